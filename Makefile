@@ -1,0 +1,36 @@
+# Needs Python 3.11 or newer and make, nothing else. PYTHON=python3.12 make demo chooses another.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test verification clean
+
+demo: .venv/demo
+	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
+	@echo "$(CURDIR)/out/demo/report.html"
+
+test: .venv/test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q -n 2 -m "not verification"
+
+# What takes long, and the page of measured figures that it rebuilds.
+verification: .venv/test
+	$(BIN)/python -m pytest -q -m verification
+	$(BIN)/python docs/build_verification.py
+
+.venv/created:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "truespring needs Python 3.11 or newer; try: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv .venv
+	touch $@
+
+.venv/demo: .venv/created pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+.venv/test: .venv/created pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@ .venv/demo
+
+clean:
+	rm -rf .venv out .mypy_cache .pytest_cache .ruff_cache .hypothesis

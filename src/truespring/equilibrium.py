@@ -1,0 +1,244 @@
+"""solve(problem, model, solver) -> Path: the equilibria of a body and where they should not be trusted."""
+
+import time
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.errors import ModelError
+from truespring.mesh import Surface
+from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, moduli
+from truespring.potential import Potential, Stretched
+from truespring.problem import Problem
+from truespring.solvers import Equilibrium, Newton, Reporter
+
+
+class Status(StrEnum):
+    """How a path ended; `advice` says what it means and what to try."""
+
+    CONVERGED = "converged"
+    UNSTABLE = "unstable"
+    INVERTED = "inverted"
+    NOT_CONVERGED = "not-converged"
+
+    @property
+    def advice(self) -> str:
+        """What the status means, and the way out."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.CONVERGED: "every load level ended at a stable equilibrium",
+    Status.UNSTABLE: "an equilibrium is unstable: a real body would leave it; add a small imperfection or load less",
+    Status.INVERTED: "an element is turned inside out: load less, refine the mesh, or take a law with a barrier "
+    "(neo-hookean)",
+    Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached: load less, take more load_steps, "
+    "or another law; St. Venant-Kirchhoff gives way in compression, Hencky has a largest load in tension",
+}
+
+
+@dataclass(frozen=True)
+class State:
+    """An equilibrium of a body.
+
+    Attributes:
+        load_factor: share of the full load [-].
+        positions, displacement: [m], shape (n_nodes, dim).
+        reaction: force of the supports [N], shape (n_nodes, dim), zero where nothing is held.
+        energy: stored elastic energy [J].
+        iterations: Newton iterations.
+        residual: relative unbalanced force [-].
+        negative_eigenvalues: of the tangent; 0 is stable, None is not proven.
+        branched: true where an unstable equilibrium was left for a stable one nearby.
+        area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
+        stretch: smallest and largest length over rest length of the springs, None without springs.
+    """
+
+    load_factor: float
+    positions: Floats
+    displacement: Floats
+    reaction: Floats
+    energy: float
+    iterations: int
+    residual: float
+    negative_eigenvalues: int | None
+    branched: bool
+    area_ratio: float
+    stretch: tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The equilibria of one model of one problem, by load level.
+
+    Attributes:
+        label: how figures and tables call it.
+        kind: "springs", "fem", or what the path was read from.
+        states: equilibria in path order, the unloaded state first; read from a file, the one level it is for.
+        best: where a level was not reached, the best state there (not an equilibrium).
+        status, warnings: how it ended, and what should be known before it is trusted.
+        seconds: wall time from the built mesh to the last equilibrium.
+        surface: what was read from a file that holds no more than a deformed surface.
+        potential: what was solved, None for a path from elsewhere.
+        moduli: what the springs realise, None for other models and irregular networks.
+    """
+
+    problem: Problem
+    label: str
+    kind: str
+    states: tuple[State, ...]
+    status: Status
+    warnings: tuple[str, ...] = ()
+    seconds: float = 0.0
+    best: State | None = None
+    surface: Surface | None = None
+    potential: Potential | None = None
+    moduli: Moduli | None = None
+
+    @cached_property
+    def load_factors(self) -> Floats:
+        """Load factors of the states, shape (n_states,)."""
+        return np.array([state.load_factor for state in self.states])
+
+    @property
+    def load_factor(self) -> float:
+        """The last load level reached."""
+        return self.states[-1].load_factor if self.states else 0.0
+
+    @property
+    def complete(self) -> bool:
+        """Whether the full load was reached."""
+        return self.load_factor == 1.0
+
+    @property
+    def newton_iterations(self) -> int:
+        """All Newton iterations spent."""
+        return sum(state.iterations for state in self.states) + (self.best.iterations if self.best else 0)
+
+    def at(self, load_factor: float) -> State | None:
+        """Return the state at a load level, None where the path has none there."""
+        found = np.flatnonzero(np.abs(self.load_factors - load_factor) <= 1e-9)
+        return self.states[found[0]] if found.size else None
+
+    def applied_force(self, state: State) -> Floats:
+        """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion."""
+        loading = self.problem.loading
+        if self.problem.loads:
+            return np.asarray(state.load_factor * loading.external_force.sum(axis=0))
+        return np.asarray((state.reaction * (loading.displacement != 0)).sum(axis=0))
+
+
+def solve(
+    problem: Problem,
+    model: Model | Potential,
+    solver: Newton | None = None,
+    report: Reporter | None = None,
+) -> Path:
+    """Follow the equilibria of `problem` under `model` from no load to the full one.
+
+    `model` is Springs, Fem, or a potential such as a SpringNetwork, which is taken as it is (the
+    problem then needs no material). A failure is not an exception: see Path.status and Path.best.
+    Raises ModelError where the model does not fit the problem.
+    """
+    started = time.perf_counter()
+    potential = model if isinstance(model, Potential) else model.potential(problem)
+    if potential.nodes.shape != problem.mesh.nodes.shape:
+        raise ModelError(
+            f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
+        )
+    found = list((solver or Newton()).follow(potential, problem.loading, report))
+    seconds = time.perf_counter() - started
+    linear = isinstance(model, Fem) and not LAWS[model.law].finite
+    realised = moduli(problem, model) if isinstance(model, Springs) else None
+    states = tuple(_state(problem, potential, one) for one in found if one.converged)
+    best = None if found[-1].converged else _state(problem, potential, found[-1])
+    return Path(
+        problem=problem,
+        label="springs" if isinstance(model, SpringNetwork) else getattr(model, "label", type(model).__name__),
+        kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
+        states=states,
+        status=_status(states, best, linear),
+        warnings=(*model_warnings(problem, realised), *_path_warnings(states, best, linear)),
+        seconds=seconds,
+        best=best,
+        potential=potential,
+        moduli=realised,
+    )
+
+
+def _state(problem: Problem, potential: Potential, found: Equilibrium) -> State:
+    loading = problem.loading
+    reaction = np.where(loading.held, found.internal_force - found.load_factor * loading.external_force, 0.0)
+    stretch = potential.stretch(found.positions) if isinstance(potential, Stretched) else None
+    return State(
+        load_factor=found.load_factor,
+        positions=found.positions,
+        displacement=found.positions - problem.mesh.nodes,
+        reaction=reaction,
+        energy=found.energy,
+        iterations=found.iterations,
+        residual=found.residual,
+        negative_eigenvalues=found.negative_eigenvalues,
+        branched=found.branched,
+        area_ratio=problem.mesh.smallest_area_ratio(found.positions),
+        stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
+    )
+
+
+def _status(states: tuple[State, ...], best: State | None, linear: bool) -> Status:
+    if best is not None:
+        return Status.NOT_CONVERGED
+    if any(state.area_ratio <= 0 for state in states) and not linear:
+        return Status.INVERTED
+    if any(state.negative_eigenvalues for state in states):
+        return Status.UNSTABLE
+    return Status.CONVERGED
+
+
+def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]:
+    """Return what should be known of springs before they are solved: moduli other than the material's."""
+    if realised is None:
+        return ()
+    young, poisson = realised.young(), realised.poisson()
+    differs = abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01
+    if not differs:
+        return ()
+    return (
+        f"these springs realise Young's modulus {young:.6g} Pa and Poisson's ratio {poisson:.4g} along x; the material "
+        f"in its section has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}",
+    )
+
+
+def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) -> tuple[str, ...]:
+    warnings = []
+    if best is not None:
+        last = f"{states[-1].load_factor:.6g}" if states else "none"
+        warnings.append(
+            f"no equilibrium found at load factor {best.load_factor:.6g} (relative residual {best.residual:.1e}); "
+            f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
+        )
+    inverted = [state for state in states if state.area_ratio <= 0]
+    if inverted:
+        advice = "a linear model does not notice" if linear else Status.INVERTED.advice
+        warnings.append(
+            f"an element is inverted from load factor {inverted[0].load_factor:.6g} on "
+            f"(smallest area ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
+        )
+    unstable = [state for state in states if state.negative_eigenvalues]
+    if unstable:
+        warnings.append(
+            f"the equilibrium at load factor {unstable[0].load_factor:.6g} is unstable "
+            f"({unstable[0].negative_eigenvalues} negative eigenvalues of the tangent): {Status.UNSTABLE.advice}"
+        )
+    branched = [state for state in states if state.branched]
+    if branched:
+        warnings.append(
+            f"stability was lost before load factor {branched[0].load_factor:.6g}: the path goes on along a stable "
+            "branch nearby (buckling); the side it took is arbitrary"
+        )
+    if any(state.negative_eigenvalues is None for state in states):
+        warnings.append("stability not proven: the inertia of a tangent could not be found")
+    return tuple(warnings)

@@ -1,0 +1,34 @@
+"""The one family of errors that truespring raises on purpose."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class TruespringError(Exception):
+    """The input is wrong; the message names the value, where it stands and the way out."""
+
+
+class StudyError(TruespringError):
+    """A study file is wrong: file, key, value and what is allowed."""
+
+
+class MeshError(TruespringError):
+    """A mesh, a shape or a selection on a mesh is wrong."""
+
+
+class ProblemError(TruespringError):
+    """What is asked cannot be solved as it stands: supports, loads, material or section."""
+
+
+class ModelError(TruespringError):
+    """A model cannot be built for this problem: an unknown rule or law, or one that does not fit."""
+
+
+class ReferenceFileError(TruespringError):
+    """A result of another program cannot be read."""
+
+
+def nearest(word: str, allowed: Iterable[str]) -> str:
+    """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, else nothing."""
+    close = difflib.get_close_matches(word, list(allowed), n=1, cutoff=0.5)
+    return f" (did you mean '{close[0]}'?)" if close else ""

@@ -1,0 +1,79 @@
+"""Material and section: what a body is made of and how its third direction behaves."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from truespring.errors import ProblemError
+
+
+class Lame(NamedTuple):
+    """Lamé constants [Pa]."""
+
+    lam: float
+    mu: float
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic elastic material: `young` [Pa], `poisson` [-], `density` [kg/m^3] if known."""
+
+    young: float
+    poisson: float
+    density: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.young) and self.young > 0):
+            raise ProblemError(f"young = {self.young!r} Pa: Young's modulus must be positive and finite")
+        if not -1 < self.poisson < 0.5:
+            raise ProblemError(
+                f"poisson = {self.poisson!r}: Poisson's ratio must lie between -1 and 0.5, both excluded; "
+                "take 0.49 for a nearly incompressible material"
+            )
+        if self.density is not None and not (math.isfinite(self.density) and self.density > 0):
+            raise ProblemError(f"density = {self.density!r} kg/m^3: a density must be positive and finite")
+
+    @property
+    def lame(self) -> Lame:
+        """Lamé constants of the three-dimensional material [Pa]."""
+        young, poisson = self.young, self.poisson
+        return Lame(young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson)))
+
+
+@dataclass(frozen=True, slots=True)
+class Section(ABC):
+    """How a plane body carries its third direction; `thickness` [m]."""
+
+    thickness: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.thickness) and self.thickness > 0):
+            raise ProblemError(f"thickness = {self.thickness!r} m: a thickness must be positive and finite")
+
+    @abstractmethod
+    def plane_moduli(self, material: Material) -> tuple[float, float]:
+        """Return Young's modulus [Pa] and Poisson's ratio [-] as seen by a test within the plane."""
+
+    def plane_lame(self, material: Material) -> Lame:
+        """Lamé constants of the linear law within the plane [Pa]."""
+        young, poisson = self.plane_moduli(material)
+        return Lame(young * poisson / (1 - poisson**2), material.lame.mu)
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneStress(Section):
+    """A thin body, free to change its thickness."""
+
+    def plane_moduli(self, material: Material) -> tuple[float, float]:
+        """Those of the material itself."""
+        return material.young, material.poisson
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneStrain(Section):
+    """A slice of a long body, held at its thickness."""
+
+    def plane_moduli(self, material: Material) -> tuple[float, float]:
+        """E / (1 - nu^2) and nu / (1 - nu)."""
+        return material.young / (1 - material.poisson**2), material.poisson / (1 - material.poisson)

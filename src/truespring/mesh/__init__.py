@@ -1,0 +1,17 @@
+"""Geometry that knows no physics: nodes, elements, named sides, selections."""
+
+from truespring.mesh.mesh import ELEMENT_KINDS as ELEMENT_KINDS
+from truespring.mesh.mesh import ElementKind as ElementKind
+from truespring.mesh.mesh import Mesh as Mesh
+from truespring.mesh.selections import Box as Box
+from truespring.mesh.selections import Near as Near
+from truespring.mesh.selections import Plane as Plane
+from truespring.mesh.selections import Selection as Selection
+from truespring.mesh.selections import named_point as named_point
+from truespring.mesh.selections import nearest_node as nearest_node
+from truespring.mesh.selections import select as select
+from truespring.mesh.selections import shares as shares
+from truespring.mesh.shapes import rectangle as rectangle
+from truespring.mesh.surface import Surface as Surface
+from truespring.mesh.surface import SurfaceDistance as SurfaceDistance
+from truespring.mesh.surface import surface_distance as surface_distance

@@ -1,0 +1,32 @@
+"""Models: a problem becomes a potential. Springs, FEM, and the moduli that springs realise."""
+
+from typing import Protocol
+
+from truespring.models.fem import Fem as Fem
+from truespring.models.laws import LAWS as LAWS
+from truespring.models.moduli import Moduli as Moduli
+from truespring.models.moduli import moduli as moduli
+from truespring.models.rules import RULES as RULES
+from truespring.models.rules import UserStiffness as UserStiffness
+from truespring.models.springs import SpringNetwork as SpringNetwork
+from truespring.models.springs import Springs as Springs
+from truespring.potential import Potential
+from truespring.problem import Problem
+
+
+class Model(Protocol):
+    """How matter is idealised: what `solve` takes beside a bare potential."""
+
+    @property
+    def kind(self) -> str:
+        """The word of the study file."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """How curves and tables call the model."""
+        ...
+
+    def potential(self, problem: Problem) -> Potential:
+        """Build the potential of the problem's body."""
+        ...

@@ -1,0 +1,167 @@
+"""Finite elements on the same mesh, the embedded reference: assembled with scikit-fem, full integration."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, Functional, LinearForm, MeshQuad
+
+from truespring.arrays import Floats
+from truespring.errors import ModelError, nearest
+from truespring.material import PlaneStress
+from truespring.mesh import Mesh
+from truespring.models.laws import LAWS, Constants, Law, Response
+from truespring.potential import SparseMatrix
+from truespring.problem import Problem
+
+# scikit-fem's mesh and element of each kind, and the order of its quadrature: 2 x 2 Gauss points
+# integrate polynomials of third order in each direction.
+_SKFEM = {"quadrilateral": (MeshQuad, ElementQuad1, 3)}
+
+
+@dataclass(frozen=True)
+class Fem:
+    """The finite element model with the constitutive `law`, a key of LAWS."""
+
+    law: str
+
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise ModelError(f"law = '{self.law}' is unknown{nearest(self.law, LAWS)}; allowed: {', '.join(LAWS)}")
+
+    kind = "fem"
+
+    @property
+    def label(self) -> str:
+        """How curves and tables call the model: the law is always named."""
+        return LAWS[self.law].label
+
+    def potential(self, problem: Problem) -> "FemPotential":
+        """Return the potential of four-node quadrilaterals with 2 x 2 Gauss points."""
+        return fem_potential(problem, self.law)
+
+
+def fem_potential(problem: Problem, law: str) -> "FemPotential":
+    """Set up quadrature and constants of `law` on the problem's mesh."""
+    if problem.material is None or problem.section is None or problem.mesh.element not in _SKFEM:
+        raise ModelError(f"finite elements need a material, a section and elements of a kind among {', '.join(_SKFEM)}")
+    constants = Constants.of(problem.material.lame, isinstance(problem.section, PlaneStress))
+    return FemPotential(problem.mesh, LAWS[law], constants, problem.section.thickness)
+
+
+def element_matrices(problem: Problem) -> Floats:
+    """Return each element's linear stiffness matrix [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
+    return fem_potential(problem, "linear").element_hessians(problem.mesh.nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class FemPotential:
+    """Elastic energy of a mesh of finite elements, integrated over the reference body.
+
+    With W the law's energy density, S its stress and A its elasticity at the deformation gradient F:
+    energy W, gradient F S : grad v, Hessian F^T grad u : A : F^T grad v + S : (grad u^T grad v).
+    The linear law has F = I in the last two and no geometric part.
+    """
+
+    mesh: Mesh
+    law: Law
+    constants: Constants
+    thickness: float
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference positions [m], shape (n_nodes, dim)."""
+        return self.mesh.nodes
+
+    @cached_property
+    def _basis(self) -> Any:
+        mesh_class, element_class, order = _SKFEM[self.mesh.element]
+        grid = mesh_class(
+            np.ascontiguousarray(self.mesh.nodes.T),
+            np.ascontiguousarray(self.mesh.elements.T),
+            validate=False,
+        )
+        return Basis(grid, ElementVector(element_class()), intorder=order)
+
+    def _deformation(self, positions: Floats) -> Floats:
+        """Deformation gradient at the Gauss points, axes (i, j, element, point)."""
+        displacement = (positions - self.nodes).ravel()
+        gradient = self._basis.interpolate(displacement).grad
+        return np.asarray(gradient + np.eye(len(gradient))[:, :, None, None])
+
+    def _respond(self, F: Floats) -> Response:
+        if not self.law.finite:
+            return self.law.respond((F + F.swapaxes(0, 1)) / 2 - np.eye(len(F))[:, :, None, None], self.constants)
+        return self.law.respond(np.einsum("ki...,kj...->ij...", F, F), self.constants)
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]; infinite where a law with a barrier meets an inverted element."""
+        F = self._deformation(positions)
+        with np.errstate(over="ignore", invalid="ignore"):
+            density = self._respond(F).energy
+        if not np.isfinite(density).all() or (self.law.barrier and (_determinant(F) <= 0).any()):
+            return float("inf")
+        return float(Functional(lambda w: self.thickness * density).assemble(self._basis))
+
+    def stress(self, positions: Floats) -> Floats:
+        """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (i, j, element, point)."""
+        return self._respond(self._deformation(positions)).stress
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        F = self._deformation(positions)
+        stress = self._respond(F).stress
+        first = np.einsum("ik...,kj...->ij...", F, stress) if self.law.finite else stress
+        form = LinearForm(lambda v, w: self.thickness * np.einsum("ij...,ij...", first, v.grad))
+        return np.asarray(form.assemble(self._basis)).reshape(positions.shape)
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Tangent stiffness [N/m]; `stress` [Pa] makes the geometric part, by default that of the positions."""
+        return sparse.csr_array(self._tangent(positions, stress).tocsr())
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """Sum of the element Hessians, each with its negative eigenvalues cut off [N/m]."""
+        tangent = self._tangent(positions, None)
+        local = tangent.tolocal()
+        values, vectors = np.linalg.eigh((local + local.swapaxes(1, 2)) / 2)
+        clipped = np.einsum("eik,ek,ejk->eij", vectors, np.maximum(values, 0.0), vectors)
+        return sparse.csr_array(tangent.fromlocal(clipped).tocsr())
+
+    def element_hessians(self, positions: Floats) -> Floats:
+        """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
+        return np.asarray(self._tangent(positions, None).tolocal())
+
+    def _tangent(self, positions: Floats, stress: Floats | None) -> Any:
+        F = self._deformation(positions)
+        response = self._respond(F)
+        if self.law.finite:
+            S = response.stress if stress is None else stress
+            tangent = np.einsum("ai...,ijkl...,bk...->ajbl...", F, response.elasticity, F, optimize=True)
+            tangent += np.einsum("ab,jl...->ajbl...", np.eye(len(F)), S)
+        else:
+            tangent = response.elasticity
+
+        def contract(u: Any, v: Any, w: Any) -> Any:
+            return self.thickness * np.einsum("ajbl...,aj...,bl...->...", tangent, v.grad, u.grad)
+
+        return BilinearForm(contract).coo_data(self._basis)
+
+    def cauchy_stress(self, positions: Floats) -> Floats:
+        """True stress averaged over the points of each element [Pa], shape (n_elements, dim, dim).
+
+        F S F^T over the volume ratio, the change of thickness included; of the linear law, its stress.
+        """
+        F = self._deformation(positions)
+        response = self._respond(F)
+        true = response.stress
+        if self.law.finite:
+            volume = _determinant(F) * response.thickness_stretch
+            pushed = np.einsum("ik...,kl...,jl...->ij...", F, true, F)
+            true = np.divide(pushed, volume, out=np.full_like(pushed, np.nan), where=volume != 0)
+        return np.moveaxis(true.mean(axis=-1), -1, 0)
+
+
+def _determinant(F: Floats) -> Floats:
+    return np.asarray(np.linalg.det(np.moveaxis(F, (0, 1), (-2, -1))))

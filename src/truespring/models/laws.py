@@ -1,0 +1,214 @@
+"""Constitutive laws: from the deformation gradient to energy density, stress and elasticity.
+
+Arrays have their tensor axes first and any number of axes after them, as scikit-fem does. In the
+plane, tensors are 2 by 2 and the third direction is settled here: in plane strain it keeps its
+length, in plane stress it takes the one that leaves it free of stress. A law is one function and
+one line in LAWS.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.material import Lame
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What a law needs: the Lamé constants [Pa] and how the third direction behaves.
+
+    `lam_plane` is 2 lam mu / (lam + 2 mu) in plane stress, lam otherwise: the constant with which a
+    quadratic law within the plane accounts for the third direction.
+    """
+
+    lam: float
+    mu: float
+    plane_stress: bool
+
+    @property
+    def lam_plane(self) -> float:
+        """The first Lamé constant within the plane [Pa]."""
+        return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
+
+    @classmethod
+    def of(cls, lame: Lame, plane_stress: bool) -> "Constants":
+        """Take the constants of the three-dimensional material."""
+        return cls(lame.lam, lame.mu, plane_stress)
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What a law answers.
+
+    Attributes:
+        energy: per reference volume [J/m^3]; infinite where the law does not reach.
+        stress: second Piola-Kirchhoff stress [Pa], axes (i, j, ...); of the linear law, the stress.
+        elasticity: its derivative by the Green strain [Pa], axes (i, j, k, l, ...).
+        thickness_stretch: length of the third direction over its rest length; 1 where it is held or in 3D.
+    """
+
+    energy: Floats
+    stress: Floats
+    elasticity: Floats
+    thickness_stretch: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A table entry: `respond` takes the strain measure named by `finite`.
+
+    A finite law takes the right Cauchy-Green tensor C = F^T F and is frame invariant; a law that is
+    not finite takes the small strain (F + F^T) / 2 - I. A law with a `barrier` has infinite energy
+    where an element is inverted; C alone cannot tell that.
+    """
+
+    respond: Callable[[Floats, Constants], Response]
+    finite: bool
+    barrier: bool
+    label: str
+    formula: str
+
+
+def linear(strain: Floats, constants: Constants) -> Response:
+    """Hooke: W = lam/2 (tr e)^2 + mu e : e of the small strain."""
+    return _quadratic(strain, constants, np.ones(strain.shape[2:]) + _thickness_strain(strain, constants))
+
+
+def saint_venant_kirchhoff(C: Floats, constants: Constants) -> Response:
+    """W = lam/2 (tr E)^2 + mu E : E of the Green strain E = (C - I) / 2."""
+    strain = (C - _identity(C)) / 2
+    # The thickness is the root of 1 + 2 E_33; the law itself goes on where that is negative.
+    thickness = np.sqrt(np.maximum(1 + 2 * _thickness_strain(strain, constants), 0.0))
+    return _quadratic(strain, constants, thickness)
+
+
+def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Response:
+    lam, mu = constants.lam_plane, constants.mu
+    eye = np.eye(len(strain))
+    trace = np.einsum("ii...->...", strain)
+    identity = _identity(strain)
+    stress = lam * trace * identity + 2 * mu * strain
+    swap = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
+    elasticity = lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * swap
+    energy = lam / 2 * trace**2 + mu * np.einsum("ij...,ij...->...", strain, strain)
+    return Response(energy, stress, _everywhere(elasticity, strain), thickness)
+
+
+def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
+    """Strain of the third direction under a quadratic law: -lam / (lam + 2 mu) tr e in plane stress."""
+    if not constants.plane_stress:
+        return np.zeros(strain.shape[2:])
+    return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * np.einsum("ii...->...", strain))
+
+
+def neo_hookean(C: Floats, constants: Constants) -> Response:
+    """W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2, J the volume ratio (Simo and Pister 1984).
+
+    In plane stress C_33 solves mu (C_33 - 1) + lam ln J = 0 at every point; eliminated, it turns
+    lam into lam 2 mu C_33 / (2 mu C_33 + lam) in the elasticity.
+    """
+    lam, mu = constants.lam, constants.mu
+    det = _determinant(C)
+    valid = det > 0
+    det = np.where(valid, det, 1.0)
+    C_33 = _free_thickness(np.log(det), lam / mu) if constants.plane_stress else np.ones_like(det)
+    log_J = (np.log(det) + np.log(C_33)) / 2
+    inverse = _inverse(np.where(valid, C, _identity(C)))
+    stress = mu * (_identity(C) - inverse) + lam * log_J * inverse
+    lam_eliminated = lam * 2 * mu * C_33 / (2 * mu * C_33 + lam) if constants.plane_stress else lam
+    outer = np.einsum("ij...,kl...->ijkl...", inverse, inverse)
+    swap = np.einsum("ik...,jl...->ijkl...", inverse, inverse) + np.einsum("il...,jk...->ijkl...", inverse, inverse)
+    elasticity = lam_eliminated * outer + (mu - lam * log_J) * swap
+    trace = np.einsum("ii...->...", C) - len(C) + (C_33 - 1)
+    energy = np.where(valid, mu / 2 * trace - mu * log_J + lam / 2 * log_J**2, np.inf)
+    return Response(energy, stress, elasticity, np.sqrt(C_33))
+
+
+def _free_thickness(log_det: Floats, ratio: float) -> Floats:
+    """Solve C_33 - 1 + ratio/2 (log_det + ln C_33) = 0 for C_33 > 0, by Newton in y = ln C_33.
+
+    e^y + ratio/2 y is convex and rises where ratio > 0, so that from the second step on Newton
+    descends monotonically; Poisson's ratio below zero (ratio in (-2/3, 0)) starts near the root.
+    """
+    half = ratio / 2
+    y = np.clip(-half * log_det / (1 + half), -50.0, 50.0)
+    for _ in range(100):
+        step = (np.expm1(y) + half * (log_det + y)) / (np.exp(y) + half)
+        y = y - np.clip(step, -2.0, 2.0)
+        if np.abs(step).max() <= 1e-15 * max(1.0, float(np.abs(y).max())):
+            break
+    return np.exp(y)
+
+
+def hencky(C: Floats, constants: Constants) -> Response:
+    """W = mu |ln U|^2 + lam/2 (tr ln U)^2, U the right stretch; Hencky's law in Kirchhoff stress.
+
+    With C = sum c_i N_i (x) N_i and e_i = ln(c_i) / 2 the stress is S_i = (2 mu e_i + lam tr e) / c_i.
+    Its shear elasticities are the divided differences (S_i - S_j) / (c_i - c_j), written with
+    log1p so that equal stretches need no special case. Plane stress keeps the law, with lam_plane.
+    """
+    lam, mu = constants.lam_plane, constants.mu
+    c, N = np.linalg.eigh(np.moveaxis(C, (0, 1), (-2, -1)))
+    c, N = np.moveaxis(c, -1, 0), np.moveaxis(N, (-2, -1), (0, 1))
+    valid = c[0] > 0
+    c = np.where(valid, c, 1.0)
+    strain = np.log(c) / 2
+    trace = strain.sum(axis=0)
+    tau = 2 * mu * strain + lam * trace
+    dim = len(C)
+    normal, shear = np.empty((dim, *c.shape)), np.empty((dim, *c.shape))
+    for i in range(dim):
+        for j in range(dim):
+            normal[i, j] = (2 * mu * (i == j) + lam) / (c[i] * c[j]) - 2 * (i == j) * tau[i] / c[i] ** 2
+            shear[i, j] = (mu * _log_difference(c[i], c[j]) - mu * np.log(c[j]) - lam * trace) / (c[i] * c[j])
+    elasticity = np.zeros((dim, dim, dim, dim, *c.shape[1:]))
+    for i in range(dim):
+        for j in range(dim):
+            own, other, mixed = (np.einsum("a...,b...->ab...", N[:, p], N[:, q]) for p, q in ((i, i), (j, j), (i, j)))
+            elasticity += normal[i, j] * np.einsum("ab...,cd...->abcd...", own, other)
+            if i != j:
+                elasticity += shear[i, j] * np.einsum("ab...,cd...->abcd...", mixed, mixed + mixed.swapaxes(0, 1))
+    stress = np.einsum("i...,ai...,bi...->ab...", tau / c, N, N)
+    energy = np.where(valid, mu * (strain**2).sum(axis=0) + lam / 2 * trace**2, np.inf)
+    free = -constants.lam / (constants.lam + 2 * constants.mu) * trace if constants.plane_stress else 0.0 * trace
+    return Response(energy, stress, elasticity, np.exp(free))
+
+
+def _log_difference(a: Floats, b: Floats) -> Floats:
+    """b (ln a - ln b) / (a - b), 1 where a = b."""
+    x = (a - b) / b
+    return np.divide(np.log1p(x), x, out=np.ones_like(x), where=x != 0)
+
+
+def _identity(tensor: Floats) -> Floats:
+    return _everywhere(np.eye(len(tensor)), tensor)
+
+
+def _everywhere(constant: Floats, like: Floats) -> Floats:
+    """Repeat a constant tensor over the axes of `like` after its first two, without a copy."""
+    points = like.shape[2:]
+    return np.broadcast_to(constant.reshape(constant.shape + (1,) * len(points)), constant.shape + points)
+
+
+def _determinant(tensor: Floats) -> Floats:
+    return np.asarray(np.linalg.det(np.moveaxis(tensor, (0, 1), (-2, -1))))
+
+
+def _inverse(tensor: Floats) -> Floats:
+    inverse = np.asarray(np.linalg.inv(np.moveaxis(tensor, (0, 1), (-2, -1))))
+    return np.moveaxis(inverse, (-2, -1), (0, 1))
+
+
+LAWS: MappingProxyType[str, Law] = MappingProxyType(
+    {
+        "linear": Law(linear, False, False, "linear FEM", "lam/2 (tr e)^2 + mu e:e"),
+        "saint-venant-kirchhoff": Law(
+            saint_venant_kirchhoff, True, False, "St. Venant-Kirchhoff FEM", "lam/2 (tr E)^2 + mu E:E"
+        ),
+        "neo-hookean": Law(neo_hookean, True, True, "neo-Hookean FEM", "mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2"),
+        "hencky": Law(hencky, True, True, "Hencky FEM", "mu |ln U|^2 + lam/2 (tr ln U)^2"),
+    }
+)

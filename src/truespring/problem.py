@@ -1,0 +1,140 @@
+"""The problem: what is asked, stated once and frozen. Mesh, material, section, supports, loads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats
+from truespring.errors import ProblemError
+from truespring.material import Material, Section
+from truespring.mesh import Mesh, Selection, select, shares
+from truespring.mesh.selections import AXES
+from truespring.potential import Loading
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A support: the directions `fix` of the nodes `on` are held (all of them by default).
+
+    `displacement` [m], one value a direction, moves them instead; it scales with the load factor.
+    """
+
+    on: Selection
+    fix: Sequence[str] | None = None
+    displacement: Sequence[float] | None = None
+
+
+@dataclass(frozen=True)
+class Force:
+    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`."""
+
+    on: Selection
+    total: Sequence[float]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A body, how it is held and what pulls at it.
+
+    `material` and `section` may be absent where the model brings its own stiffness (a SpringNetwork).
+    Raises ProblemError or MeshError where the parts do not fit, nothing loads the body, or the
+    supports leave it free to move as a rigid body.
+    """
+
+    mesh: Mesh
+    material: Material | None = None
+    section: Section | None = None
+    supports: Sequence[Fixed] = field(default=())
+    loads: Sequence[Force] = field(default=())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "supports", tuple(self.supports))
+        object.__setattr__(self, "loads", tuple(self.loads))
+        if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
+            raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
+        loading = self.loading
+        if not loading.external_force.any() and not loading.displacement.any():
+            raise ProblemError("nothing loads the body: give a load, or a support with a displacement that is not zero")
+        self._refuse_rigid_motion()
+
+    @cached_property
+    def loading(self) -> Loading:
+        """Forces and prescribed displacements at load factor 1."""
+        held, displacement = self._supports()
+        return Loading(self._forces(), held, displacement)
+
+    def _forces(self) -> Floats:
+        force = np.zeros(self.mesh.nodes.shape)
+        for load in self.loads:
+            total = _components(load.total, self.mesh.dim, "force", "N")
+            nodes = select(self.mesh, load.on)
+            force[nodes] += shares(self.mesh, nodes)[:, None] * total
+        return force
+
+    def _supports(self) -> tuple[Bools, Floats]:
+        held = np.zeros(self.mesh.nodes.shape, dtype=bool)
+        displacement = np.zeros(self.mesh.nodes.shape)
+        axes = AXES[: self.mesh.dim]
+        for support in self.supports:
+            directions = list(axes) if support.fix is None else list(support.fix)
+            if not directions or any(direction not in axes for direction in directions):
+                raise ProblemError(f"fix = {directions}: allowed are the directions {', '.join(axes)}")
+            given = [0.0] * self.mesh.dim if support.displacement is None else support.displacement
+            motion = _components(given, self.mesh.dim, "displacement", "m")
+            nodes = select(self.mesh, support.on)
+            for axis in (axes.index(direction) for direction in directions):
+                clash = nodes[held[nodes, axis] & (displacement[nodes, axis] != motion[axis])]
+                if clash.size:
+                    raise ProblemError(
+                        f"two supports move node {clash[0]} along {axes[axis]} by "
+                        f"{displacement[clash[0], axis]:g} m and by {motion[axis]:g} m: "
+                        "a node has one prescribed motion"
+                    )
+                held[nodes, axis] = True
+                displacement[nodes, axis] = motion[axis]
+        return held, displacement
+
+    def _refuse_rigid_motion(self) -> None:
+        """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
+        held = self.loading.held
+        modes = rigid_body_modes(self.mesh.nodes)
+        if held.any():
+            _, singular, combinations = np.linalg.svd(modes[held.ravel()], full_matrices=True)
+            rank = int((singular > 1e-9 * np.linalg.norm(modes, axis=0).max()).sum())
+        else:
+            rank, combinations = 0, np.eye(modes.shape[1])
+        if rank < modes.shape[1]:
+            free = np.abs(combinations[rank:]).max(axis=0)
+            dim = self.mesh.dim
+            names = [f"along {axis}" for axis in AXES[:dim]] + ["by turning"] * (modes.shape[1] - dim)
+            raise ProblemError(
+                f"the supports leave the body free to move {names[int(free.argmax())]} as a rigid body: "
+                "hold more directions or more nodes"
+            )
+
+
+def rigid_body_modes(nodes: Floats) -> Floats:
+    """Return translations, then infinitesimal rotations about the centre, shape (n_dof, 3 or 6), each of size 1."""
+    n_nodes, dim = nodes.shape
+    centred = nodes - nodes.mean(axis=0)
+    centred = centred / max(float(np.abs(centred).max()), np.finfo(float).tiny)
+    modes = [np.tile(np.eye(dim)[axis], n_nodes) for axis in range(dim)]
+    for first in range(dim):
+        for second in range(first + 1, dim):
+            turn = np.zeros((n_nodes, dim))
+            turn[:, first], turn[:, second] = -centred[:, second], centred[:, first]
+            modes.append(turn.ravel())
+    return np.stack(modes, axis=1)
+
+
+def _components(values: Sequence[float], dim: int, name: str, unit: str) -> Floats:
+    components = np.array([float(value) for value in values])
+    if len(components) != dim:
+        raise ProblemError(
+            f"{name} = {list(values)} [{unit}] has {len(components)} values, the body has {dim} directions"
+        )
+    if not np.isfinite(components).all():
+        raise ProblemError(f"{name} = {list(values)} [{unit}]: values must be finite")
+    return components

@@ -1,0 +1,255 @@
+"""Newton's method for equilibrium along a load path, with line search on the total energy."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import ProblemError
+from truespring.potential import Loading, Potential, Projectable, SparseMatrix
+from truespring.solvers.linear import Factorisation, SingularMatrixError, factorise
+
+#: Called after each iteration with load factor, iteration and relative residual.
+Reporter = Callable[[float, int, float], None]
+
+_EPS = float(np.finfo(float).eps)
+# Armijo's constant, and how far one backtracking step may cut (Nocedal and Wright, 3.1 and 3.5).
+_ARMIJO, _SHORTEST_CUT, _LONGEST_CUT = 1e-4, 0.1, 0.5
+_MIN_STEP = 1e-9
+# An unstable state is left along its mode by this share of the body's size, at most so many times.
+_NUDGE, _MAX_ESCAPES = 1e-3, 3
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state at one load level; an equilibrium where `converged`, else the best that was reached.
+
+    Attributes:
+        load_factor: share of the full load [-].
+        positions: [m], shape (n_nodes, dim).
+        internal_force: gradient of the potential [N], shape (n_nodes, dim).
+        energy: stored elastic energy [J].
+        iterations: Newton iterations spent, those of attempts that were cut back included.
+        residual: unbalanced force over the largest of applied, reaction and internal force [-].
+        negative_eigenvalues: of the tangent on the free directions: 0 if stable, None if not known.
+        branched: true where an unstable equilibrium was left for a stable one nearby.
+    """
+
+    load_factor: float
+    positions: Floats
+    internal_force: Floats
+    energy: float
+    iterations: int
+    residual: float
+    converged: bool
+    negative_eigenvalues: int | None = None
+    branched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Newton:
+    """Full Newton with load steps: cut back where they fail, grown again where they succeed.
+
+    Attributes:
+        load_steps: the levels k / load_steps are all reached and recorded.
+        tolerance: relative residual at which a state counts as balanced [-].
+        max_iterations: Newton iterations at one level before its step is cut back.
+        max_cutbacks: how often a load step may be halved.
+    """
+
+    load_steps: int = 10
+    tolerance: float = 1e-10
+    max_iterations: int = 100
+    max_cutbacks: int = 8
+
+    def __post_init__(self) -> None:
+        if self.load_steps < 1 or self.max_iterations < 1 or self.max_cutbacks < 0:
+            raise ProblemError("load_steps and max_iterations must be at least 1, max_cutbacks at least 0")
+        if not 0 < self.tolerance < 1:
+            raise ProblemError(f"tolerance = {self.tolerance}: a relative residual between 0 and 1 is wanted")
+
+    def follow(self, potential: Potential, loading: Loading, report: Reporter | None = None) -> Iterator[Equilibrium]:
+        """Yield the equilibria from load factor 0 to 1 in order.
+
+        Where a level cannot be reached the last one yielded is not converged: the best state there.
+        """
+        balance = _Balance(potential, loading, self, report)
+        state = balance.find(0.0, potential.nodes)
+        yield state
+        previous: Equilibrium | None = None
+        step, spent = 1.0 / self.load_steps, 0
+        while state.converged and state.load_factor < 1.0:
+            requested = (np.floor(state.load_factor * self.load_steps + 1e-9) + 1) / self.load_steps
+            level = float(min(requested, state.load_factor + step, 1.0))
+            if requested - level < 1e-9:
+                level = float(requested)
+            reached = balance.find(level, *balance.predictions(state, previous, level))
+            spent += reached.iterations
+            if not reached.converged and step > 2.0**-self.max_cutbacks / self.load_steps:
+                step /= 2
+                continue
+            previous, state, step = (
+                state,
+                replace(reached, iterations=spent),
+                min(2 * step, 1.0 / self.load_steps),
+            )
+            spent = 0
+            yield state
+
+
+class _Balance:
+    """The balance of forces of one potential under one loading, on the free directions."""
+
+    def __init__(self, potential: Potential, loading: Loading, settings: Newton, report: Reporter | None) -> None:
+        self.potential, self.loading, self.settings, self.report = potential, loading, settings, report
+        self.free: Ints = np.flatnonzero(~loading.held.ravel())
+        self.size = float(np.linalg.norm(np.ptp(potential.nodes, axis=0)))
+        self._last_tangent: Factorisation | None = None
+
+    def total_energy(self, positions: Floats, load_factor: float) -> tuple[float, float]:
+        """Return stored energy less the work of the loads, and the size of its rounding [J]."""
+        stored = self.potential.energy(positions)
+        work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
+        noise = 32 * _EPS * (abs(stored) + float(np.abs(work).sum()))
+        return stored - float(work.sum()), noise
+
+    def unbalanced(self, positions: Floats, load_factor: float) -> tuple[Floats, float]:
+        """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
+        applied = load_factor * self.loading.external_force
+        internal = self.potential.gradient(positions)
+        scale = max(float(np.linalg.norm(applied)), float(np.linalg.norm(internal)))
+        return (internal - applied).ravel()[self.free], scale
+
+    def moved(self, positions: Floats, step: Floats) -> Floats:
+        """Return `positions` with the free directions moved by `step` [m]."""
+        result = positions.copy()
+        result.ravel()[self.free] += step
+        return result
+
+    def tangent(self, positions: Floats) -> SparseMatrix:
+        """Return the true tangent on the free directions [N/m]."""
+        return self._free_block(self.potential.hessian(positions))
+
+    def _free_block(self, matrix: SparseMatrix) -> SparseMatrix:
+        return sparse.csr_array(matrix[self.free][:, self.free])
+
+    def predictions(self, state: Equilibrium, previous: Equilibrium | None, level: float) -> list[Floats]:
+        """Return starting points for a level: along the tangent, by extrapolation, and where the last one ended."""
+        advance = level - state.load_factor
+        motion = np.where(self.loading.held, advance * self.loading.displacement, 0.0)
+        guesses = [state.positions + motion]
+        if self._last_tangent is not None:
+            push = advance * self.loading.external_force.ravel()
+            if motion.any():
+                push = push - self.potential.hessian(state.positions) @ motion.ravel()
+            guesses.append(self.moved(state.positions + motion, self._last_tangent.solve(push[self.free])))
+        if previous is not None and not state.branched:
+            ratio = advance / (state.load_factor - previous.load_factor)
+            extrapolated = state.positions + ratio * (state.positions - previous.positions)
+            guesses.append(np.where(self.loading.held, state.positions + motion, extrapolated))
+        return guesses
+
+    def find(self, load_factor: float, *guesses: Floats) -> Equilibrium:
+        """Return the equilibrium at `load_factor`, from the guess with the least unbalanced force."""
+        usable = [guess for guess in guesses if np.isfinite(self.potential.energy(guess))]
+        if not usable:
+            nothing = np.full_like(guesses[0], np.nan)
+            return Equilibrium(load_factor, guesses[0], nothing, np.inf, 0, np.inf, converged=False)
+        start = min(usable, key=lambda guess: float(np.linalg.norm(self.unbalanced(guess, load_factor)[0])))
+        state = self._descend(load_factor, start)
+        for _ in range(_MAX_ESCAPES):
+            if not state.converged or not state.negative_eigenvalues:
+                break
+            state = self._escape(state)
+        return state
+
+    def _escape(self, state: Equilibrium) -> Equilibrium:
+        """Leave an unstable equilibrium along its mode, to the side of lower energy."""
+        assert self._last_tangent is not None  # it was found negative by factorising
+        mode = _NUDGE * self.size * self._last_tangent.lowest_mode()
+        sides = [self.moved(state.positions, mode), self.moved(state.positions, -mode)]
+        start = min(sides, key=lambda side: self.total_energy(side, state.load_factor)[0])
+        found = self._descend(state.load_factor, start)
+        spent = state.iterations + found.iterations
+        return replace(found, iterations=spent, branched=True) if found.converged else state
+
+    def _descend(self, load_factor: float, positions: Floats) -> Equilibrium:
+        """Newton with line search at one level."""
+        best = self._state(load_factor, positions, 0, np.inf)
+        for iteration in range(self.settings.max_iterations + 1):
+            force, scale = self.unbalanced(positions, load_factor)
+            size = float(np.linalg.norm(force))
+            residual = size / scale if scale else 0.0
+            if self.report:
+                self.report(load_factor, iteration, residual)
+            if residual < best.residual:
+                best = self._state(load_factor, positions, iteration, residual)
+            tangent = self.tangent(positions)
+            if size <= max(self.settings.tolerance * scale, self._rounding(tangent, positions)):
+                return self._judged(replace(best, positions=positions, iterations=iteration, converged=True), tangent)
+            step = self._step(positions, tangent, force)
+            moved = None if step is None else self._search(load_factor, positions, step, float(step @ force))
+            if moved is None:
+                break
+            positions = moved
+        return replace(best, iterations=iteration)
+
+    def _state(self, load_factor: float, positions: Floats, iterations: int, residual: float) -> Equilibrium:
+        gradient, energy = self.potential.gradient(positions), self.potential.energy(positions)
+        return Equilibrium(load_factor, positions, gradient, energy, iterations, residual, converged=False)
+
+    def _rounding(self, tangent: SparseMatrix, positions: Floats) -> float:
+        """The unbalanced force that rounding of the positions alone makes [N]: no residual can go below."""
+        centred = (positions - positions.mean(axis=0)).ravel()[self.free]
+        return 8 * _EPS * float(np.linalg.norm(abs(tangent) @ np.abs(centred)))
+
+    def _judged(self, state: Equilibrium, tangent: SparseMatrix) -> Equilibrium:
+        """Add the inertia of the tangent."""
+        if not self.free.size:
+            return replace(state, negative_eigenvalues=0)
+        try:
+            self._last_tangent = factorise(tangent)
+        except SingularMatrixError:
+            self._last_tangent = None
+            return replace(state, negative_eigenvalues=None)
+        return replace(state, negative_eigenvalues=self._last_tangent.negative_eigenvalues)
+
+    def _step(self, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
+        """Return a direction of descent: Newton's where the tangent is positive, else that of a positive neighbour."""
+        for candidate in self._positive_neighbours(positions, tangent):
+            try:
+                factors = factorise(candidate)
+            except SingularMatrixError:
+                continue
+            step = -factors.solve(force)
+            if not factors.negative_eigenvalues and np.isfinite(step).all() and step @ force < 0:
+                return step
+        return None
+
+    def _positive_neighbours(self, positions: Floats, tangent: SparseMatrix) -> Iterator[SparseMatrix]:
+        """Yield the tangent, its projection, then the projection with a growing share of its diagonal added."""
+        yield tangent
+        projected = tangent
+        if isinstance(self.potential, Projectable):
+            projected = self._free_block(self.potential.projected_hessian(positions))
+            yield projected
+        diagonal = np.abs(projected.diagonal())
+        for share in (1e-6, 1e-4, 1e-2, 1.0, 10.0):
+            yield sparse.csr_array(projected + sparse.diags_array(share * (diagonal + diagonal.mean())))
+
+    def _search(self, load_factor: float, positions: Floats, step: Floats, slope: float) -> Floats | None:
+        """Backtrack along `step` until the total energy falls enough; None where it never does."""
+        energy, noise = self.total_energy(positions, load_factor)
+        length = 1.0
+        while length >= _MIN_STEP:
+            moved = self.moved(positions, length * step)
+            with np.errstate(over="ignore", invalid="ignore"):
+                there, noise_there = self.total_energy(moved, load_factor)
+            if there <= energy + _ARMIJO * length * slope + max(noise, noise_there):
+                return moved
+            curvature = there - energy - slope * length
+            cut = -slope * length / (2 * curvature) if np.isfinite(curvature) and curvature > 0 else _SHORTEST_CUT
+            length *= min(max(cut, _SHORTEST_CUT), _LONGEST_CUT)
+        return None
