@@ -1,0 +1,1 @@
+"""Paths from elsewhere: results of other programs."""

@@ -1,0 +1,46 @@
+"""Result: all that one study gave, which everything in this folder draws, tabulates or writes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from truespring.compare import Comparison, closest
+from truespring.equilibrium import Path, Status
+from truespring.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One study, solved.
+
+    Attributes:
+        title: the study's own.
+        stem: name of the study's file without its suffix; names the output folder.
+        problem: what was asked.
+        paths: by the name of the model in the study, in its order.
+        probe: number of the node that is watched.
+        model: name of the path that is compared with the others; None where nothing is compared.
+        comparisons: by name of the reference.
+        tolerance: the rms error up to which two paths agree.
+        source: text of the study file, to run it again.
+    """
+
+    title: str
+    stem: str
+    problem: Problem
+    paths: Mapping[str, Path]
+    probe: int
+    model: str | None
+    comparisons: Mapping[str, Comparison]
+    tolerance: float
+    source: str
+
+    @cached_property
+    def closest(self) -> str | None:
+        """Name of the reference nearest to the model at full load."""
+        return closest(self.comparisons)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every path reached full load through stable equilibria."""
+        return all(path.status is Status.CONVERGED for path in self.paths.values())
