@@ -75,6 +75,20 @@ class Stretched(Potential, Protocol):
         ...
 
 
+@runtime_checkable
+class Visible(Potential, Protocol):
+    """A potential that can be drawn: its cells and what lives on them."""
+
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """VTK name of the cells and their node numbers, shape (n_cells, k)."""
+        ...
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Values on the cells by name, each of shape (n_cells, ...), SI units."""
+        ...
+
+
 @dataclass(frozen=True)
 class Loading:
     """What acts on a potential from outside at load factor 1; every part of it scales linearly.

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, Functional, LinearForm, MeshQuad
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import PlaneStress
 from truespring.mesh import Mesh
@@ -147,6 +147,19 @@ class FemPotential:
             return self.thickness * np.einsum("ajbl...,aj...,bl...->...", tangent, v.grad, u.grad)
 
         return BilinearForm(contract).coo_data(self._basis)
+
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """The elements, shape (n_elements, nodes)."""
+        return self.mesh.kind.vtk, self.mesh.elements
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """True stress [Pa], padded to 3 by 3 and flattened, and strain energy [J] of each element."""
+        stress = np.zeros((len(self.mesh.elements), 3, 3))
+        stress[:, : self.mesh.dim, : self.mesh.dim] = self.cauchy_stress(positions)
+        density = self._respond(self._deformation(positions)).energy
+        energy = Functional(lambda w: self.thickness * density).elemental(self._basis)
+        return {"stress": stress.reshape(-1, 9), "strain_energy": np.asarray(energy)}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """True stress averaged over the points of each element [Pa], shape (n_elements, dim, dim).

@@ -64,6 +64,21 @@ class SpringNetwork:
         """The network as a mesh of lines: what a Problem of a plain network takes."""
         return Mesh(self.nodes, self.springs, "line")
 
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """The springs as lines, shape (n_springs, 2)."""
+        return "line", self.springs
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring."""
+        tension = self.stress(positions)
+        return {
+            "tension": tension,
+            "stretch": self.stretch(positions),
+            "stiffness": self.stiffness,
+            "strain_energy": tension * (self._lengths(positions)[1] - self.rest_length) / 2,
+        }
+
     @cached_property
     def _pattern(self) -> Pattern:
         return Pattern(self.springs, *self.nodes.shape)
@@ -138,8 +153,8 @@ class Springs:
     @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        rule = f"{self.rule} rule" if self.stiffness is None else "own stiffness"
-        return f"springs, {rule}" + (", single" if self.sharing == "single" else "")
+        rule = self.rule if self.stiffness is None else "own stiffness"
+        return f"springs ({rule}, single)" if self.sharing == "single" else f"springs ({rule})"
 
     def element_stiffness(self, problem: Problem) -> Floats:
         """Stiffness of each element's own springs [N/m], shape (n_elements, links of the kind)."""

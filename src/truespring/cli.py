@@ -1,0 +1,257 @@
+"""The command line: parses, calls, prints; nothing else."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.errors import TruespringError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from truespring.report.result import Result
+    from truespring.study import Study
+
+CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code: 0 converged, 1 not, 2 the input is wrong."""
+    options = _parser().parse_args(arguments)
+    try:
+        with _threads(options.threads):
+            code: int = options.verb(options)
+            return code
+    except TruespringError as error:
+        for line in str(error).splitlines():
+            print(f"truespring: {line}", file=sys.stderr)  # noqa: T201  # the one place that prints
+        return WRONG_INPUT
+    except MemoryError:
+        print("truespring: out of memory: take fewer elements", file=sys.stderr)  # noqa: T201
+        return NOT_CONVERGED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="truespring",
+        description="Mass-spring bodies true to their material, solved at large deformation, shown beside FEM.",
+    )
+    parser.add_argument("--version", action="version", version=f"truespring {version('truespring')}")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--json", action="store_true", help="print one JSON object on standard output, nothing else")
+    common.add_argument("--quiet", action="store_true", help="no progress and no tables; errors are still said")
+    common.add_argument("--threads", type=_positive, metavar="N", help="threads of the linear algebra (default: all)")
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+
+    def add(name: str, run: Callable[[argparse.Namespace], int], summary: str, studies: bool = True) -> Any:
+        verb = verbs.add_parser(name, parents=[common], help=summary, description=summary)
+        verb.set_defaults(verb=run)
+        if studies:
+            verb.add_argument("study", nargs="+", help="a study file (TOML)")
+        return verb
+
+    for name, run, summary in (
+        ("verify", _verify, "solve every model of a study, compare them, write curves, pictures and a report"),
+        ("solve", _solve, "the same without comparison, figures and report"),
+    ):
+        verb = add(name, run, summary)
+        verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    add("check", _check, "check a study and show what would be run, solving nothing")
+    add("schema", _schema, "print the JSON Schema of a study file", studies=False)
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is not a positive number")
+    return number
+
+
+@contextmanager
+def _threads(limit: int | None) -> Iterator[None]:
+    with ExitStack() as stack:
+        if limit is not None:
+            from threadpoolctl import threadpool_limits
+
+            stack.enter_context(threadpool_limits(limit))
+        yield
+
+
+def _verify(options: argparse.Namespace) -> int:
+    return _run(options, comparing=True)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    return _run(options, comparing=False)
+
+
+def _run(options: argparse.Namespace, comparing: bool) -> int:
+    from truespring.report.summary import summary
+    from truespring.study import read_studies, run, write, write_overview
+
+    if options.out.exists() and not options.out.is_dir():
+        raise TruespringError(f"--out {options.out}: is a file, a folder is wanted")
+    studies = read_studies(options.study)
+    console = _console(options)
+    results = []
+    for study in studies:
+        _print_moduli(console, study)
+        with _progress(options) as progress:
+            result = run(study, progress, comparing)
+        results.append(result)
+        try:
+            write(result, options.out, report=comparing)
+        except OSError as error:
+            raise TruespringError(f"--out {options.out}: cannot be written: {error.strerror}") from None
+        _print_result(console, result)
+    if comparing:
+        write_overview(results, options.out)
+        console.print(f"report: {options.out / 'report.html'}", soft_wrap=True)
+    if options.json:
+        summaries = {result.stem: summary(result) for result in results}
+        _print_json(summaries if len(results) > 1 else summaries[results[0].stem])
+    for result in results:
+        _say_failures(result, options.out)
+    return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
+
+
+def _say_failures(result: "Result", out: Path) -> None:
+    """Name on standard error what did not converge, with the last good level and what to try."""
+    for name, path in result.paths.items():
+        if str(path.status) != "converged":
+            print(  # noqa: T201
+                f"truespring: {result.stem}: model '{name}' is {path.status}; "
+                f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
+                *(f"truespring:   {warning}" for warning in path.warnings),
+                sep="\n",
+                file=sys.stderr,
+            )
+
+
+def _check(options: argparse.Namespace) -> int:
+    from truespring.study import plan, read_studies
+
+    studies = read_studies(options.study)
+    plans = {study.stem: plan(study) for study in studies}
+    console = _console(options)
+    for study in studies:
+        _print_plan(console, plans[study.stem])
+        _print_moduli(console, study)
+    if options.json:
+        _print_json(plans if len(plans) > 1 else plans[studies[0].stem])
+    return CONVERGED
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from truespring.study.schema import StudyTable
+
+    _print_json(StudyTable.model_json_schema())
+    return CONVERGED
+
+
+def _print_json(value: Any) -> None:
+    print(json.dumps(value, indent=2, allow_nan=False))  # noqa: T201
+
+
+def _console(options: argparse.Namespace) -> "Console":
+    from rich.console import Console
+
+    return Console(quiet=options.quiet or options.json, highlight=False)
+
+
+@contextmanager
+def _progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float], None] | None]:
+    """A bar a model on standard error, where that is a terminal."""
+    if options.quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    tasks: dict[str, TaskID] = {}
+    with Progress(console=Console(stderr=True), transient=True) as bars:
+
+        def advance(study: str, model: str, load_factor: float) -> None:
+            if model not in tasks:
+                tasks[model] = bars.add_task(f"{study}: {model}", total=1.0)
+            bars.update(tasks[model], completed=load_factor)
+
+        yield advance
+
+
+def _table(title: str, *columns: str) -> "Table":
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="left" if number == 0 else "right")
+    return table
+
+
+def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
+    held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
+    force = ", ".join(f"{component:g}" for component in plan["total_force"])
+    console.print(f"[bold]{plan['title']}[/bold]")
+    console.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
+    console.print(f"held nodes: {held}")
+    console.print(f"total force ({force}) N in {plan['load_steps']} load steps")
+    for name, model in plan["models"].items():
+        console.print(f"  {name}: {model['label']}")
+    compare = plan["compare"]
+    console.print(f"compared: {compare['model']} with {', '.join(compare['references']) or 'nothing'}\n")
+
+
+def _print_moduli(console: "Console", study: "Study") -> None:
+    """What the springs realise, before anything is solved."""
+    from truespring.equilibrium import model_warnings
+    from truespring.models import Springs, moduli
+
+    for name, entry in study.entries.items():
+        if not isinstance(entry, Springs):
+            continue
+        realised = moduli(study.problem, entry)
+        table = _table(f"{study.stem}: what '{name}' realises, {entry.label}", "", "springs", "material")
+        wanted_young, wanted_poisson = f"{realised.young_wanted:.6g}", f"{realised.poisson_wanted:.4f}"
+        table.add_row("Young's modulus at 0 degrees [Pa]", f"{realised.young():.6g}", wanted_young)
+        table.add_row("Young's modulus at 45 degrees [Pa]", f"{realised.young(45):.6g}", wanted_young)
+        table.add_row("Poisson's ratio at 0 degrees", f"{realised.poisson():.4f}", wanted_poisson)
+        table.add_row("Poisson's ratio at 45 degrees", f"{realised.poisson(45):.4f}", wanted_poisson)
+        table.add_row("Zener ratio", f"{realised.zener:.4f}", "1.0000")
+        for depth, factor in sorted(realised.bending.items()):
+            here = " (this mesh)" if depth == realised.depth else ""
+            elements = "element" if depth == 1 else "elements"
+            table.add_row(f"bending factor EI, {depth} {elements} deep{here}", f"{factor:.4f}", "1.0000")
+        console.print(table)
+        for warning in model_warnings(study.problem, realised):
+            console.print(f"warning: {warning}")
+
+
+def _print_result(console: "Console", result: "Result") -> None:
+    table = _table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
+    for name, path in result.paths.items():
+        spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
+        table.add_row(name, path.label, str(path.status), f"{path.load_factor:.6g}", *spent)
+    console.print(table)
+    if result.comparisons:
+        from truespring.report.verdict import verdict
+
+        errors = _table(f"'{result.model}' against", "reference", "", "probe", "rms", "largest", "agrees up to")
+        for name, one in result.comparisons.items():
+            values = (one.probe_error, one.rms_error, one.max_error)
+            shown = ["-" if value is None else f"{value:.2%}" for value in values]
+            up_to = one.agrees_up_to_load_factor
+            errors.add_row(name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}")
+        console.print(errors)
+        console.print(verdict(result))
+    for name, path in result.paths.items():
+        for warning in path.warnings:
+            console.print(f"warning: {name}: {warning}")

@@ -1,0 +1,19 @@
+"""curves.csv: displacement of the probe against force, for every model and load level."""
+
+import csv
+from pathlib import Path as FilePath
+
+from truespring.mesh.selections import AXES
+from truespring.report.result import Result
+
+
+def write_curves(result: Result, file: FilePath) -> None:
+    """Write columns model, load_factor, ux, uy[, uz] [m], fx, fy[, fz] [N], a row per model and level."""
+    axes = AXES[: result.problem.mesh.dim]
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream)
+        table.writerow(["model", "load_factor", *(f"u{axis}" for axis in axes), *(f"f{axis}" for axis in axes)])
+        for name, path in result.paths.items():
+            for state in path.states:  # + 0.0 writes no negative zero
+                moved, force = state.displacement[result.probe], path.applied_force(state)
+                table.writerow([name, *(repr(float(value) + 0.0) for value in (state.load_factor, *moved, *force))])

@@ -1,0 +1,71 @@
+"""summary.json: status, cost, warnings and errors of one study in plain values."""
+
+import math
+from importlib.metadata import version
+from typing import Any
+
+from truespring.compare import Comparison
+from truespring.equilibrium import Path
+from truespring.models import Moduli
+from truespring.report.result import Result
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Return the summary of a study as values that JSON can hold; what is not known is None."""
+    return {
+        "title": result.title,
+        "truespring": version("truespring"),
+        "models": {name: _model(path) for name, path in result.paths.items()},
+        "comparison": {name: _comparison(one) for name, one in result.comparisons.items()},
+        "closest": result.closest,
+    }
+
+
+def _model(path: Path) -> dict[str, Any]:
+    last = path.states[-1] if path.states else None
+    values = {
+        "kind": path.kind,
+        "label": path.label,
+        "status": str(path.status),
+        "load_factor": path.load_factor,
+        "newton_iterations": path.newton_iterations,
+        "seconds": path.seconds,
+        "n_nodes": path.problem.mesh.n_nodes,
+        "n_unknowns": int((~path.problem.loading.held).sum()),
+        "residual": _known(last.residual) if last else None,
+        "negative_eigenvalues": last.negative_eigenvalues if last else None,
+        "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),
+        "warnings": list(path.warnings),
+    }
+    if path.moduli is not None:
+        values["moduli"] = moduli_values(path.moduli)
+    return values
+
+
+def moduli_values(moduli: Moduli) -> dict[str, Any]:
+    """Return the moduli that springs realise; Young's moduli in Pa, the bending factor by depth in elements."""
+    return {
+        "young": moduli.young(),
+        "poisson": moduli.poisson(),
+        "anisotropy": moduli.zener,
+        "young_45": moduli.young(45),
+        "poisson_45": moduli.poisson(45),
+        "bending_factor": {str(depth): factor for depth, factor in sorted(moduli.bending.items())},
+    }
+
+
+def _comparison(comparison: Comparison) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "probe_error": comparison.probe_error,
+        "rms_error": comparison.rms_error,
+        "max_error": comparison.max_error,
+        "agrees_up_to_load_factor": comparison.agrees_up_to_load_factor,
+    }
+    if (surface := comparison.surface) is not None:
+        values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
+        values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
+    return values
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

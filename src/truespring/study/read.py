@@ -1,0 +1,256 @@
+"""From a study file to the objects of the Python API, and from its faults to one readable message."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+
+from truespring.equilibrium import Path
+from truespring.errors import StudyError, TruespringError, nearest
+from truespring.material import Material, PlaneStrain, PlaneStress, Section
+from truespring.mesh import Mesh, Near, named_point, nearest_node, rectangle, select
+from truespring.models import Fem, Model, Springs, UserStiffness
+from truespring.problem import Fixed, Force, Problem
+from truespring.reference import read_stl
+from truespring.solvers import Newton
+from truespring.study import schema
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study file as objects, checked as far as can be without solving.
+
+    Attributes:
+        title, stem, source: the study's own title, the name of its file without suffix, its text.
+        problem, solver: what is asked and how it is solved.
+        entries: by name, a model to be solved, or a path that was read from another program's file.
+        model: the name of the entry that is compared with the others, None where there is nothing to compare.
+        references: the names that it is compared with.
+        probe: number of the node that is watched; None takes the one that moves most.
+        tolerance: the rms error up to which two paths agree.
+    """
+
+    title: str
+    stem: str
+    source: str
+    problem: Problem
+    solver: Newton
+    entries: Mapping[str, Model | Path]
+    model: str
+    references: tuple[str, ...]
+    probe: int | None
+    tolerance: float
+
+
+def read_study(file: str | FilePath) -> Study:
+    """Read and check a study file; raise StudyError with file, key, value and what is allowed."""
+    place = FilePath(file)
+    try:
+        source = place.read_text(encoding="utf-8")
+    except OSError as error:
+        raise StudyError(f"{place}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise StudyError(f"{place}: is not a text file in UTF-8; a study is TOML") from None
+    try:
+        tables = tomllib.loads(source)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{place}: is not valid TOML: {error}") from None
+    try:
+        table = schema.StudyTable.model_validate(tables)
+    except ValidationError as error:
+        lines = _line_numbers(source)
+        raise StudyError("\n".join(_message(place, one, lines) for one in error.errors())) from None
+    return _Builder(place, source, table).study()
+
+
+class _Builder:
+    """Makes the objects table by table, so that every error names its table."""
+
+    def __init__(self, file: FilePath, source: str, table: schema.StudyTable) -> None:
+        self.file, self.source, self.table = file, source, table
+        self.lines = _line_numbers(source)
+
+    @contextmanager
+    def at(self, *key: str | int) -> Iterator[None]:
+        """Name file, line and key in front of any error."""
+        try:
+            yield
+        except TruespringError as error:
+            raise StudyError(f"{_place(self.file, key, self.lines)}: {error}") from None
+
+    def study(self) -> Study:
+        table = self.table
+        problem = self.problem()
+        entries = {name: self.entry(problem, name, entry) for name, entry in table.models.items()}
+        model, references = self.compared(entries)
+        with self.at("compare", "probe"):
+            probe = _probe_node(problem.mesh, table.compare.probe)
+        return Study(
+            title=table.title or self.file.stem,
+            stem=self.file.stem,
+            source=self.source,
+            problem=problem,
+            solver=Newton(
+                load_steps=table.solver.load_steps,
+                tolerance=table.solver.tolerance,
+                max_iterations=table.solver.max_iterations,
+            ),
+            entries=entries,
+            model=model,
+            references=references,
+            probe=probe,
+            tolerance=table.compare.tolerance,
+        )
+
+    def problem(self) -> Problem:
+        table = self.table
+        with self.at("mesh"):
+            mesh = rectangle(table.mesh.size, table.mesh.elements)
+        with self.at("material"):
+            material = Material(table.material.young, table.material.poisson, table.material.density)
+        with self.at("section"):
+            section = _SECTIONS[table.section.kind](table.section.thickness)
+        supports, loads = [], []
+        for number, support in enumerate(table.support):
+            with self.at("support", number, "on"):
+                select(mesh, support.on)
+            supports.append(Fixed(support.on, support.fix, support.displacement))
+        for number, load in enumerate(table.load):
+            with self.at("load", number, "on"):
+                select(mesh, load.on)
+            loads.append(Force(load.on, load.force))
+        with self.at("support" if loads else "load"):
+            return Problem(mesh, material, section, supports, loads)
+
+    def entry(self, problem: Problem, name: str, table: Any) -> Model | Path:
+        with self.at("models", name):
+            match table:
+                case schema.StlTable():
+                    beside = self.file.parent
+                    undeformed = None if table.undeformed is None else beside / table.undeformed
+                    read: Path = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
+                    return read
+                case schema.FemTable():
+                    model: Model = Fem(table.law)
+                case _:
+                    own = table.stiffness and UserStiffness(table.stiffness.edge, table.stiffness.diagonal)
+                    model = Springs(table.rule, own, table.sharing, table.allow_negative)
+            model.potential(problem)  # what does not fit is said before anything is solved
+            return model
+
+    def compared(self, entries: Mapping[str, Model | Path]) -> tuple[str, tuple[str, ...]]:
+        """Return the model that is compared, by default the first springs, and its references, by default the rest."""
+        compare = self.table.compare
+        springs = [name for name, entry in entries.items() if isinstance(entry, Springs)]
+        model = compare.model or (springs or list(entries))[0]
+        self._known("model", model, entries)
+        if compare.references is None:
+            return model, tuple(name for name in entries if name != model)
+        for reference in compare.references:
+            self._known("references", reference, entries)
+            if reference == model:
+                with self.at("compare", "references"):
+                    raise StudyError(f"'{reference}' is the model itself: name others, or leave the list empty")
+        return model, tuple(dict.fromkeys(compare.references))
+
+    def _known(self, key: str, name: str, entries: Mapping[str, Any]) -> None:
+        if name not in entries:
+            with self.at("compare", key):
+                raise StudyError(f"'{name}' is not among the models{nearest(name, entries)}: {', '.join(entries)}")
+
+
+_SECTIONS: dict[str, type[Section]] = {"plane-stress": PlaneStress, "plane-strain": PlaneStrain}
+
+
+def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None:
+    if probe is None:
+        return None
+    return named_point(mesh, probe) if isinstance(probe, str) else nearest_node(mesh, Near(probe).point)
+
+
+def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], int]) -> str:
+    """One line for one fault that pydantic found."""
+    key = _without_tag(error["loc"])
+    place = _place(file, key, lines)
+    value, text = error["input"], str(error["msg"])
+    match error["type"]:
+        case "missing":
+            return f"{place}: is required and missing"
+        case "extra_forbidden":
+            allowed = _allowed_keys(error["loc"][:-1])
+            return f"{place}: unknown key{nearest(str(key[-1]), allowed)}; allowed: {', '.join(allowed)}"
+        case "value_error":
+            return f"{place}: {text.removeprefix('Value error, ')}"
+        case "literal_error":
+            expected = error["ctx"]["expected"]
+            words = re.findall(r"'([^']*)'", expected)
+            return f"{place} = {value!r}: allowed: {expected}{nearest(str(value), words)}"
+        case "union_tag_invalid" | "union_tag_not_found":
+            given = value.get("kind") if isinstance(value, dict) else value
+            kinds = ("springs", "fem", "stl")
+            return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
+        case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
+            return f"{place}: a model's name is made of letters, digits, '_', '-' and '.', it names files"
+        case _:
+            shown = "" if isinstance(value, dict | list) and len(str(value)) > 60 else f" = {value!r}"
+            return f"{place}{shown}: {text[0].lower()}{text[1:]}"
+
+
+def _without_tag(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Drop the kind that pydantic puts behind a model's name, and its mark of a faulty key."""
+    key = loc[:2] + loc[3:] if loc[0] == "models" and len(loc) > 3 else loc
+    return tuple(part for part in key if part != "[key]")
+
+
+def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
+    """The keys of the table at `loc`."""
+    tables: dict[str | int, type[schema.Table]] = {
+        "mesh": schema.MeshTable,
+        "material": schema.MaterialTable,
+        "section": schema.SectionTable,
+        "support": schema.SupportTable,
+        "load": schema.LoadTable,
+        "solver": schema.SolverTable,
+        "compare": schema.CompareTable,
+    }
+    kinds: dict[str | int, type[schema.Table]] = {
+        "springs": schema.SpringsTable,
+        "fem": schema.FemTable,
+        "stl": schema.StlTable,
+    }
+    if not loc:
+        return list(schema.StudyTable.model_fields)
+    if loc[-1] == "stiffness":
+        return list(schema.StiffnessTable.model_fields)
+    return list((kinds[loc[2]] if loc[0] == "models" else tables[loc[0]]).model_fields)
+
+
+def _place(file: FilePath, key: tuple[str | int, ...], lines: Mapping[tuple[str | int, ...], int]) -> str:
+    """File, line of the key or of the nearest table around it, and the key; lists count from 1."""
+    known = next((lines[key[:n]] for n in range(len(key), 0, -1) if key[:n] in lines), None)
+    dotted = ".".join(str(part + 1) if isinstance(part, int) else part for part in key)
+    return f"{file}:{known}: {dotted}" if known else f"{file}: {dotted}"
+
+
+def _line_numbers(source: str) -> dict[tuple[str | int, ...], int]:
+    """The line of each table and key that is written in the plain way; others fall back to the table around."""
+    lines: dict[tuple[str | int, ...], int] = {}
+    count: dict[str, int] = {}
+    table: tuple[str | int, ...] = ()
+    for number, line in enumerate(source.splitlines(), 1):
+        if found := re.match(r"\s*\[\[([\w.\-]+)\]\]", line):
+            count[found[1]] = count.get(found[1], -1) + 1
+            table = (*found[1].split("."), count[found[1]])
+            lines[table] = number
+            lines.setdefault(table[:-1], number)
+        elif found := re.match(r"\s*\[([\w.\-]+)\]", line):
+            table = tuple(found[1].split("."))
+            lines[table] = number
+        elif found := re.match(r"\s*([\w\-]+)\s*=", line):
+            lines[(*table, found[1])] = number
+    return lines

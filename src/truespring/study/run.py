@@ -1,0 +1,132 @@
+"""Running studies: solve what a study asks, compare, and write what it leaves behind."""
+
+import json
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from truespring.compare import compare, most_moved
+from truespring.equilibrium import Path, model_warnings, solve
+from truespring.errors import StudyError
+from truespring.mesh.selections import AXES
+from truespring.models import Fem, Springs, moduli
+from truespring.report.curves import write_curves
+from truespring.report.result import Result
+from truespring.report.series import write_series, write_stl
+from truespring.report.summary import moduli_values, summary
+from truespring.study.read import Study, read_study
+
+#: Called with study, model and the load factor reached, for a progress bar.
+Progress = Callable[[str, str, float], None]
+
+
+def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
+    """Read and check all studies before any is solved; raise StudyError with the faults of all of them."""
+    studies: list[Study] = []
+    faults: list[str] = []
+    seen: dict[str, str | FilePath] = {}
+    for file in files:
+        stem = FilePath(file).stem
+        if stem in seen:
+            faults.append(f"{file} and {seen[stem]} have one stem, '{stem}': their outputs would share a folder")
+        seen[stem] = file
+        try:
+            studies.append(read_study(file))
+        except StudyError as error:
+            faults.append(str(error))
+    if faults:
+        raise StudyError("\n".join(faults))
+    return studies
+
+
+def run(study: Study, progress: Progress | None = None, comparing: bool = True) -> Result:
+    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached."""
+    paths: dict[str, Path] = {}
+    for name, entry in study.entries.items():
+        if isinstance(entry, Path):
+            paths[name] = entry
+            continue
+
+        def report(load_factor: float, iteration: int, residual: float, name: str = name) -> None:
+            if progress:
+                progress(study.stem, name, load_factor)
+
+        paths[name] = solve(study.problem, entry, study.solver, report)
+        if progress:
+            progress(study.stem, name, 1.0)
+    model = paths[study.model]
+    probe = most_moved(model) if study.probe is None else study.probe
+    names = study.references if comparing else ()
+    return Result(
+        title=study.title,
+        stem=study.stem,
+        problem=study.problem,
+        paths=paths,
+        probe=probe,
+        model=study.model,
+        comparisons={name: compare(model, paths[name], probe, study.tolerance) for name in names},
+        tolerance=study.tolerance,
+        source=study.source,
+    )
+
+
+def write(result: Result, out: FilePath, report: bool = True) -> None:
+    """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures too."""
+    folder = out / result.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    write_curves(result, folder / "curves.csv")
+    text = json.dumps(summary(result), indent=2, allow_nan=False)
+    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    for name, path in result.paths.items():
+        write_series(path, folder, name)
+        write_stl(path, folder / f"deformed_{name}.stl")
+    if report:
+        from truespring.report.figures import save_figures
+        from truespring.report.page import write_page
+
+        save_figures(result, folder / "figures")
+        write_page([result], folder / "report.html", _command([result], out))
+
+
+def write_overview(results: Sequence[Result], out: FilePath) -> None:
+    """Write out/report.html over all studies."""
+    from truespring.report.page import write_page
+
+    write_page(results, out / "report.html", _command(results, out))
+
+
+def _command(results: Sequence[Result], out: FilePath) -> str:
+    files = " ".join(shlex.quote(f"{result.stem}.toml") for result in results)
+    return f"truespring verify {files} --out {shlex.quote(out.name)}"
+
+
+def plan(study: Study) -> dict[str, Any]:
+    """Return what would be run, solving nothing: sizes, loads, supports, and what the springs realise."""
+    mesh, loading = study.problem.mesh, study.problem.loading
+    return {
+        "title": study.title,
+        "n_nodes": mesh.n_nodes,
+        "n_elements": len(mesh.elements),
+        "n_unknowns": int((~loading.held).sum()),
+        "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
+        "total_force": loading.external_force.sum(axis=0).tolist(),
+        "load_steps": study.solver.load_steps,
+        "models": {name: _entry_plan(study, entry) for name, entry in study.entries.items()},
+        "compare": {"model": study.model, "references": list(study.references), "tolerance": study.tolerance},
+        "probe": None if study.probe is None else mesh.nodes[study.probe].tolist(),
+    }
+
+
+def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
+    if not isinstance(entry, Springs):
+        law = {"law": entry.law} if isinstance(entry, Fem) else {"warnings": list(getattr(entry, "warnings", ()))}
+        return {"kind": entry.kind, "label": entry.label, **law}
+    realised = moduli(study.problem, entry)
+    return {
+        "kind": entry.kind,
+        "label": entry.label,
+        "n_springs": len(entry.potential(study.problem).springs),
+        "moduli": moduli_values(realised),
+        "warnings": list(model_warnings(study.problem, realised)),
+    }

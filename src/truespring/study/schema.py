@@ -1,0 +1,232 @@
+"""The tables of a study file, as pydantic knows them. Numbers are SI; texts carry units."""
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PlainValidator, WithJsonSchema
+
+from truespring.errors import TruespringError, nearest
+from truespring.mesh import Box, Near, Plane, Selection
+from truespring.models import LAWS, RULES
+from truespring.units import SI_UNITS, Dimension, to_si
+
+
+def _as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Pydantic collects ValueErrors; ours are TruespringErrors."""
+
+    def converted(value: Any) -> Any:
+        try:
+            return convert(value)
+        except TruespringError as error:
+            raise ValueError(str(error)) from None
+
+    return converted
+
+
+def _si(dimension: Dimension) -> BeforeValidator:
+    return BeforeValidator(_as_value_error(lambda value: to_si(value, dimension)))
+
+
+def _quantity(dimension: Dimension) -> WithJsonSchema:
+    unit, example = SI_UNITS[dimension]
+    description = f"a {dimension}: a number in {unit}, or a text with its unit such as {example}"
+    return WithJsonSchema({"type": ["number", "string"], "description": description})
+
+
+def _key_of(table: Mapping[str, Any]) -> BeforeValidator:
+    """Accept the keys of RULES or LAWS, so that the table is the one list of names."""
+
+    def check(value: Any) -> Any:
+        if value not in table:
+            raise ValueError(f"{value!r} is unknown{nearest(str(value), table)}; allowed: {', '.join(table)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def _strict_number(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{value!r} is not a number")
+    return value
+
+
+Length = Annotated[float, _si("length"), _quantity("length")]
+Stress = Annotated[float, _si("stress"), _quantity("stress")]
+Force = Annotated[float, _si("force"), _quantity("force")]
+Density = Annotated[float, _si("density"), _quantity("density")]
+RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
+LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
+Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
+Direction = Literal["x", "y", "z"]
+
+_SELECTION_FORMS = (
+    'a side ("left", "right", "bottom", "top"), a point ("right-middle"), '
+    '{ x = "0 mm" }, { box = [[xmin, ymin], [xmax, ymax]] } or { near = [x, y] }'
+)
+
+
+def _selection(value: Any) -> Selection:
+    if isinstance(value, str):
+        return value
+    if not isinstance(value, dict) or len(value) != 1:
+        raise TruespringError(f"{value!r} is no selection; allowed: {_SELECTION_FORMS}")
+    ((key, what),) = value.items()
+    if key in ("x", "y", "z"):
+        return Plane(key, to_si(what, "length"))
+    if key == "near":
+        return Near(_point(what))
+    if key == "box":
+        if not isinstance(what, list) or len(what) != 2:
+            raise TruespringError(f"box = {what!r}: two corners are wanted, [[xmin, ymin], [xmax, ymax]]")
+        return Box(_point(what[0]), _point(what[1]))
+    known = ("x", "y", "z", "box", "near")
+    raise TruespringError(f"'{key}' is no selection{nearest(key, known)}; allowed: {_SELECTION_FORMS}")
+
+
+def _point(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) not in (2, 3):
+        raise TruespringError(f'{value!r} is no point: a list of coordinates such as ["160 mm", "20 mm"] is wanted')
+    return tuple(to_si(coordinate, "length") for coordinate in value)
+
+
+def _probe(value: Any) -> str | tuple[float, ...]:
+    return value if isinstance(value, str) else _point(value)
+
+
+_ON_SCHEMA = {
+    "description": _SELECTION_FORMS,
+    "anyOf": [
+        {"type": "string"},
+        *(
+            {"type": "object", "properties": {key: form}, "required": [key], "additionalProperties": False}
+            for key, form in (
+                ("x", {"type": ["number", "string"]}),
+                ("y", {"type": ["number", "string"]}),
+                ("z", {"type": ["number", "string"]}),
+                ("box", {"type": "array", "items": {"type": "array"}, "minItems": 2, "maxItems": 2}),
+                ("near", {"type": "array", "items": {"type": ["number", "string"]}}),
+            )
+        ),
+    ],
+}
+On = Annotated[Any, PlainValidator(_as_value_error(_selection)), WithJsonSchema(_ON_SCHEMA)]
+_POINT_SCHEMA = {"type": "array", "items": {"type": ["number", "string"]}}
+Probe = Annotated[
+    Any, PlainValidator(_as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
+]
+
+
+class Table(BaseModel):
+    """A table of a study file: frozen, and without keys that it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, protected_namespaces=())
+
+
+class MeshTable(Table):
+    """The body's shape and its elements."""
+
+    shape: Literal["rectangle"]
+    size: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    elements: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=2, max_length=2)]
+    element: Literal["quadrilateral"] = "quadrilateral"
+
+
+class MaterialTable(Table):
+    """What the body is made of."""
+
+    young: Stress
+    poisson: Number
+    density: Density | None = None
+
+
+class SectionTable(Table):
+    """How a plane body behaves across the plane."""
+
+    kind: Literal["plane-stress", "plane-strain"]
+    thickness: Length
+
+
+class SupportTable(Table):
+    """Nodes that are held or moved."""
+
+    on: On
+    fix: Annotated[list[Direction], Field(min_length=1)] | None = None
+    displacement: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = None
+
+
+class LoadTable(Table):
+    """A total force, shared consistently."""
+
+    on: On
+    force: Annotated[list[Force], Field(min_length=2, max_length=3)]
+
+
+class SolverTable(Table):
+    """How equilibrium is found."""
+
+    load_steps: Annotated[int, Field(ge=1, le=100_000)] = 10
+    control: Literal["load"] = "load"
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
+    max_iterations: Annotated[int, Field(ge=1)] = 100
+
+
+class StiffnessTable(Table):
+    """Springs of the user's own, in units of thickness times Young's modulus."""
+
+    edge: Number
+    diagonal: Number
+
+
+class SpringsTable(Table):
+    """A mass-spring model."""
+
+    kind: Literal["springs"]
+    rule: RuleName | None = None
+    stiffness: StiffnessTable | None = None
+    sharing: Literal["summed", "single"] = "summed"
+    allow_negative: bool = False
+    volume: Literal[False] = False
+
+
+class FemTable(Table):
+    """A finite element model."""
+
+    kind: Literal["fem"]
+    law: LawName
+
+
+class StlTable(Table):
+    """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
+
+    kind: Literal["stl"]
+    file: str
+    undeformed: str | None = None
+    load_factor: Annotated[Number, Field(gt=0, le=1)] = 1.0
+    unit: str = "m"
+
+
+class CompareTable(Table):
+    """Which path is compared with which, and where one looks."""
+
+    model: str | None = None
+    references: list[str] | None = None
+    probe: Probe = None
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
+
+
+ModelTable = Annotated[SpringsTable | FemTable | StlTable, Discriminator("kind")]
+ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+
+
+class StudyTable(Table):
+    """A whole study file."""
+
+    title: str | None = None
+    mesh: MeshTable
+    material: MaterialTable
+    section: SectionTable
+    support: Annotated[list[SupportTable], Field(min_length=1)]
+    load: list[LoadTable] = []
+    solver: SolverTable = SolverTable()
+    models: Annotated[dict[ModelName, ModelTable], Field(min_length=1)]
+    compare: CompareTable = CompareTable()
