@@ -13,10 +13,8 @@ from truespring.errors import TruespringError
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from truespring.report.result import Result
-    from truespring.study import Study
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -96,7 +94,8 @@ def _solve(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.report.summary import summary
-    from truespring.study import read_studies, run, write, write_overview
+    from truespring.report.tables import moduli_table, result_tables
+    from truespring.study import read_studies, realised_moduli, run, write, write_overview
 
     if options.out.exists() and not options.out.is_dir():
         raise TruespringError(f"--out {options.out}: is a file, a folder is wanted")
@@ -104,7 +103,8 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     console = _console(options)
     results = []
     for study in studies:
-        _print_moduli(console, study)
+        for title, moduli in realised_moduli(study):
+            console.print(moduli_table(title, moduli))
         with _progress(options) as progress:
             result = run(study, progress, comparing)
         results.append(result)
@@ -112,7 +112,8 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
             write(result, options.out, report=comparing)
         except OSError as error:
             raise TruespringError(f"--out {options.out}: cannot be written: {error.strerror}") from None
-        _print_result(console, result)
+        for part in result_tables(result):
+            console.print(part)
     if comparing:
         write_overview(results, options.out)
         console.print(f"report: {options.out / 'report.html'}", soft_wrap=True)
@@ -138,14 +139,16 @@ def _say_failures(result: "Result", out: Path) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from truespring.study import plan, read_studies
+    from truespring.report.tables import moduli_table
+    from truespring.study import plan, read_studies, realised_moduli
 
     studies = read_studies(options.study)
     plans = {study.stem: plan(study) for study in studies}
     console = _console(options)
     for study in studies:
         _print_plan(console, plans[study.stem])
-        _print_moduli(console, study)
+        for title, moduli in realised_moduli(study):
+            console.print(moduli_table(title, moduli))
     if options.json:
         _print_json(plans if len(plans) > 1 else plans[studies[0].stem])
     return CONVERGED
@@ -188,15 +191,6 @@ def _progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float
         yield advance
 
 
-def _table(title: str, *columns: str) -> "Table":
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number == 0 else "right")
-    return table
-
-
 def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
@@ -205,53 +199,6 @@ def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     console.print(f"held nodes: {held}")
     console.print(f"total force ({force}) N in {plan['load_steps']} load steps")
     for name, model in plan["models"].items():
-        console.print(f"  {name}: {model['label']}")
+        console.print(f"  {name}: {model['label']}", *(f"\n    warning: {text}" for text in model.get("warnings", ())))
     compare = plan["compare"]
     console.print(f"compared: {compare['model']} with {', '.join(compare['references']) or 'nothing'}\n")
-
-
-def _print_moduli(console: "Console", study: "Study") -> None:
-    """What the springs realise, before anything is solved."""
-    from truespring.equilibrium import model_warnings
-    from truespring.models import Springs, moduli
-
-    for name, entry in study.entries.items():
-        if not isinstance(entry, Springs):
-            continue
-        realised = moduli(study.problem, entry)
-        table = _table(f"{study.stem}: what '{name}' realises, {entry.label}", "", "springs", "material")
-        wanted_young, wanted_poisson = f"{realised.young_wanted:.6g}", f"{realised.poisson_wanted:.4f}"
-        table.add_row("Young's modulus at 0 degrees [Pa]", f"{realised.young():.6g}", wanted_young)
-        table.add_row("Young's modulus at 45 degrees [Pa]", f"{realised.young(45):.6g}", wanted_young)
-        table.add_row("Poisson's ratio at 0 degrees", f"{realised.poisson():.4f}", wanted_poisson)
-        table.add_row("Poisson's ratio at 45 degrees", f"{realised.poisson(45):.4f}", wanted_poisson)
-        table.add_row("Zener ratio", f"{realised.zener:.4f}", "1.0000")
-        for depth, factor in sorted(realised.bending.items()):
-            here = " (this mesh)" if depth == realised.depth else ""
-            elements = "element" if depth == 1 else "elements"
-            table.add_row(f"bending factor EI, {depth} {elements} deep{here}", f"{factor:.4f}", "1.0000")
-        console.print(table)
-        for warning in model_warnings(study.problem, realised):
-            console.print(f"warning: {warning}")
-
-
-def _print_result(console: "Console", result: "Result") -> None:
-    table = _table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
-    for name, path in result.paths.items():
-        spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
-        table.add_row(name, path.label, str(path.status), f"{path.load_factor:.6g}", *spent)
-    console.print(table)
-    if result.comparisons:
-        from truespring.report.verdict import verdict
-
-        errors = _table(f"'{result.model}' against", "reference", "", "probe", "rms", "largest", "agrees up to")
-        for name, one in result.comparisons.items():
-            values = (one.probe_error, one.rms_error, one.max_error)
-            shown = ["-" if value is None else f"{value:.2%}" for value in values]
-            up_to = one.agrees_up_to_load_factor
-            errors.add_row(name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}")
-        console.print(errors)
-        console.print(verdict(result))
-    for name, path in result.paths.items():
-        for warning in path.warnings:
-            console.print(f"warning: {name}: {warning}")

@@ -30,5 +30,10 @@ class ReferenceFileError(TruespringError):
 
 def nearest(word: str, allowed: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, else nothing."""
-    close = difflib.get_close_matches(word, list(allowed), n=1, cutoff=0.5)
+    close = close_words(word, allowed)
     return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def close_words(word: str, allowed: Iterable[str]) -> list[str]:
+    """Return the allowed word nearest to `word` in a list of one, an empty list where none is near."""
+    return difflib.get_close_matches(word, list(allowed), n=1, cutoff=0.5)

@@ -98,21 +98,15 @@ class Problem:
 
     def _refuse_rigid_motion(self) -> None:
         """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
-        held = self.loading.held
         modes = rigid_body_modes(self.mesh.nodes)
-        if held.any():
-            _, singular, combinations = np.linalg.svd(modes[held.ravel()], full_matrices=True)
-            rank = int((singular > 1e-9 * np.linalg.norm(modes, axis=0).max()).sum())
-        else:
-            rank, combinations = 0, np.eye(modes.shape[1])
-        if rank < modes.shape[1]:
-            free = np.abs(combinations[rank:]).max(axis=0)
-            dim = self.mesh.dim
-            names = [f"along {axis}" for axis in AXES[:dim]] + ["by turning"] * (modes.shape[1] - dim)
-            raise ProblemError(
-                f"the supports leave the body free to move {names[int(free.argmax())]} as a rigid body: "
-                "hold more directions or more nodes"
-            )
+        hindered = modes[self.loading.held.ravel()]
+        if hindered.size and np.linalg.matrix_rank(hindered, tol=1e-9 * np.sqrt(len(modes))) == modes.shape[1]:
+            return
+        free = [axis for axis, mode in zip(AXES[: self.mesh.dim], hindered.T, strict=False) if not mode.any()]
+        raise ProblemError(
+            f"the supports leave the body free to move {'along ' + ', '.join(free) if free else 'by turning'} "
+            "as a rigid body: hold more directions or more nodes"
+        )
 
 
 def rigid_body_modes(nodes: Floats) -> Floats:

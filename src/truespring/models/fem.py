@@ -1,6 +1,6 @@
 """Finite elements on the same mesh, the embedded reference: assembled with scikit-fem, full integration."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -69,6 +69,7 @@ class FemPotential:
     law: Law
     constants: Constants
     thickness: float
+    _last: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def nodes(self) -> Floats:
@@ -91,29 +92,35 @@ class FemPotential:
         gradient = self._basis.interpolate(displacement).grad
         return np.asarray(gradient + np.eye(len(gradient))[:, :, None, None])
 
-    def _respond(self, F: Floats) -> Response:
-        if not self.law.finite:
-            return self.law.respond((F + F.swapaxes(0, 1)) / 2 - np.eye(len(F))[:, :, None, None], self.constants)
-        return self.law.respond(np.einsum("ki...,kj...->ij...", F, F), self.constants)
+    def _respond(self, positions: Floats) -> tuple[Floats, Response]:
+        """Deformation gradient and the law's response; the last ones are kept, for energy, gradient and Hessian."""
+        key = positions.tobytes()
+        if self._last.get("key") != key:
+            F = self._deformation(positions)
+            if self.law.finite:
+                strain = np.einsum("ki...,kj...->ij...", F, F)
+            else:
+                strain = (F + F.swapaxes(0, 1)) / 2 - np.eye(len(F))[:, :, None, None]
+            self._last.update(key=key, F=F, response=self.law.respond(strain, self.constants))
+        return self._last["F"], self._last["response"]
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]; infinite where a law with a barrier meets an inverted element."""
-        F = self._deformation(positions)
         with np.errstate(over="ignore", invalid="ignore"):
-            density = self._respond(F).energy
+            F, response = self._respond(positions)
+        density = response.energy
         if not np.isfinite(density).all() or (self.law.barrier and (_determinant(F) <= 0).any()):
             return float("inf")
         return float(Functional(lambda w: self.thickness * density).assemble(self._basis))
 
     def stress(self, positions: Floats) -> Floats:
         """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (i, j, element, point)."""
-        return self._respond(self._deformation(positions)).stress
+        return self._respond(positions)[1].stress
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        F = self._deformation(positions)
-        stress = self._respond(F).stress
-        first = np.einsum("ik...,kj...->ij...", F, stress) if self.law.finite else stress
+        F, response = self._respond(positions)
+        first = np.einsum("ik...,kj...->ij...", F, response.stress) if self.law.finite else response.stress
         form = LinearForm(lambda v, w: self.thickness * np.einsum("ij...,ij...", first, v.grad))
         return np.asarray(form.assemble(self._basis)).reshape(positions.shape)
 
@@ -134,8 +141,7 @@ class FemPotential:
         return np.asarray(self._tangent(positions, None).tolocal())
 
     def _tangent(self, positions: Floats, stress: Floats | None) -> Any:
-        F = self._deformation(positions)
-        response = self._respond(F)
+        F, response = self._respond(positions)
         if self.law.finite:
             S = response.stress if stress is None else stress
             tangent = np.einsum("ai...,ijkl...,bk...->ajbl...", F, response.elasticity, F, optimize=True)
@@ -157,7 +163,7 @@ class FemPotential:
         """True stress [Pa], padded to 3 by 3 and flattened, and strain energy [J] of each element."""
         stress = np.zeros((len(self.mesh.elements), 3, 3))
         stress[:, : self.mesh.dim, : self.mesh.dim] = self.cauchy_stress(positions)
-        density = self._respond(self._deformation(positions)).energy
+        density = self._respond(positions)[1].energy
         energy = Functional(lambda w: self.thickness * density).elemental(self._basis)
         return {"stress": stress.reshape(-1, 9), "strain_energy": np.asarray(energy)}
 
@@ -166,8 +172,7 @@ class FemPotential:
 
         F S F^T over the volume ratio, the change of thickness included; of the linear law, its stress.
         """
-        F = self._deformation(positions)
-        response = self._respond(F)
+        F, response = self._respond(positions)
         true = response.stress
         if self.law.finite:
             volume = _determinant(F) * response.thickness_stretch

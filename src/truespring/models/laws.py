@@ -180,7 +180,9 @@ def hencky(C: Floats, constants: Constants) -> Response:
 def _log_difference(a: Floats, b: Floats) -> Floats:
     """b (ln a - ln b) / (a - b), 1 where a = b."""
     x = (a - b) / b
-    return np.divide(np.log1p(x), x, out=np.ones_like(x), where=x != 0)
+    near = np.abs(x) < 0.5
+    logarithm = np.where(near, np.log1p(np.where(near, x, 0.0)), np.log(a) - np.log(b))
+    return np.divide(logarithm, x, out=np.ones_like(x), where=x != 0)
 
 
 def _identity(tensor: Floats) -> Floats:

@@ -115,10 +115,9 @@ class _Balance:
         noise = 32 * _EPS * (abs(stored) + float(np.abs(work).sum()))
         return stored - float(work.sum()), noise
 
-    def unbalanced(self, positions: Floats, load_factor: float) -> tuple[Floats, float]:
+    def unbalanced(self, internal: Floats, load_factor: float) -> tuple[Floats, float]:
         """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
         applied = load_factor * self.loading.external_force
-        internal = self.potential.gradient(positions)
         scale = max(float(np.linalg.norm(applied)), float(np.linalg.norm(internal)))
         return (internal - applied).ravel()[self.free], scale
 
@@ -157,13 +156,16 @@ class _Balance:
         if not usable:
             nothing = np.full_like(guesses[0], np.nan)
             return Equilibrium(load_factor, guesses[0], nothing, np.inf, 0, np.inf, converged=False)
-        start = min(usable, key=lambda guess: float(np.linalg.norm(self.unbalanced(guess, load_factor)[0])))
+        start = usable[0] if len(usable) == 1 else min(usable, key=lambda guess: self._misfit(guess, load_factor))
         state = self._descend(load_factor, start)
         for _ in range(_MAX_ESCAPES):
             if not state.converged or not state.negative_eigenvalues:
                 break
             state = self._escape(state)
         return state
+
+    def _misfit(self, positions: Floats, load_factor: float) -> float:
+        return float(np.linalg.norm(self.unbalanced(self.potential.gradient(positions), load_factor)[0]))
 
     def _escape(self, state: Equilibrium) -> Equilibrium:
         """Leave an unstable equilibrium along its mode, to the side of lower energy."""
@@ -176,29 +178,28 @@ class _Balance:
         return replace(found, iterations=spent, branched=True) if found.converged else state
 
     def _descend(self, load_factor: float, positions: Floats) -> Equilibrium:
-        """Newton with line search at one level."""
-        best = self._state(load_factor, positions, 0, np.inf)
+        """Newton with line search at one level; the state with the least residual where it fails."""
+        best = Equilibrium(load_factor, positions, np.full_like(positions, np.nan), np.inf, 0, np.inf, converged=False)
         for iteration in range(self.settings.max_iterations + 1):
-            force, scale = self.unbalanced(positions, load_factor)
+            internal = self.potential.gradient(positions)
+            force, scale = self.unbalanced(internal, load_factor)
             size = float(np.linalg.norm(force))
             residual = size / scale if scale else 0.0
             if self.report:
                 self.report(load_factor, iteration, residual)
             if residual < best.residual:
-                best = self._state(load_factor, positions, iteration, residual)
+                best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self.tangent(positions)
             if size <= max(self.settings.tolerance * scale, self._rounding(tangent, positions)):
-                return self._judged(replace(best, positions=positions, iterations=iteration, converged=True), tangent)
+                energy = self.potential.energy(positions)
+                state = Equilibrium(load_factor, positions, internal, energy, iteration, residual, converged=True)
+                return self._judged(state, tangent)
             step = self._step(positions, tangent, force)
             moved = None if step is None else self._search(load_factor, positions, step, float(step @ force))
             if moved is None:
                 break
             positions = moved
-        return replace(best, iterations=iteration)
-
-    def _state(self, load_factor: float, positions: Floats, iterations: int, residual: float) -> Equilibrium:
-        gradient, energy = self.potential.gradient(positions), self.potential.energy(positions)
-        return Equilibrium(load_factor, positions, gradient, energy, iterations, residual, converged=False)
+        return replace(best, energy=self.potential.energy(best.positions), iterations=iteration)
 
     def _rounding(self, tangent: SparseMatrix, positions: Floats) -> float:
         """The unbalanced force that rounding of the positions alone makes [N]: no residual can go below."""
@@ -218,6 +219,8 @@ class _Balance:
 
     def _step(self, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
         """Return a direction of descent: Newton's where the tangent is positive, else that of a positive neighbour."""
+        if not np.isfinite(tangent.data).all():
+            return None
         for candidate in self._positive_neighbours(positions, tangent):
             try:
                 factors = factorise(candidate)

@@ -11,10 +11,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from truespring.equilibrium import Path
-from truespring.errors import StudyError, TruespringError, nearest
+from truespring.errors import StudyError, TruespringError, close_words, nearest
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
 from truespring.mesh import Mesh, Near, named_point, nearest_node, rectangle, select
-from truespring.models import Fem, Model, Springs, UserStiffness
+from truespring.models import Fem, Model, Springs, UserStiffness, moduli
 from truespring.problem import Fixed, Force, Problem
 from truespring.reference import read_stl
 from truespring.solvers import Newton
@@ -63,8 +63,7 @@ def read_study(file: str | FilePath) -> Study:
     try:
         table = schema.StudyTable.model_validate(tables)
     except ValidationError as error:
-        lines = _line_numbers(source)
-        raise StudyError("\n".join(_message(place, one, lines) for one in error.errors())) from None
+        raise StudyError("\n".join(_messages(place, error, _line_numbers(source)))) from None
     return _Builder(place, source, table).study()
 
 
@@ -141,6 +140,8 @@ class _Builder:
                     own = table.stiffness and UserStiffness(table.stiffness.edge, table.stiffness.diagonal)
                     model = Springs(table.rule, own, table.sharing, table.allow_negative)
             model.potential(problem)  # what does not fit is said before anything is solved
+            if isinstance(model, Springs):
+                moduli(problem, model)
             return model
 
     def compared(self, entries: Mapping[str, Model | Path]) -> tuple[str, tuple[str, ...]]:
@@ -171,6 +172,18 @@ def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None
     if probe is None:
         return None
     return named_point(mesh, probe) if isinstance(probe, str) else nearest_node(mesh, Near(probe).point)
+
+
+def _messages(file: FilePath, error: ValidationError, lines: Mapping[tuple[str | int, ...], int]) -> list[str]:
+    """One line a fault; a missing key is not told where an unknown one beside it is its misspelling."""
+    faults = error.errors()
+    meant = set()
+    for fault in faults:
+        if fault["type"] == "extra_forbidden":
+            *table, word = fault["loc"]
+            meant.update((*table, guess) for guess in close_words(str(word), _allowed_keys(tuple(table))))
+    told = [fault for fault in faults if fault["type"] != "missing" or fault["loc"] not in meant]
+    return [_message(file, fault, lines) for fault in told]
 
 
 def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], int]) -> str:

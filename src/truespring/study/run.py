@@ -2,7 +2,7 @@
 
 import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -10,7 +10,7 @@ from truespring.compare import compare, most_moved
 from truespring.equilibrium import Path, model_warnings, solve
 from truespring.errors import StudyError
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, Springs, moduli
+from truespring.models import Fem, Moduli, Springs, moduli
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
 from truespring.report.series import write_series, write_stl
@@ -69,6 +69,13 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
         tolerance=study.tolerance,
         source=study.source,
     )
+
+
+def realised_moduli(study: Study) -> Iterator[tuple[str, Moduli]]:
+    """Yield a title and what they realise for each springs model of a study, solving nothing."""
+    for name, entry in study.entries.items():
+        if isinstance(entry, Springs):
+            yield f"{study.stem}: what '{name}' realises, {entry.label}", moduli(study.problem, entry)
 
 
 def write(result: Result, out: FilePath, report: bool = True) -> None:

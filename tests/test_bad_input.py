@@ -1,0 +1,186 @@
+"""Broken studies: exit code 2 (or 1 where only solving can tell), one readable message, nothing written."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.studies import changed, written
+from truespring.cli import main
+
+STL = '[models.other]\nkind = "stl"\nfile = "other.stl"\n\n[compare]'
+
+# What is changed in a good study, and what the message must name: the key, the value or what is allowed.
+BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
+    "not TOML": (("[mesh]", "[mesh"), ("TOML", "line 3")),
+    "a key twice": (("poisson = 0.3", "poisson = 0.3\npoisson = 0.3"), ("TOML", "line 11")),
+    "no mesh": (
+        ('[mesh]\nshape = "rectangle"\nsize = ["40 mm", "10 mm"]\nelements = [8, 2]\n', ""),
+        ("mesh", "required"),
+    ),
+    "no models": (
+        ('[models.springs]\nkind = "springs"\nrule = "lloyd"\n\n[models.linear]\nkind = "fem"\nlaw = "linear"\n', ""),
+        ("models", "required"),
+    ),
+    "unknown table": (("[solver]", "[solvers]"), ("solvers", "did you mean 'solver'")),
+    "unknown key": (("poisson = 0.3", "poison = 0.3"), ("material.poison", "did you mean 'poisson'")),
+    "unknown key of a model": (('rule = "lloyd"', 'rul = "lloyd"'), ("models.springs.rul", "did you mean 'rule'")),
+    "shape unknown": (('shape = "rectangle"', 'shape = "rectangel"'), ("mesh.shape", "did you mean 'rectangle'")),
+    "size a text": (('size = ["40 mm", "10 mm"]', 'size = "40 mm"'), ("mesh.size", "list")),
+    "size of three": (('["40 mm", "10 mm"]', '["40 mm", "10 mm", "1 mm"]'), ("mesh.size", "2")),
+    "size negative": (('["40 mm", "10 mm"]', '["-40 mm", "10 mm"]'), ("mesh", "-0.04", "positive")),
+    "size in kPa": (('["40 mm", "10 mm"]', '["40 kPa", "10 mm"]'), ("mesh.size.1", "40 kPa", "length")),
+    "size without unit": (('["40 mm", "10 mm"]', '["40", "10 mm"]'), ("mesh.size.1", "no unit", "160 mm")),
+    "elements zero": (("elements = [8, 2]", "elements = [0, 2]"), ("mesh.elements.1", "= 0", "1")),
+    "elements fractional": (("elements = [8, 2]", "elements = [8.5, 2]"), ("mesh.elements.1", "8.5", "integer")),
+    "mesh too large": (("elements = [8, 2]", "elements = [400000, 100000]"), ("mesh", "GiB", "fewer elements")),
+    "elements too flat": (("elements = [8, 2]", "elements = [1, 5000]"), ("mesh", "flatter")),
+    "no squares for lloyd": (("elements = [8, 2]", "elements = [8, 3]"), ("models.springs", "squares", "isotropic")),
+    "young negative": (('young = "10 kPa"', 'young = "-10 kPa"'), ("material", "-10000", "positive")),
+    "young a length": (('young = "10 kPa"', 'young = "10 mm"'), ("material.young", "10 mm", "stress")),
+    "young in unknown unit": (('young = "10 kPa"', 'young = "10 kpa"'), ("material.young", "kpa", "case")),
+    "young a boolean": (('young = "10 kPa"', "young = true"), ("material.young", "True", "stress")),
+    "young infinite": (('young = "10 kPa"', "young = inf"), ("material.young", "inf", "finite")),
+    "young empty": (('young = "10 kPa"', 'young = ""'), ("material.young", "stress")),
+    "poisson 0.6": (("poisson = 0.3", "poisson = 0.6"), ("material", "0.6", "0.5")),
+    "poisson not a number": (("poisson = 0.3", "poisson = nan"), ("material.poisson", "nan", "finite")),
+    "poisson a text": (("poisson = 0.3", 'poisson = "0.3"'), ("material.poisson", "0.3", "number")),
+    "section unknown": (('"plane-stress"', '"plane stress"'), ("section.kind", "did you mean 'plane-stress'")),
+    "thickness zero": (('thickness = "10 mm"', 'thickness = "0 mm"'), ("section", "0.0", "positive")),
+    "no thickness": (('thickness = "10 mm"\n', ""), ("section.thickness", "required")),
+    "no support": (('[[support]]\non = "left"\n', ""), ("support", "required")),
+    "support of nothing": (('on = "left"', 'on = "lef"'), ("support.1.on", "did you mean 'left'")),
+    "support between nodes": (('on = "left"', 'on = { x = "1 mm" }'), ("support.1.on", "0.001", "nearest")),
+    "empty box": (('on = "left"', "on = { box = [[1, 1], [2, 2]] }"), ("support.1.on", "no node in the box")),
+    "box reversed": (('on = "left"', "on = { box = [[1, 1], [0, 0]] }"), ("support.1.on", "lower")),
+    "unknown selection": (('on = "left"', 'on = { neer = ["0 mm", "0 mm"] }'), ("support.1.on", "did you mean 'near'")),
+    "side of a 3D body": (('on = "left"', 'on = "back"'), ("support.1.on", "3D")),
+    "rigid motion": (('on = "left"', 'on = "left"\nfix = ["x"]'), ("support", "along y", "rigid")),
+    "body may turn": (('on = "left"', 'on = "left-middle"'), ("support", "turning", "rigid")),
+    "unknown direction": (('on = "left"', 'on = "left"\nfix = ["w"]'), ("support.1.fix.1", "'w'", "allowed")),
+    "direction of a 3D body": (('on = "left"', 'on = "left"\nfix = ["x", "z"]'), ("support", "'z'", "x, y")),
+    "contradicting supports": (
+        ("[[load]]", '[[support]]\non = "left-top"\ndisplacement = ["1 mm", "0 mm"]\n\n[[load]]'),
+        ("support", "0.001", "one prescribed motion"),
+    ),
+    "no load": (('[[load]]\non = "right"\nforce = ["0 N", "-0.01 N"]\n', ""), ("load", "nothing loads")),
+    "force zero": (('["0 N", "-0.01 N"]', '["0 N", "0 N"]'), ("nothing loads", "load")),
+    "force in metres": (('["0 N", "-0.01 N"]', '["0 N", "-0.01 m"]'), ("load.1.force.2", "-0.01 m", "force")),
+    "force of one": (('["0 N", "-0.01 N"]', '["-0.01 N"]'), ("load.1.force", "2")),
+    "force of three": (('["0 N", "-0.01 N"]', '[0, 0, "-0.01 N"]'), ("3 values", "2 directions")),
+    "load steps zero": (("load_steps = 2", "load_steps = 0"), ("solver.load_steps", "0", "1")),
+    "control unknown": (("load_steps = 2", 'control = "lod"'), ("solver.control", "did you mean 'load'")),
+    "rule unknown": (('rule = "lloyd"', 'rule = "loyd"'), ("models.springs.rule", "did you mean 'lloyd'")),
+    "rule and stiffness": (
+        ('rule = "lloyd"', 'rule = "lloyd"\nstiffness = { edge = 0.3, diagonal = 0.4 }'),
+        ("models.springs", "either a rule"),
+    ),
+    "neither rule nor stiffness": (('rule = "lloyd"\n', ""), ("models.springs", "either a rule")),
+    "no diagonals": (
+        ('rule = "lloyd"', "stiffness = { edge = 0.3, diagonal = 0.0 }"),
+        ("models.springs", "do not resist"),
+    ),
+    "negative spring": (
+        ('rule = "lloyd"', "stiffness = { edge = -0.3, diagonal = 0.4 }"),
+        ("models.springs", "negative", "allow_negative"),
+    ),
+    "stiffness misspelt": (
+        ('rule = "lloyd"', "stiffness = { edge = 0.3, diagonl = 0.4 }"),
+        ("models.springs.stiffness.diagonl", "did you mean 'diagonal'"),
+    ),
+    "sharing unknown": (('rule = "lloyd"', 'rule = "lloyd"\nsharing = "sum"'), ("models.springs.sharing", "'summed'")),
+    "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
+    "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
+    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, stl")),
+    "model name with a slash": (("[models.linear]", '[models."a/b"]'), ("models.a/b", "name")),
+    "probe unknown": (('"right-middle"', '"right-mid"'), ("compare.probe", "did you mean 'right-middle'")),
+    "probe of one number": (('"right-middle"', "[0.04]"), ("compare.probe", "coordinates")),
+    "model of compare unknown": (
+        ("[compare]", '[compare]\nmodel = "spring"'),
+        ("compare.model", "did you mean 'springs'"),
+    ),
+    "reference unknown": (("[compare]", '[compare]\nreferences = ["liner"]'), ("references", "did you mean 'linear'")),
+    "reference is the model": (("[compare]", '[compare]\nreferences = ["springs"]'), ("compare.references", "itself")),
+    "tolerance zero": (("[compare]", "[compare]\ntolerance = 0.0"), ("compare.tolerance", "0")),
+    "STL missing": (("[compare]", STL), ("models.other", "other.stl")),
+}
+
+
+def refused(folder: Path, capsys: pytest.CaptureFixture[str], *files: Path) -> str:
+    """Run verify on the files, check that they are refused without a trace, and return the message."""
+    out = folder / "out"
+    assert main(["verify", *map(str, files), "--out", str(out)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "Traceback" not in printed.err
+    assert not out.exists()
+    return printed.err
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_study_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change, words = BROKEN[name]
+    message = refused(tmp_path, capsys, written(tmp_path, changed(change)))
+    assert message.startswith(f"truespring: {tmp_path / 'study.toml'}")
+    assert len(message.splitlines()) == 1, message
+    for word in words:
+        assert word in message, message
+
+
+def test_there_are_enough_broken_studies() -> None:
+    assert len(BROKEN) >= 40
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (b"", "empty"),
+        (b"this is no STL at all\n" * 20, "STL"),
+        (b"solid cut\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "cut"),
+        (b"\0" * 80 + (1000).to_bytes(4, "little") + b"\0" * 120, "cut"),
+    ],
+)
+def test_a_broken_stl_is_refused(content: bytes, word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "other.stl").write_bytes(content)
+    message = refused(tmp_path, capsys, written(tmp_path, changed(("[compare]", STL))))
+    assert "models.other" in message and "other.stl" in message
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = written(tmp_path, changed(("poisson = 0.3", "poison = 0.3")), "first.toml")
+    second = written(tmp_path, changed(('on = "left"', 'on = "lef"')), "second.toml")
+    good = written(tmp_path, name="good.toml")
+    message = refused(tmp_path, capsys, good, first, second, tmp_path / "absent.toml")
+    # A key that is not known leaves the one that is meant missing: two faults of one file.
+    for word in ("first.toml", "poison", "second.toml", "lef", "absent.toml"):
+        assert word in message
+
+
+def test_two_studies_of_one_stem_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "other").mkdir()
+    message = refused(tmp_path, capsys, written(tmp_path), written(tmp_path / "other"))
+    assert "one stem" in message
+
+
+def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path)
+    assert main(["verify", str(file), "--out", str(file)]) == 2
+    assert "folder is wanted" in capsys.readouterr().err
+
+
+def test_what_only_solving_can_tell_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    crushed = changed(('["0 N", "-0.01 N"]', '["-100 N", "0 N"]'), ('law = "linear"', 'law = "saint-venant-kirchhoff"'))
+    out = tmp_path / "out"
+    assert main(["solve", str(written(tmp_path, crushed)), "--out", str(out)]) == 1
+    error = capsys.readouterr().err
+    assert "Traceback" not in error
+    assert "model 'linear'" in error and "load factor" in error
+    assert (out / "study" / "summary.json").exists()
+    assert (out / "study" / "curves.csv").exists()
+
+
+def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in ([], ["verify"], ["verfy", "x.toml"], ["verify", "x.toml", "--threads", "0"]):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert ended.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err

@@ -1,0 +1,96 @@
+"""The picture of imports: problem x model x solver -> path -> comparison -> report, one way only."""
+
+import ast
+from pathlib import Path
+
+import truespring
+
+SOURCE = Path(truespring.__file__).parent
+
+# What each room may import of the others; arrays and errors are open to all.
+ALLOWED = {
+    "cli": {"study", "report"},
+    "study": {
+        "report",
+        "compare",
+        "reference",
+        "equilibrium",
+        "models",
+        "solvers",
+        "problem",
+        "mesh",
+        "material",
+        "units",
+    },
+    "report": {"compare", "equilibrium", "models", "potential", "problem", "mesh", "material"},
+    "compare": {"equilibrium", "mesh"},
+    "reference": {"equilibrium", "problem", "mesh", "units"},
+    "equilibrium": {"models", "solvers", "potential", "problem", "mesh"},
+    "models": {"potential", "problem", "mesh", "material"},
+    "solvers": {"potential"},
+    "problem": {"potential", "mesh", "material"},
+    "potential": set(),
+    "mesh": set(),
+    "material": set(),
+    "units": set(),
+    "errors": set(),
+    "arrays": set(),
+}
+OPEN_TO_ALL = {"arrays", "errors"}
+HEAVY = {"matplotlib", "pyvista", "vtk", "numba", "pint", "trimesh", "meshio", "rich", "jinja2"}
+
+
+def rooms() -> dict[str, list[Path]]:
+    found: dict[str, list[Path]] = {}
+    for file in SOURCE.rglob("*.py"):
+        room = file.relative_to(SOURCE).parts[0].removesuffix(".py")
+        found.setdefault(room, []).append(file)
+    del found["__init__"]  # the public names, each once
+    return found
+
+
+def imported(file: Path, everywhere: bool = True) -> set[str]:
+    """Dotted names that a file imports, at its top only or everywhere."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    names: set[str] = set()
+    for node in ast.walk(tree) if everywhere else tree.body:
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0 and node.module, f"{file}: relative import"
+            names.add(node.module)
+    return names
+
+
+def test_imports_run_one_way() -> None:
+    assert set(rooms()) == set(ALLOWED)
+    for room, files in rooms().items():
+        for file in files:
+            ours = {name.split(".")[1] for name in imported(file) if name.startswith("truespring.")}
+            assert ours - {room} - OPEN_TO_ALL <= ALLOWED[room], f"{file} imports {ours}"
+            assert "truespring" not in imported(file), f"{file} imports the public names"
+
+
+def test_the_picture_has_no_cycle() -> None:
+    left = {room: set(others) for room, others in ALLOWED.items()}
+    while left:
+        lowest = [room for room, others in left.items() if not others & left.keys()]
+        assert lowest, f"a cycle among {sorted(left)}"
+        for room in lowest:
+            del left[room]
+
+
+def test_heavy_libraries_are_imported_where_they_are_used() -> None:
+    for files in rooms().values():
+        for file in files:
+            heavy = {name.split(".")[0] for name in imported(file, everywhere=False)} & HEAVY
+            assert not heavy, f"{file} imports {heavy} at its top"
+
+
+def test_the_library_neither_prints_nor_exits() -> None:
+    for room, files in rooms().items():
+        for file in files:
+            calls = [node.func for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.Call)]
+            named = {call.id for call in calls if isinstance(call, ast.Name)}
+            assert room == "cli" or not named & {"print", "exit", "input"}, file
+            assert "sys.exit" not in file.read_text(encoding="utf-8"), file
