@@ -14,7 +14,7 @@ from truespring.mesh import SurfaceDistance, surface_distance
 TOLERANCE = 0.05
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """How a path differs from a reference. All errors are relative to the reference's displacement.
 
@@ -38,6 +38,9 @@ class Comparison:
     max_errors: Floats
     probe_errors: Floats
     surface: SurfaceDistance | None = None
+
+    def __repr__(self) -> str:
+        return f"Comparison({self})"
 
     def _at_full_load(self, errors: Floats) -> float | None:
         reached = self.load_factors.size and self.load_factors[-1] == 1.0

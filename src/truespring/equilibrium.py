@@ -70,7 +70,7 @@ class State:
     stretch: tuple[float, float] | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Path:
     """The equilibria of one model of one problem, by load level.
 
@@ -97,6 +97,9 @@ class Path:
     surface: Surface | None = None
     potential: Potential | None = None
     moduli: Moduli | None = None
+
+    def __repr__(self) -> str:
+        return f"Path({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
 
     @cached_property
     def load_factors(self) -> Floats:

@@ -58,7 +58,7 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """Nodes joined by elements of one kind.
 
@@ -87,6 +87,9 @@ class Mesh:
         except ValueError as error:
             raise MeshError(str(error)) from None
         self._check()
+
+    def __repr__(self) -> str:
+        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} {self.element}s)"
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

@@ -5,7 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
+from truespring.errors import MeshError
+
+# A place counts as inside a triangle up to this share of the surface's diameter beyond its edges:
+# above the rounding of single precision files, far below any element.
+_INSIDE = 1e-6
+
+# A triangle of less height over length holds nothing: shares there would be rounding.
+_NEEDLE = 1e-6
+
+# Rows that are compared with many columns are taken in blocks of about this many numbers, to bound the memory.
+_BLOCK = 250_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,11 +27,30 @@ class Surface:
         points: [m], shape (n_points, 2).
         triangles: point numbers, shape (n_triangles, 3).
         load_factor: the load level that it belongs to.
+
+    Raises MeshError where there is no triangle, a triangle names a point that does not exist, or no
+    edge bounds the region.
     """
 
     points: Floats
     triangles: Ints
     load_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "points", frozen_floats(self.points, (None, 2), "points"))
+            object.__setattr__(self, "triangles", frozen_ints(self.triangles, (None, 3), "triangles"))
+        except ValueError as error:
+            raise MeshError(str(error)) from None
+        if not len(self.triangles):
+            raise MeshError("a surface without triangles is empty")
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.points):
+            raise MeshError(
+                f"triangles name points {self.triangles.min()} to {self.triangles.max()}, "
+                f"there are 0 to {len(self.points) - 1}"
+            )
+        if not len(self.outline):
+            raise MeshError("every edge of the surface belongs to several triangles: it has no outline")
 
     @cached_property
     def outline(self) -> Ints:
@@ -29,13 +59,77 @@ class Surface:
         _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
         return np.asarray(edges[first[count == 1]])
 
+    @property
+    def lower(self) -> Floats:
+        """The smallest coordinates [m], shape (2,)."""
+        return np.asarray(self.points.min(axis=0))
+
+    @property
+    def upper(self) -> Floats:
+        """The largest coordinates [m], shape (2,)."""
+        return np.asarray(self.points.max(axis=0))
+
+    @property
+    def diameter(self) -> float:
+        """The diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(self.upper - self.lower))
+
+    def locate(self, places: Floats) -> tuple[Ints, Floats, Floats]:
+        """Find the triangle that holds each of `places` [m], shape (n, 2), or one near that it is least beyond.
+
+        Returns the triangles' numbers, shape (n,); the barycentric shares of their points, shape (n, 3),
+        sum 1; and the distance to the surface [m], shape (n,), zero inside.
+        """
+        from scipy.spatial import KDTree
+
+        centres = self._corners.mean(axis=1)
+        tree = KDTree(centres)
+        slack = _INSIDE * self.diameter
+        # No triangle reaches a place further from its centre: candidates up to there are enough.
+        reach = float(np.linalg.norm(self._corners - centres[:, None], axis=2).max()) + slack
+        triangle, shares = np.empty(len(places), dtype=np.int64), np.empty((len(places), 3))
+        beyond, seen = np.empty(len(places)), np.empty(len(places))
+        unsure = np.arange(len(places))
+        for n_near in sorted({min(few, len(centres)) for few in (16, 256, len(centres))}):
+            for some in _blocks(unsure, n_near):
+                distance, near = tree.query(places[some], k=np.arange(1, n_near + 1))
+                triangle[some], shares[some], beyond[some] = self._least_beyond(places[some], np.asarray(near))
+                seen[some] = np.asarray(distance)[:, -1]
+            unsure = unsure[(beyond[unsure] > slack) & (seen[unsure] <= reach)]
+        outside = np.flatnonzero(beyond > slack)
+        apart = np.zeros(len(places))
+        apart[outside] = _to_segments(places[outside], self.points[self.outline])
+        return triangle, shares, apart
+
+    @cached_property
+    def _corners(self) -> Floats:
+        return np.asarray(self.points[self.triangles])
+
+    def _least_beyond(self, places: Floats, candidates: Ints) -> tuple[Ints, Floats, Floats]:
+        """Pick for each place, among its row of triangles, the one whose edges it is least beyond [m]."""
+        corners = self._corners[candidates]
+        to_corner = corners - places[:, None, None]
+        # Twice the signed areas that a place spans with the edge opposite to each corner; their sum is the triangle's.
+        areas = np.stack([_cross(to_corner[:, :, (c + 1) % 3], to_corner[:, :, (c + 2) % 3]) for c in range(3)], axis=2)
+        whole = areas.sum(axis=2, keepdims=True)
+        opposite = np.linalg.norm(np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2), axis=3)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            beyond = (-areas * np.sign(whole) / opposite).max(axis=2)
+            all_shares = areas / whole
+        beyond[np.abs(whole[:, :, 0]) <= _NEEDLE * opposite.max(axis=2) ** 2] = np.inf
+        best = beyond.argmin(axis=1)
+        row = np.arange(len(places))
+        chosen = np.broadcast_to(candidates, beyond.shape)[row, best]
+        return np.asarray(chosen), np.asarray(all_shares[row, best]), np.asarray(beyond[row, best])
+
 
 @dataclass(frozen=True, slots=True)
 class SurfaceDistance:
     """Distances of a body's outline and nodes to a surface [m].
 
     Attributes:
-        outline_rms, outline_max: of points along either outline to the other one.
+        outline_rms, outline_max: of either outline to the other one; the rms is taken over the length
+            of both, so that it does not depend on how finely they are divided.
         nodes_rms, nodes_max: of each node of the body to the nearest point of the surface.
     """
 
@@ -48,34 +142,74 @@ class SurfaceDistance:
 def surface_distance(positions: Floats, boundary: Ints, surface: Surface) -> SurfaceDistance:
     """Measure nodes at `positions`, shape (n_nodes, 2), and the outline of edges `boundary` against `surface`."""
     mine, theirs = positions[boundary], surface.points[surface.outline]
-    apart = np.concatenate([_to_segments(_along(mine), theirs), _to_segments(_along(theirs), mine)])
-    nodes = _to_points(positions, surface.points)
-    return SurfaceDistance(_rms(apart), float(apart.max()), _rms(nodes), float(nodes.max()))
+    apart = np.concatenate([_apart(mine, theirs), _apart(theirs, mine)])
+    length = np.concatenate([_lengths(mine), _lengths(theirs)])
+    nodes = _nearest(surface.points, positions, 1)[0]
+    return SurfaceDistance(
+        outline_rms=float(np.sqrt(np.average(apart**2 @ _SIMPSON, weights=length))),
+        outline_max=float(apart.max()),
+        nodes_rms=float(np.sqrt((nodes**2).mean())),
+        nodes_max=float(nodes.max()),
+    )
 
 
-def _along(segments: Floats) -> Floats:
-    """Nine evenly spaced points of each segment, shape (9 n, 2)."""
-    share = np.linspace(0, 1, 9)[None, :, None]
-    return np.asarray((segments[:, :1] * (1 - share) + segments[:, 1:] * share).reshape(-1, segments.shape[2]))
+# Shares of the composite Simpson rule at nine evenly spaced points: exact where the distance is linear along a segment.
+_SIMPSON = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) / 24
+
+
+def _apart(segments: Floats, others: Floats) -> Floats:
+    """Distance of nine evenly spaced points of each segment to the nearest of the others [m], shape (n, 9)."""
+    share = np.linspace(0, 1, len(_SIMPSON))[None, :, None]
+    along = segments[:, :1] * (1 - share) + segments[:, 1:] * share
+    return _to_segments(along.reshape(-1, 2), others).reshape(-1, len(_SIMPSON))
 
 
 def _to_segments(points: Floats, segments: Floats) -> Floats:
-    """Distance of each point to the nearest segment [m], shape (n_points,)."""
-    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    """Distance of each point to the nearest segment [m], shape (n_points,).
+
+    Looks at the segments with the nearest middles only; a segment further than these is at least its
+    middle's distance less half its length away, which tells for which points that was not enough.
+    """
+    middles = segments.mean(axis=1)
+    reach = _lengths(segments).max() / 2
     nearest = np.empty(len(points))
-    for first in range(0, len(points), 1024):  # in blocks, so that long outlines fit in memory
-        offset = points[first : first + 1024, None] - start
-        share = np.clip((offset * along).sum(axis=2) / squared, 0, 1)
-        nearest[first : first + 1024] = np.linalg.norm(offset - share[:, :, None] * along, axis=2).min(axis=1)
+    unsure = np.arange(len(points))
+    for n_near in (8, 64):
+        if n_near < len(segments):
+            distance, near = _nearest(middles, points[unsure], n_near)
+            nearest[unsure] = _to_each(points[unsure], segments[near]).min(axis=1)
+            unsure = unsure[distance[:, -1] - reach < nearest[unsure]]
+    for some in _blocks(unsure, len(segments)):
+        nearest[some] = _to_each(points[some], segments[None]).min(axis=1)
     return nearest
 
 
-def _to_points(points: Floats, others: Floats) -> Floats:
+def _nearest(points: Floats, places: Floats, n_near: int) -> tuple[Floats, Ints]:
+    """Distances [m] and numbers of the `n_near` points nearest to each place, shapes (n_places, n_near)."""
     from scipy.spatial import KDTree
 
-    return np.asarray(KDTree(others).query(points)[0])
+    distance, number = KDTree(points).query(places, k=np.arange(1, n_near + 1))
+    return np.asarray(distance, dtype=np.float64), np.asarray(number, dtype=np.int64)
 
 
-def _rms(values: Floats) -> float:
-    return float(np.sqrt((values**2).mean()))
+def _to_each(points: Floats, segments: Floats) -> Floats:
+    """Distance of each point to each segment of its row [m]; segments of shape (n_points or 1, k, 2, 2)."""
+    start = segments[:, :, 0]
+    along = segments[:, :, 1] - start
+    offset = points[:, None] - start
+    squared = np.maximum((along**2).sum(axis=2), np.finfo(float).tiny)  # a segment may be a point
+    share = np.clip((offset * along).sum(axis=2) / squared, 0, 1)
+    return np.asarray(np.linalg.norm(offset - share[:, :, None] * along, axis=2))
+
+
+def _blocks(rows: Ints, n_columns: int) -> list[Ints]:
+    size = max(1, _BLOCK // n_columns)
+    return [rows[first : first + size] for first in range(0, len(rows), size)]
+
+
+def _lengths(segments: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1))
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

@@ -9,7 +9,7 @@ from truespring.equilibrium import Path, Status
 from truespring.problem import Problem
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """One study, solved.
 
@@ -34,6 +34,9 @@ class Result:
     comparisons: Mapping[str, Comparison]
     tolerance: float
     source: str
+
+    def __repr__(self) -> str:
+        return f"Result({self.stem}, {list(self.paths.values())})"
 
     @cached_property
     def closest(self) -> str | None:
