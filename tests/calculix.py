@@ -1,0 +1,122 @@
+"""Twins of truespring problems for CalculiX: writes the input deck, runs ccx, reads the displacement back.
+
+CalculiX is a finite element program of its own (Dhondt and Wittig, https://www.calculix.de), called as a process.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from truespring.arrays import Floats
+
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+
+# CalculiX stops by default at a residual of 0.5 % of the mean force and a correction of 1 % of the displacement;
+# these are less than it prints.
+_CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7"
+# It also takes any residual below 1e-6 for zero, whatever the unit: forces are given to it in micronewtons.
+_FORCE_UNIT = 1e-6
+
+
+def continuum_deck(problem: ts.Problem, increments: int | None) -> str:
+    """Write four-node quadrilaterals, CPS4 or CPE4 by the section.
+
+    With `increments` equal load increments NLGEOM makes `*ELASTIC` the St. Venant-Kirchhoff law; None solves linearly.
+    """
+    assert problem.material is not None and problem.section is not None
+    kind = "CPE4" if isinstance(problem.section, ts.PlaneStrain) else "CPS4"
+    lines = [
+        f"*ELEMENT, TYPE={kind}, ELSET=BODY",
+        *(f"{number}, {_joined(nodes + 1)}" for number, nodes in enumerate(problem.mesh.elements, 1)),
+        "*MATERIAL, NAME=M",
+        "*ELASTIC",
+        f"{_real(problem.material.young / _FORCE_UNIT)}, {_real(problem.material.poisson)}",
+        "*SOLID SECTION, ELSET=BODY, MATERIAL=M",
+        _real(problem.section.thickness),
+    ]
+    return _deck(problem, lines, increments)
+
+
+def spring_deck(problem: ts.Problem, network: ts.SpringNetwork, increments: int) -> str:
+    """Write every spring as a SPRINGA element, one set of elements for each distinct stiffness.
+
+    SPRINGA takes its rest length from the reference positions: the network must be at rest there.
+    """
+    assert np.allclose(network.stretch(network.nodes), 1.0, rtol=1e-14)
+    values, place = np.unique(network.stiffness, return_inverse=True)
+    lines = []
+    for group, stiffness in enumerate(values):
+        lines.append(f"*ELEMENT, TYPE=SPRINGA, ELSET=S{group}")
+        members = np.flatnonzero(place == group)
+        lines.extend(f"{number + 1}, {_joined(network.springs[number] + 1)}" for number in members)
+        # The empty line stands for directions; stiffness without a decimal point would be read as one.
+        lines.extend([f"*SPRING, ELSET=S{group}", "", _real(stiffness / _FORCE_UNIT)])
+    # CalculiX is three-dimensional: the plane is held in z.
+    lines += ["*BOUNDARY", "NALL, 3, 3"]
+    return _deck(problem, lines, increments)
+
+
+def displacement(deck: str, folder: Path) -> Floats:
+    """Run `deck` in `folder` and return the displacement at the end of its step [m], shape (n_nodes, 2)."""
+    (folder / "twin.inp").write_text(deck)
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        ["ccx", "twin"], cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    printed = folder / "twin.dat"
+    # Of a wrong deck ccx leaves an empty file.
+    assert done.returncode == 0 and printed.is_file() and printed.stat().st_size, done.stdout[-2000:]
+    return _last_block(printed.read_text())
+
+
+def _deck(problem: ts.Problem, model: list[str], increments: int | None) -> str:
+    mesh, loading = problem.mesh, problem.loading
+    return "\n".join(
+        [
+            "*NODE, NSET=NALL",
+            *(f"{number}, {_joined(map(_real, node))}" for number, node in enumerate(mesh.nodes, 1)),
+            *model,
+            "*STEP" if increments is None else f"*STEP, NLGEOM, INC={increments}",
+            *(["*STATIC"] if increments is None else [_CONTROLS, "*STATIC, DIRECT", f"{_real(1 / increments)}, 1."]),
+            "*BOUNDARY",
+            *(
+                f"{node + 1}, {axis + 1}, {axis + 1}, {_real(loading.displacement[node, axis])}"
+                for node, axis in np.argwhere(loading.held)
+            ),
+            *_loads(loading.external_force),
+            f"*NODE PRINT, NSET=NALL, FREQUENCY={increments or 1}",
+            "U",
+            "*END STEP",
+            "",
+        ]
+    )
+
+
+def _loads(force: Floats) -> Iterator[str]:
+    if force.any():
+        yield "*CLOAD"
+        for node, axis in np.argwhere(force):
+            yield f"{node + 1}, {axis + 1}, {_real(force[node, axis] / _FORCE_UNIT)}"
+
+
+def _real(value: float) -> str:
+    """At most 19 characters: ccx reads twenty of a number and silently drops the rest."""
+    return f"{value:.12e}"
+
+
+def _joined(values: Iterable[object]) -> str:
+    return ", ".join(map(str, values))
+
+
+def _last_block(printed: str) -> Floats:
+    """Read the last table of a .dat file: node, vx, vy, vz."""
+    table = printed[printed.rindex("displacements") :].splitlines()[1:]
+    rows = np.array([line.split() for line in table if line.strip()], dtype=float)
+    assert (rows[:, 0] == np.arange(1, len(rows) + 1)).all()
+    return rows[:, 1:3]
