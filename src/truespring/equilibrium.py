@@ -152,9 +152,13 @@ def solve(
         raise ModelError(
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
-    found = list((solver or Newton()).follow(potential, problem.loading, report))
-    seconds = time.perf_counter() - started
     linear = isinstance(model, Fem) and not LAWS[model.law].finite
+
+    def upright(positions: Floats) -> bool:
+        return linear or problem.mesh.smallest_area_ratio(positions) > 0
+
+    found = list((solver or Newton()).follow(potential, problem.loading, report, upright))
+    seconds = time.perf_counter() - started
     realised = moduli(problem, model) if isinstance(model, Springs) else None
     states = tuple(_state(problem, potential, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, found[-1])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -15,9 +16,13 @@ from truespring.solvers.linear import Factorisation, SingularMatrixError, factor
 Reporter = Callable[[float, int, float], None]
 
 _EPS = float(np.finfo(float).eps)
+# Energies that differ by less than this share cannot be told apart; see _search.
+_DROWNED = 1e-9
+# Rounding of the positions excuses a residual up to this share of the forces, and no more.
+_LARGEST_ROUNDING = 1e-6
 # Armijo's constant, and how far one backtracking step may cut (Nocedal and Wright, 3.1 and 3.5).
 _ARMIJO, _SHORTEST_CUT, _LONGEST_CUT = 1e-4, 0.1, 0.5
-_MIN_STEP = 1e-9
+_MIN_STEP, _LONGEST_STEP = 1e-9, 1024.0
 # An unstable state is left along its mode by this share of the body's size, at most so many times.
 _NUDGE, _MAX_ESCAPES = 1e-3, 3
 
@@ -61,8 +66,8 @@ class Newton:
 
     load_steps: int = 10
     tolerance: float = 1e-10
-    max_iterations: int = 100
-    max_cutbacks: int = 8
+    max_iterations: int = 50
+    max_cutbacks: int = 6
 
     def __post_init__(self) -> None:
         if self.load_steps < 1 or self.max_iterations < 1 or self.max_cutbacks < 0:
@@ -70,16 +75,25 @@ class Newton:
         if not 0 < self.tolerance < 1:
             raise ProblemError(f"tolerance = {self.tolerance}: a relative residual between 0 and 1 is wanted")
 
-    def follow(self, potential: Potential, loading: Loading, report: Reporter | None = None) -> Iterator[Equilibrium]:
+    def follow(
+        self,
+        potential: Potential,
+        loading: Loading,
+        report: Reporter | None = None,
+        admissible: Callable[[Floats], bool] = lambda positions: True,
+    ) -> Iterator[Equilibrium]:
         """Yield the equilibria from load factor 0 to 1 in order.
 
         Where a level cannot be reached the last one yielded is not converged: the best state there.
+        Equilibria whose positions are not `admissible` (an inverted element) are taken only from where
+        the smallest load step leads to no other.
         """
         balance = _Balance(potential, loading, self, report)
         state = balance.find(0.0, potential.nodes)
         yield state
         previous: Equilibrium | None = None
         step, spent = 1.0 / self.load_steps, 0
+        smallest, strict = step / 2**self.max_cutbacks, admissible(state.positions)
         while state.converged and state.load_factor < 1.0:
             requested = (np.floor(state.load_factor * self.load_steps + 1e-9) + 1) / self.load_steps
             level = float(min(requested, state.load_factor + step, 1.0))
@@ -87,16 +101,24 @@ class Newton:
                 level = float(requested)
             reached = balance.find(level, *balance.predictions(state, previous, level))
             spent += reached.iterations
-            if not reached.converged and step > 2.0**-self.max_cutbacks / self.load_steps:
+            wanted = reached.converged and (not strict or admissible(reached.positions))
+            if not wanted and step > smallest:
                 step /= 2
                 continue
-            previous, state, step = (
-                state,
-                replace(reached, iterations=spent),
-                min(2 * step, 1.0 / self.load_steps),
-            )
-            spent = 0
+            if not wanted and strict:
+                strict, step = False, 1.0 / self.load_steps
+                continue
+            previous, state, spent = state, replace(reached, iterations=spent), 0
+            step = min(2 * step, 1.0 / self.load_steps)
             yield state
+
+
+class _Step(NamedTuple):
+    """A direction [m], the slope of the total energy along it [J], and whether it is Newton's own."""
+
+    direction: Floats
+    slope: float
+    newton: bool
 
 
 class _Balance:
@@ -109,11 +131,11 @@ class _Balance:
         self._last_tangent: Factorisation | None = None
 
     def total_energy(self, positions: Floats, load_factor: float) -> tuple[float, float]:
-        """Return stored energy less the work of the loads, and the size of its rounding [J]."""
-        stored = self.potential.energy(positions)
+        """Return stored energy less the work of the loads, and the size of these two together [J]."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            stored = self.potential.energy(positions)
         work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
-        noise = 32 * _EPS * (abs(stored) + float(np.abs(work).sum()))
-        return stored - float(work.sum()), noise
+        return stored - float(work.sum()), abs(stored) + float(np.abs(work).sum())
 
     def unbalanced(self, internal: Floats, load_factor: float) -> tuple[Floats, float]:
         """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
@@ -164,8 +186,11 @@ class _Balance:
             state = self._escape(state)
         return state
 
+    def _force(self, positions: Floats, load_factor: float) -> Floats:
+        return self.unbalanced(self.potential.gradient(positions), load_factor)[0]
+
     def _misfit(self, positions: Floats, load_factor: float) -> float:
-        return float(np.linalg.norm(self.unbalanced(self.potential.gradient(positions), load_factor)[0]))
+        return float(np.linalg.norm(self._force(positions, load_factor)))
 
     def _escape(self, state: Equilibrium) -> Equilibrium:
         """Leave an unstable equilibrium along its mode, to the side of lower energy."""
@@ -190,12 +215,13 @@ class _Balance:
             if residual < best.residual:
                 best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self.tangent(positions)
-            if size <= max(self.settings.tolerance * scale, self._rounding(tangent, positions)):
+            rounding = min(self._rounding(tangent, positions), _LARGEST_ROUNDING * scale)
+            if size <= max(self.settings.tolerance * scale, rounding):
                 energy = self.potential.energy(positions)
                 state = Equilibrium(load_factor, positions, internal, energy, iteration, residual, converged=True)
                 return self._judged(state, tangent)
-            step = self._step(positions, tangent, force)
-            moved = None if step is None else self._search(load_factor, positions, step, float(step @ force))
+            found = self._step(positions, tangent, force)
+            moved = found and self._search(load_factor, positions, found)
             if moved is None:
                 break
             positions = moved
@@ -217,7 +243,7 @@ class _Balance:
             return replace(state, negative_eigenvalues=None)
         return replace(state, negative_eigenvalues=self._last_tangent.negative_eigenvalues)
 
-    def _step(self, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
+    def _step(self, positions: Floats, tangent: SparseMatrix, force: Floats) -> _Step | None:
         """Return a direction of descent: Newton's where the tangent is positive, else that of a positive neighbour."""
         if not np.isfinite(tangent.data).all():
             return None
@@ -228,7 +254,7 @@ class _Balance:
                 continue
             step = -factors.solve(force)
             if not factors.negative_eigenvalues and np.isfinite(step).all() and step @ force < 0:
-                return step
+                return _Step(step, float(step @ force), candidate is tangent)
         return None
 
     def _positive_neighbours(self, positions: Floats, tangent: SparseMatrix) -> Iterator[SparseMatrix]:
@@ -242,17 +268,33 @@ class _Balance:
         for share in (1e-6, 1e-4, 1e-2, 1.0, 10.0):
             yield sparse.csr_array(projected + sparse.diags_array(share * (diagonal + diagonal.mean())))
 
-    def _search(self, load_factor: float, positions: Floats, step: Floats, slope: float) -> Floats | None:
-        """Backtrack along `step` until the total energy falls enough; None where it never does."""
-        energy, noise = self.total_energy(positions, load_factor)
+    def _search(self, load_factor: float, positions: Floats, step: _Step) -> Floats | None:
+        """Backtrack along a step until the total energy falls enough; None where it never does.
+
+        Near equilibrium the fall drowns in the rounding of the energy; there the slope decides
+        (the approximate Wolfe condition of Hager and Zhang 2005). A step that is not Newton's own
+        is often too short, as when a straight column begins to buckle: it is doubled while it descends.
+        """
+        energy, size = self.total_energy(positions, load_factor)
+
+        def descends(moved: Floats, length: float) -> bool:
+            there, size_there = self.total_energy(moved, load_factor)
+            if not np.isfinite(there) or there <= energy + _ARMIJO * length * step.slope:
+                return bool(np.isfinite(there))
+            drowned = there - energy <= _DROWNED * max(size, size_there)
+            return bool(drowned and step.direction @ self._force(moved, load_factor) <= -step.slope / 2)
+
         length = 1.0
-        while length >= _MIN_STEP:
-            moved = self.moved(positions, length * step)
-            with np.errstate(over="ignore", invalid="ignore"):
-                there, noise_there = self.total_energy(moved, load_factor)
-            if there <= energy + _ARMIJO * length * slope + max(noise, noise_there):
-                return moved
-            curvature = there - energy - slope * length
-            cut = -slope * length / (2 * curvature) if np.isfinite(curvature) and curvature > 0 else _SHORTEST_CUT
+        while not descends(moved := self.moved(positions, length * step.direction), length):
+            there, _ = self.total_energy(moved, load_factor)
+            curvature = there - energy - step.slope * length
+            cut = -step.slope * length / (2 * curvature) if np.isfinite(curvature) and curvature > 0 else _SHORTEST_CUT
             length *= min(max(cut, _SHORTEST_CUT), _LONGEST_CUT)
-        return None
+            if length < _MIN_STEP:
+                return None
+        while not step.newton and length >= 1 and length < _LONGEST_STEP:
+            further = self.moved(positions, 2 * length * step.direction)
+            if not descends(further, 2 * length) or step.direction @ self._force(further, load_factor) > 0:
+                break
+            moved, length = further, 2 * length
+        return moved

@@ -177,7 +177,7 @@ def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None
 def _messages(file: FilePath, error: ValidationError, lines: Mapping[tuple[str | int, ...], int]) -> list[str]:
     """One line a fault; a missing key is not told where an unknown one beside it is its misspelling."""
     faults = error.errors()
-    meant = set()
+    meant: set[tuple[str | int, ...]] = set()
     for fault in faults:
         if fault["type"] == "extra_forbidden":
             *table, word = fault["loc"]

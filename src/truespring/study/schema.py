@@ -167,7 +167,7 @@ class SolverTable(Table):
     load_steps: Annotated[int, Field(ge=1, le=100_000)] = 10
     control: Literal["load"] = "load"
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
-    max_iterations: Annotated[int, Field(ge=1)] = 100
+    max_iterations: Annotated[int, Field(ge=1)] = 50
 
 
 class StiffnessTable(Table):

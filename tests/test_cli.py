@@ -1,0 +1,238 @@
+"""The command line and what it leaves behind: the contract that other programs rely on."""
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+from tests.studies import changed, written
+from truespring.cli import main
+
+MODELS = ["springs", "linear"]
+MOVED = (
+    '[[load]]\non = "right"\nforce = ["0 N", "-0.01 N"]\n',
+    '[[support]]\non = "right"\nfix = ["x"]\ndisplacement = ["4 mm", "0 mm"]\n',
+)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The outputs of verify on one small study."""
+    folder = tmp_path_factory.mktemp("verified")
+    assert main(["verify", str(written(folder)), "--out", str(folder / "out"), "--quiet"]) == 0
+    return folder / "out"
+
+
+def rows(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_verify_writes_every_file_of_the_contract(out: Path) -> None:
+    assert {path.name for path in out.iterdir()} == {"study", "report.html"}
+    expected = {"curves.csv", "summary.json", "figures", "report.html"}
+    for model in MODELS:
+        expected |= {f"{model}.pvd", model, f"deformed_{model}.stl"}
+    assert {path.name for path in (out / "study").iterdir()} == expected
+    figures = {path.name for path in (out / "study" / "figures").iterdir()}
+    for name in ("undeformed", "curves", "springs_over_linear"):
+        assert {f"{name}.png", f"{name}.svg"} <= figures
+
+
+def test_curves(out: Path) -> None:
+    table = rows(out / "study" / "curves.csv")
+    assert list(table[0]) == ["model", "load_factor", "ux", "uy", "fx", "fy"]
+    for model in MODELS:
+        mine = [row for row in table if row["model"] == model]
+        assert [float(row["load_factor"]) for row in mine] == [0.0, 0.5, 1.0]
+        assert [float(row["fy"]) for row in mine] == pytest.approx([0.0, -0.005, -0.01])
+        deflections = [float(row["uy"]) for row in mine]
+        assert deflections[0] == 0.0
+        assert deflections[2] < deflections[1] < 0
+    linear = [float(row["uy"]) for row in table if row["model"] == "linear"]
+    assert linear[2] == pytest.approx(2 * linear[1], rel=1e-9)
+
+
+def test_summary(out: Path) -> None:
+    summary = json.loads((out / "study" / "summary.json").read_text(encoding="utf-8"))
+    assert list(summary) == ["title", "truespring", "models", "comparison", "closest"]
+    springs, linear = summary["models"]["springs"], summary["models"]["linear"]
+    assert springs["status"] == linear["status"] == "converged"
+    assert (springs["kind"], linear["kind"]) == ("springs", "fem")
+    assert springs["load_factor"] == 1.0
+    assert springs["n_nodes"] == 27 and springs["n_unknowns"] == 48
+    assert springs["newton_iterations"] > 0 and springs["seconds"] > 0
+    assert springs["moduli"]["young"] == pytest.approx(15 / 17 * 10e3)
+    assert springs["moduli"]["poisson"] == pytest.approx(7 / 17)
+    assert springs["moduli"]["anisotropy"] == pytest.approx(7 / 5)
+    # What the springs realise differs from the material (nu 0.3): both numbers are named.
+    assert "0.4118" in springs["warnings"][0] and "0.3" in springs["warnings"][0]
+    assert "moduli" not in linear and linear["warnings"] == []
+    assert summary["closest"] == "linear"
+    errors = summary["comparison"]["linear"]
+    assert list(errors) == ["probe_error", "rms_error", "max_error", "agrees_up_to_load_factor"]
+    table = {(row["model"], row["load_factor"]): row for row in rows(out / "study" / "curves.csv")}
+    mine, theirs = (np.array([float(table[m, "1.0"][u]) for u in ("ux", "uy")]) for m in MODELS)
+    assert errors["probe_error"] == pytest.approx(np.linalg.norm(mine - theirs) / np.linalg.norm(theirs), rel=1e-9)
+
+
+def test_vtu_series(out: Path) -> None:
+    for model, kind, fields in (
+        ("springs", "line", {"tension", "stretch", "stiffness", "strain_energy"}),
+        ("linear", "quad", {"stress", "strain_energy"}),
+    ):
+        collection = ElementTree.parse(out / "study" / f"{model}.pvd").getroot()
+        sets = collection.findall("./Collection/DataSet")
+        assert [float(one.attrib["timestep"]) for one in sets] == [0.0, 0.5, 1.0]
+        last = meshio.read(out / "study" / sets[-1].attrib["file"])
+        assert [block.type for block in last.cells] == [kind]
+        assert set(last.cell_data) == fields
+        assert set(last.point_data) == {"displacement", "reaction"}
+        reaction = last.point_data["reaction"].sum(axis=0)
+        assert reaction == pytest.approx([0, 0.01, 0], abs=1e-10)
+        curve = [row for row in rows(out / "study" / "curves.csv") if row["model"] == model][-1]
+        rest = last.points - last.point_data["displacement"]
+        probe = np.flatnonzero(np.abs(rest - [0.04, 0.005, 0]).max(axis=1) < 1e-9)
+        assert last.point_data["displacement"][probe[0], 1] == pytest.approx(float(curve["uy"]), rel=1e-12)
+
+
+def test_stress_of_the_elements_balances_the_load(out: Path) -> None:
+    """The shear force through any column of elements is the load: mean stress times area [N]."""
+    mesh = meshio.read(out / "study" / "linear" / "linear_0002.vtu")
+    rest = mesh.points - mesh.point_data["displacement"]
+    middle = rest[mesh.cells[0].data].mean(axis=1)
+    column = np.isclose(middle[:, 0], 0.0225)
+    assert column.sum() == 2
+    shear = mesh.cell_data["stress"][0].reshape(-1, 3, 3)[column, 0, 1]
+    assert shear.mean() * 0.01 * 0.01 == pytest.approx(-0.01, rel=1e-9)
+
+
+def test_deformed_stl(out: Path) -> None:
+    for model in MODELS:
+        surface = trimesh.load_mesh(out / "study" / f"deformed_{model}.stl")
+        assert len(surface.faces) == 2 * 16
+        lowest = min(float(row["uy"]) for row in rows(out / "study" / "curves.csv") if row["model"] == model)
+        assert surface.bounds[0, 1] == pytest.approx(lowest, rel=0.25)
+
+
+def test_json_is_all_that_stands_on_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = written(tmp_path, name="first.toml"), written(tmp_path, name="second.toml")
+    assert main(["solve", str(first), "--out", str(tmp_path / "out"), "--json", "--threads", "1"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["models"]) == MODELS
+    assert main(["solve", str(first), str(second), "--out", str(tmp_path / "out"), "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)) == ["first", "second"]
+
+
+def test_quiet_prints_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err == ""
+
+
+def test_solve_writes_no_comparison(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", str(written(tmp_path)), "--out", str(tmp_path / "out")]) == 0
+    assert "springs (lloyd)" in capsys.readouterr().out
+    names = {path.name for path in (tmp_path / "out" / "study").iterdir()}
+    assert "curves.csv" in names and not names & {"report.html", "figures"}
+    assert json.loads((tmp_path / "out" / "study" / "summary.json").read_text("utf-8"))["comparison"] == {}
+
+
+def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path)
+    assert main(["check", str(file)]) == 0
+    shown = capsys.readouterr().out
+    for text in ("27 nodes", "16 elements", "48 unknowns", "Zener", "1.4000", "bending factor EI, 2 elements deep"):
+        assert text in shown
+    assert main(["check", str(file), "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["total_force"] == pytest.approx([0, -0.01])
+    assert plan["models"]["springs"]["n_springs"] == 8 * 3 + 2 * 9 + 2 * 16
+    assert {path.name for path in tmp_path.iterdir()} == {"study.toml"}
+
+
+def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert set(schema["required"]) == {"mesh", "material", "section", "support", "models"}
+    assert schema["$defs"]["SpringsTable"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
+
+
+def test_prescribed_motion_without_loads(tmp_path: Path) -> None:
+    """The force of the curves is the reaction, and it does the work that the springs store."""
+    assert main(["solve", str(written(tmp_path, changed(MOVED))), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    table = rows(tmp_path / "out" / "study" / "curves.csv")
+    linear = [row for row in table if row["model"] == "linear"]
+    assert float(linear[-1]["ux"]) == pytest.approx(0.004)
+    energy = meshio.read(tmp_path / "out" / "study" / "linear" / "linear_0002.vtu").cell_data["strain_energy"][0].sum()
+    assert float(linear[-1]["fx"]) * 0.004 / 2 == pytest.approx(energy, rel=1e-9)
+
+
+def test_a_failure_keeps_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """St. Venant-Kirchhoff bears no nominal stress below -E sqrt(3) / 9 in uniaxial compression; springs go on."""
+    pressed = changed(
+        ('on = "left"', 'on = "left"\nfix = ["x"]\n\n[[support]]\non = "left-bottom"'),
+        ('["0 N", "-0.01 N"]', '["-0.25 N", "0 N"]'),
+        ("load_steps = 2", "load_steps = 5"),
+        ("elements = [8, 2]", "elements = [4, 1]"),
+        ('law = "linear"', 'law = "saint-venant-kirchhoff"'),
+    )
+    out = tmp_path / "out"
+    assert main(["verify", str(written(tmp_path, pressed)), "--out", str(out), "--json"]) == 1
+    printed = capsys.readouterr()
+    summary = json.loads(printed.out)
+    failed = summary["models"]["linear"]
+    assert failed["status"] != "converged"
+    assert f"{failed['load_factor']:.6g}" in printed.err
+    assert failed["warnings"]
+    # The level that was reached is in the curves, and at most what the law bears.
+    levels = [float(row["load_factor"]) for row in rows(out / "study" / "curves.csv") if row["model"] == "linear"]
+    assert levels[-1] == failed["load_factor"]
+    assert (out / "report.html").exists()
+
+
+def deformed_by_another_program(folder: Path, out: Path) -> Iterator[str]:
+    """The STL of a former run as the result of another program, and the undeformed body, as text for the study."""
+    springs = meshio.read(out / "study" / "linear" / "linear_0000.vtu")
+    faces = np.concatenate([springs.cells[0].data[:, [0, 1, 2]], springs.cells[0].data[:, [0, 2, 3]]])
+    trimesh.Trimesh(springs.points, faces, process=False).export(folder / "rest.stl")
+    (folder / "deformed.stl").write_bytes((out / "study" / "deformed_linear.stl").read_bytes())
+    yield '[models.other]\nkind = "stl"\nfile = "deformed.stl"\n\n[compare]'
+    yield '[models.other]\nkind = "stl"\nfile = "deformed.stl"\nundeformed = "rest.stl"\n\n[compare]'
+
+
+def test_a_deformed_mesh_of_another_program(tmp_path: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    surface, displaced = deformed_by_another_program(tmp_path, out)
+
+    def verified(text: str) -> dict[str, Any]:
+        file = written(tmp_path, changed(("[compare]", text)))
+        assert main(["verify", str(file), "--out", str(tmp_path / "out"), "--json"]) == 0
+        return dict(json.loads(capsys.readouterr().out)["comparison"])
+
+    comparison = verified(surface)
+    assert comparison["other"]["rms_error"] is None
+    # The file is the linear path's own: the springs' outline differs from it by about their tip's error.
+    assert 1e-4 < comparison["other"]["outline_distance"]["max"] < 5e-3
+    comparison = verified(displaced)
+    # STL holds single precision: the errors against the file and against the path itself agree to that.
+    assert comparison["other"]["rms_error"] == pytest.approx(comparison["linear"]["rms_error"], rel=1e-5)
+    assert comparison["other"]["agrees_up_to_load_factor"] is None
+
+
+def test_the_command_is_installed_and_answers() -> None:
+    shown = subprocess.run(
+        [sys.executable, "-c", "import sys; from truespring.cli import main; sys.exit(main())", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for verb in ("verify", "solve", "check", "schema"):
+        assert verb in shown.stdout

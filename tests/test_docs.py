@@ -1,0 +1,69 @@
+"""The README and the pages of docs: their Python runs, their studies are read, their numbers and keys are true."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.test_examples import EXAMPLES
+from truespring.models import LAWS, RULES
+from truespring.study import read_study, run
+from truespring.study.schema import StudyTable
+
+ROOT = EXAMPLES.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(language: str) -> list[tuple[str, str]]:
+    """Page and text of every fenced block of a language."""
+    return [
+        (page.name, text)
+        for page in PAGES
+        for text in re.findall(
+            rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+        )
+    ]
+
+
+def test_the_pages_hold_code() -> None:
+    assert len(blocks("python")) >= 2
+    assert len(blocks("toml")) >= 2
+
+
+@pytest.mark.parametrize(("page", "code"), blocks("python"))
+def test_python_on_the_pages_runs(page: str, code: str) -> None:
+    exec(compile(code, page, "exec"), {})
+
+
+@pytest.mark.parametrize(("page", "text"), blocks("toml"))
+def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text(text, encoding="utf-8")
+    assert run(read_study(file)).converged
+
+
+def test_every_key_rule_and_law_is_documented() -> None:
+    study, models = (ROOT / "docs" / "study.md").read_text("utf-8"), (ROOT / "docs" / "models.md").read_text("utf-8")
+    tables = StudyTable.model_json_schema()
+    keys = set(tables["properties"]) | {key for one in tables["$defs"].values() for key in one["properties"]}
+    assert len(keys) > 25
+    for key in keys:
+        assert re.search(rf"\b{key}\b", study), f"{key} is not in docs/study.md"
+    for name in (*RULES, *LAWS):
+        assert f"`{name}`" in models
+
+
+def test_the_table_of_the_readme_is_what_the_shipped_studies_give() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    results = [run(read_study(EXAMPLES / f"{name}.toml")) for name in ("stretching", "bending")]
+    for name in results[0].comparisons:
+        errors = [result.comparisons[name].rms_error for result in results]
+        label = results[0].paths[name].label
+        shown = " | ".join(f"{100 * error:.{0 if error > 0.1 else 1}f} %" for error in errors)
+        assert f"| {label} | {shown} |" in readme
+
+
+def test_links_of_the_pages_lead_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} links to {target}"
