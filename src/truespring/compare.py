@@ -78,10 +78,9 @@ class Comparison:
         """Return the comparison in a sentence."""
         if self.rms_error is None:
             return f"{self.model.label} and {self.reference.label} do not meet at full load"
-        return (
-            f"{self.model.label} against {self.reference.label}: {self.rms_error:.1%} rms at full load, "
-            f"within {self.tolerance:.0%} up to load factor {self.agrees_up_to_load_factor or 0:g}"
-        )
+        up_to = self.agrees_up_to_load_factor
+        within = "" if up_to is None else f", within {self.tolerance:.0%} up to load factor {up_to:g}"
+        return f"{self.model.label} against {self.reference.label}: {self.rms_error:.1%} rms at full load{within}"
 
 
 def compare(model: Path, reference: Path, probe: int | None = None, tolerance: float = TOLERANCE) -> Comparison:

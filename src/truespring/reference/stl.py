@@ -1,0 +1,358 @@
+"""Deformed bodies that another program wrote as STL: triangles without connectivity and without a unit."""
+
+import io
+import math
+import pathlib
+import re
+import warnings as python_warnings
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.equilibrium import Path, State, Status
+from truespring.errors import MeshError, ReferenceFileError, TruespringError
+from truespring.mesh import Mesh, Surface
+from truespring.mesh.selections import AXES
+from truespring.problem import Problem
+from truespring.units import to_si
+
+# All shares of a body's diameter.
+_SAME_POINT = 1e-6  # vertices this near are one point: text files carry six digits or more
+_FLAT = 1e-6  # a body this thin lies in a plane
+_OUTSIDE = 1e-3  # a node this far off the undeformed body still belongs to it: chords of a curved side
+_SAME_BODY = 1e-2  # boxes that differ by more are of different bodies
+
+# No load makes a body so much larger or smaller: a unit is wrong (1 inch, 1 cm or 1 mm taken for 1 m, or back).
+_WRONG_UNIT = 10.0
+
+_BINARY_HEADER = 84
+_BINARY_FACET = 50
+_EXPORT_AGAIN = "export the body again as STL, ASCII or binary"
+
+
+def read_stl(
+    problem: Problem,
+    file: pathlib.Path,
+    load_factor: float = 1.0,
+    undeformed: pathlib.Path | None = None,
+    unit: str = "m",
+) -> Path:
+    """Read the deformed body of `problem` from an STL file, ASCII or binary.
+
+    The body lies in a plane of constant z, or is a solid that is thin along z, of which the upper face is taken.
+
+    Args:
+        problem: what the other program solved; its mesh may be another one.
+        file: the deformed body.
+        load_factor: the load level that it belongs to, above 0, at most 1.
+        undeformed: the body at rest, the same triangles in the same order; it tells which vertex went
+            where, and so the displacement at the problem's nodes: linear between the vertices.
+        unit: the unit of length of both files, such as "mm".
+
+    Returns a path of kind "stl" with a surface, and with one state where `undeformed` is given.
+    Raises ReferenceFileError where a file cannot be read, is no such body, or does not fit the problem.
+    """
+    file = pathlib.Path(file)
+    mesh = problem.mesh
+    if mesh.dim != 2 or mesh.kind.dim != 2:
+        raise ReferenceFileError(f"{file}: an STL file stands beside a plane body of elements, not beside this mesh")
+    if not 0 < load_factor <= 1:
+        raise ReferenceFileError(f"{file}: load_factor = {load_factor:g} is not above 0 and at most 1")
+    scale = _scale(unit, file)
+    deformed = _read(file, scale)
+    warnings = [
+        f"{file.name} was read, not solved: its convergence and stability are those of the program that wrote it; "
+        "stability not proven"
+    ]
+    if undeformed is None:
+        surface = _surface(deformed[_face(deformed, file)][:, :, :2], load_factor, file)
+        states: tuple[State, ...] = ()
+        warnings += _unit_warnings(mesh, surface, unit)
+    else:
+        undeformed = pathlib.Path(undeformed)
+        rest, surface = _matched(_read(undeformed, scale), deformed, load_factor, undeformed, file)
+        state = _state(problem, rest, surface, undeformed, unit)
+        states = (state,)
+        warnings += _state_warnings(problem, rest, state, undeformed)
+    inverted = bool(states) and states[0].area_ratio <= 0
+    return Path(
+        problem=problem,
+        label=file.name,
+        kind="stl",
+        states=states,
+        status=Status.INVERTED if inverted else Status.CONVERGED,
+        warnings=tuple(warnings),
+        surface=surface,
+    )
+
+
+# --- the file -------------------------------------------------------------------------------------
+
+
+def _scale(unit: str, file: pathlib.Path) -> float:
+    try:
+        scale = to_si(f"1 {unit}", "length")
+    except TruespringError:
+        scale = 0.0
+    if scale <= 0:
+        raise ReferenceFileError(
+            f"{file}: unit = '{unit}' is no unit of length; allowed are m, cm, mm, inch and others"
+        )
+    return scale
+
+
+def _read(file: pathlib.Path, scale: float) -> Floats:
+    """Return the vertices of every facet in the file's order [m], shape (n_facets, 3, 3)."""
+    facets = _parse(_bytes(file), file) * scale
+    bad = np.flatnonzero(~np.isfinite(facets).all(axis=(1, 2)))
+    if bad.size:
+        raise ReferenceFileError(
+            f"{file}: {bad.size} of {len(facets)} facets have a vertex that is not finite, the first is facet "
+            f"{bad[0] + 1}: did the other program converge? {_EXPORT_AGAIN}"
+        )
+    size = np.ptp(facets, axis=(0, 1))
+    normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    if np.linalg.norm(normals, axis=1).sum() <= 1e-9 * (size**2).sum():
+        raise ReferenceFileError(f"{file}: all {len(facets)} facets have no area: {_EXPORT_AGAIN}")
+    return np.asarray(facets)
+
+
+def _bytes(file: pathlib.Path) -> bytes:
+    if file.is_dir():
+        raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
+    try:
+        data = file.read_bytes()
+    except FileNotFoundError:
+        raise ReferenceFileError(f"{file} does not exist: check the path") from None
+    except (OSError, ValueError) as error:  # a path may hold what no file system takes
+        raise ReferenceFileError(f"{file} cannot be read ({error}): check the path and its permissions") from None
+    if not data.strip():
+        raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")
+    return data
+
+
+def _parse(data: bytes, file: pathlib.Path) -> Floats:
+    """Check that the file is whole, for the parser is lenient there, and parse it."""
+    from trimesh.exchange.stl import load_stl  # a second: only where an STL file is read
+
+    if not _is_binary(data, file):
+        data = _checked_text(data, file)
+    try:
+        with python_warnings.catch_warnings():
+            python_warnings.simplefilter("error")  # older numpy only warns of a number it cannot read
+            loaded = load_stl(io.BytesIO(data))
+    except (ValueError, Warning) as error:
+        raise ReferenceFileError(f"{file}: a vertex cannot be read ({error}): {_EXPORT_AGAIN}") from None
+    solids = [loaded] if "vertices" in loaded else list(loaded["geometry"].values())
+    return np.concatenate([np.asarray(solid["vertices"], dtype=np.float64) for solid in solids]).reshape(-1, 3, 3)
+
+
+def _is_binary(data: bytes, file: pathlib.Path) -> bool:
+    """Tell binary from text by the length, since a binary header may begin with "solid" as well."""
+    count = int.from_bytes(data[80:_BINARY_HEADER], "little")
+    wanted = _BINARY_HEADER + _BINARY_FACET * count
+    if len(data) == wanted:
+        if not count:
+            raise ReferenceFileError(f"{file} holds no facet: {_EXPORT_AGAIN}")
+        return True
+    if b"\0" not in data:  # text has none, and every binary file has
+        return False
+    if len(data) < _BINARY_HEADER:
+        raise ReferenceFileError(f"{file} is no STL file, or cut off in its header: {_EXPORT_AGAIN}")
+    state = "cut off, or no STL file" if len(data) < wanted else "damaged, or no STL file"
+    raise ReferenceFileError(
+        f"{file} is {state}: a binary STL of the {count:,} facets that its header names has {wanted:,} bytes, "
+        f"this file has {len(data):,}: {_EXPORT_AGAIN}"
+    )
+
+
+def _checked_text(data: bytes, file: pathlib.Path) -> bytes:
+    """Return an ASCII file without the names of its solids, which may hold any word; raise where it is not whole."""
+    if not re.match(rb"\s*solid\b", data, re.IGNORECASE):
+        raise ReferenceFileError(f"{file} is no STL file: it does not begin with 'solid': {_EXPORT_AGAIN}")
+    data = re.sub(rb"^([ \t]*(?:end)?solid)\b[^\r\n]*", rb"\1", data, flags=re.IGNORECASE | re.MULTILINE)
+    words = [word.lower() for word in re.findall(rb"^[ \t]*([a-z]+)\b", data, re.IGNORECASE | re.MULTILINE)]
+    n_facets = words.count(b"facet")
+    if not n_facets:
+        raise ReferenceFileError(f"{file} holds no facet: {_EXPORT_AGAIN}")
+    found = (words.count(b"vertex"), words.count(b"endfacet"), words.count(b"endsolid"))
+    wanted = (3 * n_facets, n_facets, words.count(b"solid"))
+    if found != wanted:
+        names = ("vertex", "endfacet", "endsolid")
+        lines = ", ".join(f"{f} of {w} '{name}'" for f, w, name in zip(found, wanted, names, strict=True))
+        raise ReferenceFileError(f"{file} is cut off or damaged: it has {lines} lines: {_EXPORT_AGAIN}")
+    numbers = re.findall(rb"^[ \t]*vertex((?:[ \t]+[^\s]+){3})[ \t\r]*$", data, re.IGNORECASE | re.MULTILINE)
+    if len(numbers) != 3 * n_facets:
+        raise ReferenceFileError(
+            f"{file}: {3 * n_facets - len(numbers)} of {3 * n_facets} vertices do not have three coordinates: "
+            f"{_EXPORT_AGAIN}"
+        )
+    return data
+
+
+# --- from facets to a surface ---------------------------------------------------------------------
+
+
+def _face(facets: Floats, file: pathlib.Path) -> Bools:
+    """Choose the facets of the face that lies in x and y, shape (n_facets,): all of a plane body, else the upper."""
+    lower, upper = facets.min(axis=(0, 1)), facets.max(axis=(0, 1))
+    size = upper - lower
+    thin = int(size.argmin())
+    if size[2] > 1.01 * size[thin]:
+        raise ReferenceFileError(
+            f"{file}: the body measures {_box(size)} m and is thinnest along {AXES[thin]}, the problem lies in x "
+            "and y: export the body turned so that z is its thickness, or only its face of constant z"
+        )
+    normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    if size[2] <= _FLAT * np.linalg.norm(size):
+        upwards = normals[:, 2] > 0
+        two_sided = abs(normals[:, 2].sum()) < 1e-3 * np.abs(normals[:, 2]).sum()  # a shell with both its sides
+        return np.asarray(upwards if two_sided else np.ones(len(facets), dtype=bool))
+    lies = np.abs(normals[:, 2]) > 0.5 * np.linalg.norm(normals, axis=1)  # whichever way the facets turn
+    above = facets[:, :, 2].mean(axis=1) > (lower[2] + upper[2]) / 2
+    _refuse_no_solid(facets, lies & above, lies & ~above, file)
+    return np.asarray(lies & above)
+
+
+def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: pathlib.Path) -> None:
+    """Raise where upper and lower face do not lie over each other: a tilted or warped sheet, a solid not closed."""
+    if top.any() and bottom.any():
+        boxes = [(facets[side, :, :2].min(axis=(0, 1)), facets[side, :, :2].max(axis=(0, 1))) for side in (top, bottom)]
+        if np.ptp(boxes, axis=0).max() <= 0.1 * np.linalg.norm(np.ptp(facets, axis=(0, 1))):
+            return
+    raise ReferenceFileError(
+        f"{file}: the body neither lies in a plane of constant z nor is a closed solid with an upper and a lower face "
+        "across z: export all of its outer surface, or only its face of constant z"
+    )
+
+
+def _surface(facets: Floats, load_factor: float, file: pathlib.Path) -> Surface:
+    """Join the facets, shape (n_facets, 3, 2), at their common vertices."""
+    first, numbers = _merged(facets.reshape(-1, 2))
+    return _triangulated(facets.reshape(-1, 2)[first], numbers.reshape(-1, 3), load_factor, file)
+
+
+def _matched(
+    rest: Floats, deformed: Floats, load_factor: float, rest_file: pathlib.Path, file: pathlib.Path
+) -> tuple[Surface, Surface]:
+    """Return the body at rest and deformed, point for point and triangle for triangle."""
+    if len(rest) != len(deformed):
+        raise ReferenceFileError(
+            f"{file} has {len(deformed)} facets, {rest_file} has {len(rest)}: export both from one mesh, "
+            "or leave undeformed out"
+        )
+    if np.array_equal(rest, deformed):
+        raise ReferenceFileError(f"{file} and {rest_file} hold the same shape: export one with, one without the load")
+    face = _face(rest, rest_file)
+    before, after = rest[face, :, :2].reshape(-1, 2), deformed[face, :, :2].reshape(-1, 2)
+    first, numbers = _merged(before)
+    spread = np.linalg.norm(after - after[first][numbers], axis=1)
+    worst = int(spread.argmax())
+    if spread[worst] > 10 * _SAME_POINT * np.linalg.norm(np.ptp(after, axis=0)):
+        raise ReferenceFileError(
+            f"the vertex of {rest_file} at {_box(before[worst])} m goes to two places in {file}, "
+            f"{_box(after[worst])} and {_box(after[first][numbers][worst])} m: the files list their facets in "
+            "different orders; export both in one order, or leave undeformed out"
+        )
+    triangles = numbers.reshape(-1, 3)
+    return (
+        _triangulated(before[first], triangles, 0.0, rest_file),
+        _triangulated(after[first], triangles, load_factor, file),
+    )
+
+
+def _merged(places: Floats) -> tuple[Ints, Ints]:
+    """Number the distinct places, nearly equal ones once; return a row of each, and the number of each row."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    distinct, row, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    near = KDTree(distinct).query_pairs(
+        _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))), output_type="ndarray"
+    )
+    joined = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(distinct), len(distinct)))
+    number = connected_components(joined, directed=False)[1]
+    _, first = np.unique(number, return_index=True)
+    return np.asarray(row[first]), np.asarray(number[inverse.ravel()], dtype=np.int64)
+
+
+def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: pathlib.Path) -> Surface:
+    """Return the surface without the triangles that merging closed; raise where nothing or no outline is left."""
+    a, b, c = triangles.T
+    try:
+        return Surface(points, triangles[(a != b) & (b != c) & (c != a)], load_factor)
+    except MeshError as error:
+        raise ReferenceFileError(f"{file}: {error}; {_EXPORT_AGAIN}") from None
+
+
+# --- from surfaces to a state ---------------------------------------------------------------------
+
+
+def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path, unit: str) -> State:
+    """Return the state at the nodes, by linear interpolation of the vertices' displacement."""
+    mesh = problem.mesh
+    ratio = rest.diameter / mesh.diameter
+    if not 1 / _WRONG_UNIT <= ratio <= _WRONG_UNIT:
+        raise ReferenceFileError(f"{file}, read in {unit}, {_boxes(rest, mesh)}: check unit")
+    triangle, shares, distance = rest.locate(mesh.nodes)
+    far = int(distance.argmax())
+    if distance[far] > _OUTSIDE * mesh.diameter:
+        raise ReferenceFileError(
+            f"node {far} at {_box(mesh.nodes[far])} m lies {distance[far]:.4g} m outside of {file}, which, "
+            f"read in {unit}, {_boxes(rest, mesh)}: check unit, and that both have the same origin"
+        )
+    moved = (surface.points - rest.points)[rest.triangles[triangle]]
+    displacement = (shares[:, :, None] * moved).sum(axis=1)
+    positions = mesh.nodes + displacement
+    return State(
+        load_factor=surface.load_factor,
+        positions=positions,
+        displacement=displacement,
+        reaction=np.zeros_like(positions),
+        energy=math.nan,
+        iterations=0,
+        residual=math.nan,
+        negative_eigenvalues=None,
+        branched=False,
+        area_ratio=mesh.smallest_area_ratio(positions),
+        stretch=None,
+    )
+
+
+def _unit_warnings(mesh: Mesh, surface: Surface, unit: str) -> list[str]:
+    if 1 / _WRONG_UNIT <= surface.diameter / mesh.diameter <= _WRONG_UNIT:
+        return []
+    return [f"the deformed body, read in {unit}, {_boxes(surface, mesh)}: check unit"]
+
+
+def _state_warnings(problem: Problem, rest: Surface, state: State, file: pathlib.Path) -> list[str]:
+    mesh, loading = problem.mesh, problem.loading
+    warnings = []
+    if max(np.abs(rest.lower - mesh.lower).max(), np.abs(rest.upper - mesh.upper).max()) > _SAME_BODY * mesh.diameter:
+        warnings.append(f"{file.name} {_boxes(rest, mesh)}: are these the same body?")
+    off = np.abs(state.displacement - state.load_factor * loading.displacement) * loading.held
+    if off.max() > _SAME_BODY * np.abs(state.displacement).max() + _SAME_POINT * mesh.diameter:
+        node = int(off.max(axis=1).argmax())
+        warnings.append(
+            f"node {node} at {_box(mesh.nodes[node])} m is held by a support, the files move it by "
+            f"{off.max():.4g} m against that: other supports, another load_factor, or facets in different orders"
+        )
+    if state.area_ratio <= 0:
+        warnings.append(
+            f"an element is inverted (smallest area ratio {state.area_ratio:.3g}): the other program's law allows it, "
+            "or the files list their facets in different orders"
+        )
+    return warnings
+
+
+def _boxes(surface: Surface, mesh: Mesh) -> str:
+    """Say where both lie."""
+    return (
+        f"lies between {_box(surface.lower)} and {_box(surface.upper)} m, "
+        f"the mesh between {_box(mesh.lower)} and {_box(mesh.upper)} m"
+    )
+
+
+def _box(values: Floats) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"
