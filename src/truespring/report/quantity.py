@@ -1,0 +1,65 @@
+"""Numbers as people read them: natural units, percentages, few digits."""
+
+import math
+from dataclasses import dataclass
+
+_PREFIXES: dict[str, tuple[tuple[float, str], ...]] = {
+    "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
+    "N": ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN")),
+    "Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa")),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A unit and its size in SI: values / size are in unit."""
+
+    size: float
+    unit: str
+
+
+def natural_scale(largest: float, unit: str) -> Scale:
+    """Return the largest prefix of `unit` (m, N or Pa) in which `largest`, in SI, is at least 1."""
+    prefixes = _PREFIXES[unit]
+    # A hair below 1 still is 1: lengths come out of sums.
+    fitting = [Scale(*one) for one in prefixes if abs(largest) >= one[0] * (1 - 1e-9)]
+    if largest == 0 or not math.isfinite(largest):
+        return Scale(1.0, unit)
+    return fitting[0] if fitting else Scale(*prefixes[-1])
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """Return a value in SI as a text in its natural unit: 8823.5 Pa is "8.82 kPa"."""
+    scale = natural_scale(value, unit)
+    return f"{significant(value / scale.size, digits)} {scale.unit}"
+
+
+def given(value: float, unit: str) -> str:
+    """Return a value that someone wrote, as a text in its natural unit without digits of our own: 0.04 m is "40 mm"."""
+    scale = natural_scale(value, unit)
+    return f"{value / scale.size:.6g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
+
+
+def significant(value: float, digits: int) -> str:
+    """Return a number with so many significant digits, never in powers of ten: 123.4 with two is "120"."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    rounded = round(value, decimals)
+    # Rounding may carry over: 9.96 is 10, not 10.0.
+    decimals = digits - 1 - math.floor(math.log10(abs(rounded)))
+    return f"{rounded:.{max(decimals, 0)}f}"
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage with two significant digits: 0.0214 is "2.1 %"."""
+    if not math.isfinite(share):
+        return "no number"
+    if 0 < abs(share) < 1e-4:
+        return "less than 0.01 %"
+    return f"{significant(100 * share, 2)} %"
+
+
+def tolerance_percent(share: float) -> str:
+    """Return a tolerance as a percentage as its writer wrote it: 0.05 is "5 %"."""
+    return f"{100 * share:.6g} %"

@@ -1,0 +1,320 @@
+"""The verdict: how far a model may be trusted, in plain sentences made from numbers alone."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.compare import Comparison
+from truespring.equilibrium import Path, State, Status
+from truespring.models import Moduli
+from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
+from truespring.report.result import Result
+
+
+def verdict(result: Result) -> str:
+    """Return the verdict as one text."""
+    return " ".join(verdict_sentences(result))
+
+
+def verdict_sentences(result: Result) -> tuple[str, ...]:
+    """Return what a reader must know first: trouble of the model itself, then where it agrees with what."""
+    return tuple(_capital(sentence) for sentence in (*_trouble(result), *_agreement(result)))
+
+
+def closest_sentence(result: Result) -> str | None:
+    """Return which reference is nearest at full load; None where there is not one to choose from."""
+    name = result.closest
+    if name is None or len(result.comparisons) < 2:
+        return None
+    error = result.comparisons[name].rms_error
+    assert error is not None  # what Result.closest chooses by
+    return f"Nearest at {_full(result)} is {display_name(result, name)}, {percent(error)} off."
+
+
+def reach(result: Result, one: Comparison) -> str:
+    """Return where the model is within the tolerance of a reference: a phrase to follow its name."""
+    levels, runs = one.load_factors, _runs(one)
+    if not runs:
+        return _NEVER
+    if one.agrees_up_to_load_factor is None:
+        return f"at {level_name(result, levels[0])}, the only level it is known at"
+    first, *more = runs
+    if first[0] == levels[0]:
+        last = ", the last level that both reached" if first[1] == levels[-1] != 1 else ""
+        again = f" and again {_listed([_span(result, run, levels[-1]) for run in more])}" if more else ""
+        return f"up to {level_name(result, first[1])}{last}{again}"
+    return f"only {_listed([_span(result, run, levels[-1]) for run in runs])}"
+
+
+def force_sentence(result: Result) -> str | None:
+    """Return the forces that a prescribed motion needs in each model; None where loads are given."""
+    if not _driven_by_motion(result) or result.model is None:
+        return None
+    model = result.paths[result.model]
+    level = model.load_factor
+    needs = {}
+    for name in (result.model, *result.comparisons):
+        path = result.paths[name]
+        state = path.at(level)
+        if state is not None and path.potential is not None:
+            axis = drive(result).axis
+            needs[name] = abs(float(path.applied_force(state)[axis]))
+    if result.model not in needs or not level:
+        return None
+    own = needs.pop(result.model)
+    others = [f"{display_name(result, name)} {quantity(force, 'N')}" for name, force in needs.items()]
+    text = f"The force it takes at {level_name(result, level)}: {_subject(result)[0]} {quantity(own, 'N')}"
+    return ", ".join([text, *others]) + "."
+
+
+def moduli_sentence(path: Path) -> str | None:
+    """Return what the springs of a path realise against the material; None where it has no moduli."""
+    moduli = path.moduli
+    if moduli is None:
+        return None
+    bending = ""
+    if moduli.depth is not None and moduli.depth in moduli.bending:
+        elements = "element" if moduli.depth == 1 else "elements"
+        factor = significant(moduli.bending[moduli.depth], 4)
+        bending = f" Bent {moduli.depth} {elements} deep, they have {factor} times the bending stiffness EI."
+    return f"{_stiffness_sentence(moduli)}{bending}"
+
+
+def _stiffness_sentence(moduli: Moduli) -> str:
+    wanted = f"{given(moduli.young_wanted, 'Pa')} and {moduli.poisson_wanted:.2f}"
+    found = [(moduli.young(angle) / moduli.young_wanted, moduli.poisson(angle)) for angle in (0.0, 45.0)]
+    if np.allclose(found, (1.0, moduli.poisson_wanted), rtol=0, atol=1e-3):  # two directions fix all four constants
+        return f"These springs realise the material, in every direction: E and Poisson's ratio are {wanted}."
+    along, diagonal = (
+        f"{quantity(moduli.young(angle), 'Pa')} and {moduli.poisson(angle):.2f}" for angle in (0.0, 45.0)
+    )
+    return (
+        f"These springs realise a Young's modulus and a Poisson's ratio of {along} along x, "
+        f"{diagonal} at 45 degrees; the material in its section has {wanted}."
+    )
+
+
+def path_trouble(result: Result, name: str) -> str | None:
+    """Return what went wrong with a path, None where it reached full load through stable equilibria."""
+    path = result.paths[name]
+    who, plural = _subject(result) if name == result.model else (display_name(result, name), False)
+    match path.status:
+        case Status.NOT_CONVERGED if path.load_factor == 0:
+            return f"{who} found no equilibrium at any load level."
+        case Status.NOT_CONVERGED:
+            return f"{who} found no equilibrium beyond load factor {path.load_factor:.4g}."
+        case Status.INVERTED:
+            start = _first(path, lambda state: state.area_ratio <= 0)
+            have = "have" if plural else "has"
+            return f"{who} {have} an element turned inside out{start}; from there on the numbers say little."
+        case Status.UNSTABLE:
+            start = _first(path, lambda state: bool(state.negative_eigenvalues))
+            are = "are" if plural else "is"
+            return f"{who} {are} in an unstable equilibrium{start}; a real body would leave it."
+        case _:
+            return None
+
+
+def display_name(result: Result, name: str) -> str:
+    """Return the label of a path, with its name in the study where the label alone is not its own."""
+    label = result.paths[name].label
+    alone = sum(path.label == label for path in result.paths.values()) == 1
+    return label if alone else f"{label} ({name})"
+
+
+def level_name(result: Result, load_factor: float) -> str:
+    """Return a load level in words: full load, full motion where nothing but supports drives, or its factor."""
+    return _full(result) if load_factor == 1 else f"load factor {load_factor:.4g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What moves a body most: the direction `axis` (0 is x), `sign` 1 or -1 along it."""
+
+    axis: int
+    sign: float
+
+
+def drive(result: Result) -> Drive:
+    """Return the dominant direction of the total force, or of the prescribed motion where no load is given."""
+    loading = result.problem.loading
+    total = loading.external_force.sum(axis=0)
+    # Loads that balance each other have no total: the largest single one decides, and so for motions.
+    each = loading.displacement if _driven_by_motion(result) else loading.external_force
+    largest = each.ravel()[np.abs(each).argmax()]
+    if _driven_by_motion(result) or np.abs(total).max() <= 1e-9 * abs(largest):
+        return Drive(int(np.abs(each).argmax()) % each.shape[1], float(np.sign(largest)))
+    axis = int(np.abs(total).argmax())
+    return Drive(axis, float(np.sign(total[axis])))
+
+
+# --- what the sentences are made of -------------------------------------------------------------
+
+
+def _trouble(result: Result) -> Iterator[str]:
+    """The model's own trouble first, then that of its references."""
+    names = [result.model] if result.model is not None else []
+    for name in names + [name for name in result.comparisons if name != result.model]:
+        trouble = path_trouble(result, name)
+        if trouble is not None:
+            yield trouble
+
+
+def _agreement(result: Result) -> Iterator[str]:
+    if result.model is None or not result.comparisons:
+        yield from _alone(result)
+        return
+    measured = {name: one for name, one in result.comparisons.items() if one.load_factors.size}
+    if measured:
+        where, beyond = _where_it_agrees(result, measured)
+        errors = _errors(result, measured)
+        if beyond and errors:
+            yield f"{where}; beyond, {errors}."
+        else:
+            yield f"{where}."
+            if errors:
+                yield f"{errors}."
+    for name, one in result.comparisons.items():
+        if name not in measured or not _meets_at_full_load(one):
+            yield _short_of_full_load(result, name, one)
+
+
+def _alone(result: Result) -> Iterator[str]:
+    if result.model is None:
+        done = sum(path.status is Status.CONVERGED for path in result.paths.values())
+        yield f"{done} of {len(result.paths)} models reached {_full(result)}; nothing was compared."
+        return
+    path = result.paths[result.model]
+    who, plural = _subject(result)
+    if path.status is Status.CONVERGED:
+        verb = "reach" if plural else "reaches"
+        yield f"{who} {verb} {_full(result)} through stable equilibria; nothing was compared with them."
+    else:
+        yield "Nothing was compared."
+    if path.states:
+        moved = float(np.linalg.norm(path.states[-1].displacement[result.probe]))
+        yield f"At {level_name(result, path.load_factor)} the probe has moved by {quantity(moved, 'm')}."
+
+
+def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[str, bool]:
+    """Where the model is within the tolerance of which reference, and whether it agrees only up to a level."""
+    who, plural = _subject(result)
+    within = f"within {tolerance_percent(result.tolerance)} of"
+    groups: dict[str, list[str]] = {}
+    for name in sorted(measured, key=lambda name: _rank(measured[name])):
+        groups.setdefault(reach(result, measured[name]), []).append(name)
+    starts = any(_runs(one)[:1] and _runs(one)[0][0] == one.load_factors[0] for one in measured.values())
+    verb = ("stay" if starts else "come") + ("" if plural else "s")
+    if len(groups) > 1:
+        clauses = [
+            f"of {_listed([display_name(result, name) for name in names])} {where}" for where, names in groups.items()
+        ]
+        return f"{who} {verb} within {tolerance_percent(result.tolerance)} {_listed(clauses, ', and ')}", False
+    ((where, names),) = groups.items()
+    everyone = _everyone(result, names)
+    if where == _NEVER:
+        do = "do" if plural else "does"
+        anyone = everyone if len(names) == 1 else "any reference"
+        return f"at no load level {do} {who} come {within} {anyone}", False
+    if where.startswith("up to"):
+        comma = "," if "," in where else ""
+        return f"{where}{comma} {who} {verb} {within} {everyone}", not where.startswith(f"up to {_full(result)}")
+    return f"{who} {verb} {within} {everyone} {where}", False
+
+
+_NEVER = "at no load level"
+
+
+def _runs(one: Comparison) -> list[tuple[float, float]]:
+    """First and last level of each stretch of neighbouring levels within the tolerance."""
+    runs: list[tuple[float, float]] = []
+    neighbour = False
+    for level, error in zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True):
+        if error < one.tolerance:
+            runs[len(runs) - neighbour :] = [(runs[-1][0] if neighbour else level, level)]
+        neighbour = error < one.tolerance
+    return runs
+
+
+def _span(result: Result, run: tuple[float, float], last: float) -> str:
+    start, end = run
+    if start == end:
+        return f"at {level_name(result, start)}"
+    if end == last:
+        return f"from load factor {start:.4g} on"
+    return f"between load factors {start:.4g} and {end:.4g}"
+
+
+def _rank(one: Comparison) -> tuple[float, bool, float]:
+    """Agreement that reaches farthest from zero first, none last, then the smaller error."""
+    runs = _runs(one)
+    from_zero = runs[0][1] if runs and runs[0][0] == one.load_factors[0] else 0.0
+    return -from_zero, not runs, float(one.rms_errors[-1])
+
+
+def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
+    """The errors at full load, smallest first; None where no reference meets the model there."""
+    met = {name: one.rms_error for name, one in measured.items() if one.rms_error is not None}
+    if not met:
+        return None
+    parts = [f"{display_name(result, name)} {percent(met[name])}" for name in sorted(met, key=lambda name: met[name])]
+    return f"at {_full(result)}: {', '.join(parts)}"
+
+
+def _meets_at_full_load(one: Comparison) -> bool:
+    return bool(one.load_factors.size) and float(one.load_factors[-1]) == 1.0
+
+
+def _short_of_full_load(result: Result, name: str, one: Comparison) -> str:
+    who = display_name(result, name)
+    if one.load_factors.size:
+        level = float(one.load_factors[-1])
+        if one.agrees_up_to_load_factor is None:
+            return f"{who} is known at load factor {level:.4g} only, there {percent(one.rms_errors[-1])}."
+        return f"with {who} the comparison ends at load factor {level:.4g}, there {percent(one.rms_errors[-1])}."
+    if one.surface is None:
+        return f"{who} and {_subject(result)[0]} have no load level in common."
+    level = one.reference.surface.load_factor if one.reference.surface else 1.0
+    return (
+        f"the outline lies {quantity(one.surface.outline_rms, 'm', 2)} (root mean square) and at most "
+        f"{quantity(one.surface.outline_max, 'm', 2)} off that of {who} at {level_name(result, level)}."
+    )
+
+
+def _subject(result: Result) -> tuple[str, bool]:
+    """What the compared model is called, and whether that is plural."""
+    assert result.model is not None
+    path = result.paths[result.model]
+    if path.kind != "springs":
+        return display_name(result, result.model), False
+    several = sum(other.kind == "springs" for other in result.paths.values()) > 1
+    return display_name(result, result.model) if several else "springs", True
+
+
+def _everyone(result: Result, names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return display_name(result, names[0])
+    return "both references" if len(names) == 2 else f"all {len(names)} references"
+
+
+def _driven_by_motion(result: Result) -> bool:
+    return not result.problem.loading.external_force.any()
+
+
+def _full(result: Result) -> str:
+    return "full motion" if _driven_by_motion(result) else "full load"
+
+
+def _first(path: Path, troubled: Callable[[State], bool]) -> str:
+    """The first load level with trouble, as the end of a sentence."""
+    levels = [state.load_factor for state in path.states if troubled(state)]
+    return f", first at load factor {levels[0]:.4g}" if levels else ""
+
+
+def _listed(parts: Sequence[str], last: str = " and ") -> str:
+    return last.join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]

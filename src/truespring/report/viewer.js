@@ -1,0 +1,180 @@
+// Draws the model over a reference at each load level. Plain JavaScript, no library, nothing is fetched.
+"use strict";
+(() => {
+  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GRID = "#e9ecef";
+
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+  const places = (text) => new Uint16Array(bytes(text)); // x, y, x, y, ... in 0 ... 65535 of the box
+  const pairs = (text) => new Uint32Array(bytes(text)); // from, to, from, to, ...
+
+  for (const host of document.querySelectorAll("[data-viewer]")) {
+    const data = JSON.parse(document.getElementById(host.dataset.viewer).textContent);
+    start(host, unpack(data));
+    host.hidden = false;
+  }
+
+  function unpack(data) {
+    const paths = data.paths.map((path) => ({
+      ...path,
+      lines: pairs(path.lines),
+      positions: path.positions.map(places),
+      surface: path.surface && { ...path.surface, points: places(path.surface.points), lines: pairs(path.surface.lines) },
+    }));
+    return { ...data, paths, rest: places(data.rest), outline: pairs(data.outline) };
+  }
+
+  function start(host, data) {
+    const canvas = host.querySelector("canvas"), slider = host.querySelector("input[type=range]");
+    const play = host.querySelector("button"), apart = host.querySelector("input[type=checkbox]");
+    const readout = host.querySelector("output"), context = canvas.getContext("2d");
+    const model = data.paths[0], others = data.paths.slice(1);
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    let reference = others[data.chosen] || null, playing = 0;
+    slider.max = model.levels.length - 1;
+    slider.value = slider.max;
+
+    for (const choice of host.querySelectorAll("input[type=radio]")) {
+      choice.addEventListener("change", () => { reference = others[Number(choice.value)]; draw(); });
+    }
+    slider.addEventListener("input", () => { stop(); draw(); });
+    if (apart) apart.addEventListener("change", () => draw());
+    play.addEventListener("click", () => (playing ? stop() : run()));
+    let width = 0, asked = 0;
+    new ResizeObserver(([entry]) => { // once a frame, and not for the height that draw() itself sets
+      if (entry.contentRect.width === width) return;
+      width = entry.contentRect.width;
+      cancelAnimationFrame(asked);
+      asked = requestAnimationFrame(() => draw());
+    }).observe(canvas.parentElement);
+    draw();
+
+    function stop() {
+      cancelAnimationFrame(playing);
+      playing = 0;
+      play.textContent = "Play";
+    }
+
+    function run() {
+      const last = model.levels.length - 1, from = Number(slider.value) >= last ? 0 : Number(slider.value);
+      const began = performance.now(), pace = Math.max(120, 3000 / Math.max(last, 1)); // ms a level
+      play.textContent = "Pause";
+      const step = (now) => {
+        const at = Math.min(last, from + Math.max(0, now - began) / pace);
+        slider.value = Math.floor(at + 1e-9);
+        draw(still ? Math.floor(at) : at);
+        if (at >= last) stop(); else playing = requestAnimationFrame(step);
+      };
+      playing = requestAnimationFrame(step);
+    }
+
+    // Positions at a place between two levels: between equilibria a straight line, for the eye only.
+    function at(path, place) {
+      const low = Math.floor(place), high = Math.ceil(place);
+      const a = index(path, low), b = index(path, high);
+      if (a < 0 || b < 0) return null;
+      const p = path.positions[a], q = path.positions[b], share = place - low;
+      return share ? Float64Array.from(p, (value, i) => value + share * (q[i] - value)) : p;
+    }
+
+    function index(path, level) {
+      const wanted = model.levels[level];
+      return path.positions.length ? path.levels.findIndex((one) => Math.abs(one - wanted) < 1e-9) : -1;
+    }
+
+    function surface(level) {
+      const known = reference && reference.surface;
+      return known && Math.abs(known.level - model.levels[level]) < 1e-9 ? known : null;
+    }
+
+    function draw(place = Number(slider.value)) {
+      const level = Math.floor(place + 1e-9), width = canvas.parentElement.clientWidth;
+      if (!width) return;
+      const pad = 14, [wide, high] = data.box;
+      const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
+      const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
+      if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {
+        canvas.width = Math.round(width * dense);
+        canvas.height = Math.round(height * dense);
+        canvas.style.height = height + "px";
+      }
+      context.setTransform(dense, 0, 0, dense, 0, 0);
+      context.clearRect(0, 0, width, height);
+      context.lineJoin = context.lineCap = "round";
+      const unit = scale * Math.max(wide, high) / 65535, left = (width - scale * wide) / 2;
+      const x = (p, i) => left + unit * p[2 * i], y = (p, i) => pad + scale * high - unit * p[2 * i + 1];
+      const stroke = (p, lines, color, thick, q = p) => {
+        context.beginPath();
+        for (let i = 0; i < lines.length; i += 2) {
+          context.moveTo(x(p, lines[i]), y(p, lines[i]));
+          context.lineTo(x(q, lines[i + 1]), y(q, lines[i + 1]));
+        }
+        context.strokeStyle = color;
+        context.lineWidth = thick * Math.min(1, Math.max(0.3, Math.sqrt(1500 / lines.length))); // fine meshes finer
+        context.stroke();
+      };
+      const dot = (p, i, radius, fill, edge) => {
+        context.beginPath();
+        context.arc(x(p, i), y(p, i), radius, 0, 2 * Math.PI);
+        context.fillStyle = fill;
+        context.strokeStyle = edge;
+        context.lineWidth = 1.2;
+        context.fill();
+        context.stroke();
+      };
+
+      bar(scale, height - 8, pad);
+      context.setLineDash([4, 3]);
+      stroke(data.rest, data.outline, FAINT, 1);
+      context.setLineDash([]);
+      const mine = at(model, place), theirs = reference && at(reference, place);
+      const outline = surface(level);
+      if (outline) stroke(outline.points, outline.lines, INK, 1.8);
+      else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
+      stroke(mine, model.lines, BLUE, 1);
+      if (theirs && apart && apart.checked) {
+        const same = new Uint32Array(2 * data.n_nodes);
+        for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;
+        stroke(mine, same, RED, 1.4, theirs);
+      }
+      context.beginPath();
+      for (let i = 0; i <= level; i++) context.lineTo(x(model.positions[i], data.probe), y(model.positions[i], data.probe));
+      context.lineTo(x(mine, data.probe), y(mine, data.probe));
+      context.strokeStyle = RED;
+      context.lineWidth = 1;
+      context.setLineDash([2, 3]);
+      context.stroke();
+      context.setLineDash([]);
+      if (theirs) dot(theirs, data.probe, 4.5, "#fff", INK);
+      dot(mine, data.probe, 4.5, RED, "#fff");
+      say(level);
+    }
+
+    // A bar of a round length, so that the picture has a size.
+    function bar(scale, bottom, left) {
+      const aim = 90 / scale, power = 10 ** Math.floor(Math.log10(aim));
+      const length = [5, 2, 1].map((digit) => digit * power).find((value) => value <= aim) || power;
+      context.fillStyle = context.strokeStyle = "#5b6168";
+      context.lineWidth = 1.5;
+      context.beginPath();
+      context.moveTo(left, bottom - 4);
+      context.lineTo(left, bottom);
+      context.lineTo(left + length * scale, bottom);
+      context.lineTo(left + length * scale, bottom - 4);
+      context.stroke();
+      context.font = "12px system-ui, sans-serif";
+      context.fillText(`${+length.toPrecision(3)} ${data.unit}`, left + length * scale + 7, bottom + 1);
+    }
+
+    function say(level) {
+      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`, `force <b>${model.force[level]}</b>`];
+      parts.push(`<i class="blue"></i>probe moved <b>${model.moved[level]}</b>`);
+      if (reference) {
+        const other = index(reference, level);
+        if (other >= 0) parts.push(`<i class="black"></i>probe moved <b>${reference.moved[other]}</b>`);
+        if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
+        if (other < 0 && level) parts.push(surface(level) ? "an outline only" : "the reference is not known at this level");
+      }
+      readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
+    }
+  }
+})();
