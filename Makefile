@@ -18,6 +18,7 @@ test: .venv/test
 verification: .venv/test
 	$(BIN)/python -m pytest -q -m verification
 	$(BIN)/python docs/build_verification.py
+	$(BIN)/python docs/build_picture.py
 
 .venv/created:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "truespring needs Python 3.11 or newer; try: make PYTHON=python3.12 ...")'

@@ -15,8 +15,9 @@ import numpy as np
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
-import truespring as ts  # noqa: E402
 from tests.closed_forms import bending_factor, elastica_tip, lattice_tension, principal_state  # noqa: E402
+
+import truespring as ts  # noqa: E402
 from truespring.models import LAWS  # noqa: E402
 from truespring.study import read_study, run  # noqa: E402
 

@@ -179,7 +179,7 @@ def test_prescribed_motion_without_loads(tmp_path: Path) -> None:
 def test_a_failure_keeps_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """St. Venant-Kirchhoff bears no nominal stress below -E sqrt(3) / 9 in uniaxial compression; springs go on."""
     pressed = changed(
-        ('on = "left"', 'on = "left"\nfix = ["x"]\n\n[[support]]\non = "left-bottom"'),
+        ('on = "left"', 'on = "left"\nfix = ["x"]\n\n[[support]]\non = "bottom"\nfix = ["y"]'),
         ('["0 N", "-0.01 N"]', '["-0.25 N", "0 N"]'),
         ("load_steps = 2", "load_steps = 5"),
         ("elements = [8, 2]", "elements = [4, 1]"),
@@ -191,11 +191,12 @@ def test_a_failure_keeps_what_was_reached(tmp_path: Path, capsys: pytest.Capture
     summary = json.loads(printed.out)
     failed = summary["models"]["linear"]
     assert failed["status"] != "converged"
+    assert summary["models"]["springs"]["status"] == "converged"
     assert f"{failed['load_factor']:.6g}" in printed.err
     assert failed["warnings"]
     # The level that was reached is in the curves, and at most what the law bears.
     levels = [float(row["load_factor"]) for row in rows(out / "study" / "curves.csv") if row["model"] == "linear"]
-    assert levels[-1] == failed["load_factor"]
+    assert levels[-1] == failed["load_factor"] == pytest.approx(3**0.5 / 9 / 0.25, rel=0.01)
     assert (out / "report.html").exists()
 
 
@@ -220,7 +221,7 @@ def test_a_deformed_mesh_of_another_program(tmp_path: Path, out: Path, capsys: p
     comparison = verified(surface)
     assert comparison["other"]["rms_error"] is None
     # The file is the linear path's own: the springs' outline differs from it by about their tip's error.
-    assert 1e-4 < comparison["other"]["outline_distance"]["max"] < 5e-3
+    assert 1e-4 < comparison["other"]["outline_distance"]["max"] < 1e-2
     comparison = verified(displaced)
     # STL holds single precision: the errors against the file and against the path itself agree to that.
     assert comparison["other"]["rms_error"] == pytest.approx(comparison["linear"]["rms_error"], rel=1e-5)

@@ -14,8 +14,9 @@ import pytest
 
 import truespring as ts
 from truespring.mesh import Surface
-from truespring.report.figures import _apart, draw_figures, mesh_edges, over_name, save_figures
+from truespring.report.figures import draw_figures, over_name, save_figures
 from truespring.report.page import render_page, write_page
+from truespring.report.plots import _apart
 from truespring.report.quantity import given, percent, quantity, significant
 from truespring.report.result import Result
 from truespring.report.verdict import closest_sentence, drive, force_sentence, moduli_sentence, verdict
@@ -77,14 +78,14 @@ def result(
     probe = ts.named_point(model.problem.mesh, "right-middle")
     return Result(
         title=title,
-        stem=stem,
+        file=FilePath(f"{stem}.toml"),
         problem=model.problem,
         paths={name: model, **references},
         probe=probe,
         model=name,
         comparisons={key: ts.compare(model, one, probe, 0.05) for key, one in references.items()},
         tolerance=0.05,
-        source='title = "A strip"  # <as written>\n',
+        source='# A strip of\n# soft stuff.\ntitle = "A strip"  # <as written>\n',
     )
 
 
@@ -305,7 +306,7 @@ def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
     n_springs = 13 + 8  # edges of 4 x 1 squares, and two diagonals a square
     over = figures["springs_over_linear"]
     assert segments(over, "model") == n_springs
-    assert segments(over, "reference") == len(mesh_edges(mesh)) == 13
+    assert segments(over, "reference") == len(mesh.edges) == 13
     assert segments(figures["undeformed"], "springs") == n_springs
     for name, positions in (("undeformed", mesh.nodes), ("springs_over_linear", springs.states[-1].positions)):
         (dot,) = figures[name].findobj(lambda artist: artist.get_gid() == "probe")
@@ -435,7 +436,7 @@ def test_a_page_of_a_plain_network() -> None:
     network = ts.SpringNetwork([[0, 10], [0, 0], [0, -10]], [[0, 1], [1, 2]], [1.0, 8.0])
     problem = ts.Problem(network.mesh, supports=[ts.Fixed(on=[0, 2])], loads=[ts.Force(on=[1], total=(5.0, 5.0))])
     only = ts.solve(problem, network)
-    found = Result("Two springs", "vm9", problem, {"net": only}, 1, None, {}, 0.05, "")
+    found = Result("Two springs", FilePath("vm9.toml"), problem, {"net": only}, 1, None, {}, 0.05, "")
     assert verdict(found) == "1 of 1 models reached full load; nothing was compared."
     page = Page(render_page([found], ""))
     assert len(page.loaded) == 2  # as asked, and the curve

@@ -140,6 +140,11 @@ class Mesh:
         return float(np.linalg.norm(self.upper - self.lower))
 
     @cached_property
+    def edges(self) -> Ints:
+        """Every edge of the elements once, shape (n_edges, 2)."""
+        return np.unique(np.sort(self.elements[:, np.array(self.kind.edges)].reshape(-1, 2), axis=1), axis=0)
+
+    @cached_property
     def facets(self) -> Ints:
         """Every facet of every element, node numbers sorted and each once, shape (n_facets, k)."""
         return np.asarray(self._facets[0])

@@ -17,7 +17,8 @@ from truespring.equilibrium import Path, Status
 from truespring.material import PlaneStress
 from truespring.models import Moduli
 from truespring.problem import Problem
-from truespring.report.figures import Drawing, mesh_edges, over_name, path_lines, render_figures
+from truespring.report.bodies import path_lines
+from truespring.report.figures import Drawing, over_name, render_figures
 from truespring.report.quantity import given, natural_scale, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.verdict import (
@@ -81,7 +82,6 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     return {
         "id": f"study-{place}",
         "title": result.title,
-        "stem": result.stem,
         "verdict": sentences,
         "more": [text for text in (closest_sentence(result), force_sentence(result)) if text],
         "converged": result.converged,
@@ -89,6 +89,8 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
         "facts": _facts(result),
         "short": _in_short(result),
+        "note": result.note,
+        "file": str(result.file),
         "pictures": {name: _picture(drawings[name]) for name in drawings},
         "over": [
             {"name": name, "label": one.reference.label, "picture": _picture(drawings[over_name(result, name)])}
@@ -265,7 +267,7 @@ def _viewer(result: Result, budget: int) -> dict[str, Any] | None:
         "probe": result.probe,
         "chosen": closest,
         "rest": pack.places(mesh.nodes),
-        "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh_edges(mesh)),
+        "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
         "paths": [_viewer_path(result, name, levels, pack) for name in shown],
     }
 

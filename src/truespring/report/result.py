@@ -1,8 +1,10 @@
 """Result: all that one study gave, which everything in this folder draws, tabulates or writes."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path as FilePath
 
 from truespring.compare import Comparison, closest
 from truespring.equilibrium import Path, Status
@@ -15,18 +17,18 @@ class Result:
 
     Attributes:
         title: the study's own.
-        stem: name of the study's file without its suffix; names the output folder.
+        file: the study's file, as it was named.
         problem: what was asked.
         paths: by the name of the model in the study, in its order.
         probe: number of the node that is watched.
         model: name of the path that is compared with the others; None where nothing is compared.
         comparisons: by name of the reference.
         tolerance: the rms error up to which two paths agree.
-        source: text of the study file, to run it again.
+        source: text of the study file; comments at its head are shown with its results.
     """
 
     title: str
-    stem: str
+    file: FilePath
     problem: Problem
     paths: Mapping[str, Path]
     probe: int
@@ -37,6 +39,17 @@ class Result:
 
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"
+
+    @property
+    def stem(self) -> str:
+        """The file's name without its suffix; names the output folder."""
+        return self.file.stem
+
+    @property
+    def note(self) -> str:
+        """What the comments at the head of the study file say."""
+        head = itertools.takewhile(lambda line: line.startswith("#"), self.source.splitlines())
+        return " ".join(line.lstrip("#").strip() for line in head)
 
     @cached_property
     def closest(self) -> str | None:

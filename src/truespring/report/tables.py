@@ -36,7 +36,7 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     yield table
     if result.comparisons:
         yield _error_table(result)
-        yield verdict(result)
+    yield verdict(result)
     for name, path in result.paths.items():
         for warning in path.warnings:
             yield f"warning: {name}: {warning}"

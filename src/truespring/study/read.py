@@ -26,7 +26,7 @@ class Study:
     """A study file as objects, checked as far as can be without solving.
 
     Attributes:
-        title, stem, source: the study's own title, the name of its file without suffix, its text.
+        title, file, source: the study's own title, its file as it was named, its text.
         problem, solver: what is asked and how it is solved.
         entries: by name, a model to be solved, or a path that was read from another program's file.
         model: the name of the entry that is compared with the others, None where there is nothing to compare.
@@ -36,7 +36,7 @@ class Study:
     """
 
     title: str
-    stem: str
+    file: FilePath
     source: str
     problem: Problem
     solver: Newton
@@ -45,6 +45,11 @@ class Study:
     references: tuple[str, ...]
     probe: int | None
     tolerance: float
+
+    @property
+    def stem(self) -> str:
+        """The file's name without its suffix; names the output folder."""
+        return self.file.stem
 
 
 def read_study(file: str | FilePath) -> Study:
@@ -91,7 +96,7 @@ class _Builder:
             probe = _probe_node(problem.mesh, table.compare.probe)
         return Study(
             title=table.title or self.file.stem,
-            stem=self.file.stem,
+            file=self.file,
             source=self.source,
             problem=problem,
             solver=Newton(

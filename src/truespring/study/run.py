@@ -60,7 +60,7 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
     names = study.references if comparing else ()
     return Result(
         title=study.title,
-        stem=study.stem,
+        file=study.file,
         problem=study.problem,
         paths=paths,
         probe=probe,
@@ -104,8 +104,7 @@ def write_overview(results: Sequence[Result], out: FilePath) -> None:
 
 
 def _command(results: Sequence[Result], out: FilePath) -> str:
-    files = " ".join(shlex.quote(f"{result.stem}.toml") for result in results)
-    return f"truespring verify {files} --out {shlex.quote(out.name)}"
+    return shlex.join(["truespring", "verify", *(str(result.file) for result in results), "--out", str(out)])
 
 
 def plan(study: Study) -> dict[str, Any]:

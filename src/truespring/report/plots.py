@@ -1,0 +1,220 @@
+"""Plots: displacement against force, errors by load level, Young's modulus by direction."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.mesh.selections import AXES
+from truespring.report.quantity import given, natural_scale, quantity, tolerance_percent
+from truespring.report.result import Result
+from truespring.report.style import BLUE, FAINT, INK, POINT, is_strong, label_and_name, path_styles
+from truespring.report.verdict import display_name, drive
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    x: Floats
+    y: Floats
+    color: str
+    dashes: Any
+    marker: str
+    label: str
+    strong: bool
+
+
+def curves_figure(result: Result) -> "Figure":
+    """Displacement of the probe against the force, both along the direction that drives the body."""
+    to = drive(result)
+    styles = path_styles(result)
+    forces, moves = {}, {}
+    for name, path in result.paths.items():
+        if path.states:
+            forces[name] = to.sign * np.array([path.applied_force(state)[to.axis] for state in path.states])
+            moves[name] = to.sign * np.array([state.displacement[result.probe, to.axis] for state in path.states])
+    x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), "N")
+    y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
+    curves = [
+        _Curve(
+            forces[name] / x_scale.size,
+            moves[name] / y_scale.size,
+            *styles[name],
+            label=_two_lines(result, name),
+            strong=is_strong(result, name),
+        )
+        for name in forces
+    ]
+    direction = f"{'−' if to.sign < 0 else ''}{AXES[to.axis]}"
+    figure, axes = _plot("Displacement of the probe against force", curves)
+    axes.set_xlabel(f"total force along {direction} [{x_scale.unit}]")
+    axes.set_ylabel(f"displacement along {direction} [{y_scale.unit}]")
+    return figure
+
+
+def error_figure(result: Result) -> "Figure":
+    """Rms error against every reference, level by level, beside the tolerance."""
+    styles = path_styles(result)
+    curves = [
+        _Curve(
+            one.load_factors,
+            100 * np.asarray(one.rms_errors),
+            *styles[name],
+            label=_two_lines(result, name),
+            strong=False,
+        )
+        for name, one in result.comparisons.items()
+        if one.load_factors.size
+    ]
+    tolerance = 100 * result.tolerance
+    within = f"within {tolerance_percent(result.tolerance)}"
+    curves.append(_Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
+    who = result.paths[result.model].label if result.model else "the model"
+    figure, axes = _plot(f"Error of {who} against each reference", curves)
+    axes.axhspan(0, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5)
+    axes.set_xlim(0, 1.02)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("load factor")
+    axes.set_ylabel("rms error [%]")
+    return figure
+
+
+def _two_lines(result: Result, name: str) -> str:
+    return "\n".join(label_and_name(result, name))
+
+
+def _plot(title: str, curves: Sequence[_Curve]) -> "tuple[Figure, Axes]":
+    """Curves with their names at their ends, moved apart where they would meet."""
+    from matplotlib.figure import Figure
+
+    left, right, bottom, top = 0.62, 1.95, 0.5, 0.38
+    height = max(3.0, 0.34 * len(curves))
+    figure = Figure(figsize=(5.9, bottom + height + top), label=title)
+    total = figure.get_size_inches()
+    box = (left / total[0], bottom / total[1], 1 - (left + right) / total[0], height / total[1])
+    axes = figure.add_axes(box)
+    figure.text(box[0], 1 - 0.19 / total[1], title, weight="bold", size=9, va="center")
+    for curve in curves:
+        axes.plot(
+            curve.x,
+            curve.y,
+            color=curve.color,
+            ls=curve.dashes,
+            lw=2.2 if curve.strong else 1.3 if curve.marker else 1,
+            marker=curve.marker,
+            ms=4.2 if curve.strong else 3.6,
+            mfc=curve.color if curve.strong else "white",
+            mew=0.9,
+            zorder=4 if curve.strong else 3,
+            label=curve.label.replace("\n", ", "),
+        )
+    _name_ends(axes, curves, height)
+    return figure, axes
+
+
+def _name_ends(axes: "Axes", curves: Sequence[_Curve], height: float) -> None:
+    """Write each curve's name right of the axes, level with its end or as near as the others allow."""
+    axes.set_ylim(auto=True)
+    axes.autoscale_view()
+    bottom, top = axes.get_ylim()
+    bottom = min(bottom, 0.0) if bottom > 0 else bottom
+    axes.set_ylim(bottom, top)
+    ends = np.array([(curve.y[-1] - bottom) / (top - bottom) for curve in curves])
+    gap = (27 if any("\n" in curve.label for curve in curves) else 17) * POINT / height
+    for curve, place in zip(curves, _apart(ends, gap, np.array([curve.x[-1] for curve in curves])), strict=True):
+        first, _, second = curve.label.partition("\n")
+        at = (1.0, float(place))
+        axes.annotate(
+            "",
+            (curve.x[-1], curve.y[-1]),
+            xytext=(1.035, float(place)),
+            textcoords="axes fraction",
+            arrowprops={"arrowstyle": "-", "color": FAINT, "lw": 0.7, "shrinkA": 0, "shrinkB": 4},
+            annotation_clip=False,
+        )
+        weight = "bold" if curve.strong else "normal"
+        for text, offset, color, size in ((first, 0.5 if second else 0, curve.color, 8), (second, -0.5, "#5b6168", 7)):
+            axes.annotate(
+                text,
+                at,
+                xycoords="axes fraction",
+                xytext=(10, 10 * offset),
+                textcoords="offset points",
+                color=color,
+                size=size,
+                weight=weight if text == first else "normal",
+                va="center",
+                annotation_clip=False,
+            )
+
+
+def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
+    """Move places along a line so that none is nearer than `gap` to the next, each as little as may be.
+
+    Of equal places the one with the smaller of `ties` comes first.
+
+    Neighbours that meet are joined to a block about their mean, until no block meets another;
+    the whole is then kept within 0 and 1 as far as it fits.
+    """
+    order = np.lexsort((ties, places.round(3)))
+    blocks: list[list[float]] = []  # [sum of wanted starts, count]
+    for rank, index in enumerate(order):
+        blocks.append([float(places[index]) - rank * gap, 1.0])
+        while len(blocks) > 1 and blocks[-2][0] / blocks[-2][1] >= blocks[-1][0] / blocks[-1][1]:
+            total, count = blocks.pop()
+            blocks[-1][0] += total
+            blocks[-1][1] += count
+    starts = np.concatenate([np.full(int(count), total / count) for total, count in blocks])
+    starts = np.clip(starts, min(0.0, 1 - gap * len(places)), max(1 - (len(places) - 1) * gap, 0.0))
+    moved = np.empty(len(places))
+    moved[order] = starts + gap * np.arange(len(places))
+    return moved
+
+
+def moduli_figure(result: Result) -> "Figure":
+    """Young's modulus in a test along every direction: the springs against the material's circle."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    known = {name: path.moduli for name, path in result.paths.items() if path.moduli is not None}
+    wanted = next(iter(known.values())).young_wanted
+    angles = np.arange(0, 361, 3.0)
+    young = {name: np.array([one.young(angle) for angle in angles]) for name, one in known.items()}
+    largest = max(wanted, *(float(values.max()) for values in young.values()))
+    scale = natural_scale(largest, "Pa")
+    title = "Young's modulus by direction"
+    figure = Figure(figsize=(3.9, 4.25 + 0.18 * len(known)), label=title)
+    total = figure.get_size_inches()
+    foot = (0.65 + 0.18 * len(known)) / total[1]
+    axes = figure.add_axes((0.12, foot, 0.76, 0.76 * total[0] / total[1]), projection="polar")
+    axes.plot(np.radians(angles), np.full(angles.shape, wanted / scale.size), color=INK, lw=1.3, ls=(0, (5, 2)))
+    handles, labels = [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))], [f"material: {given(wanted, 'Pa')}"]
+    styles = path_styles(result)
+    for name, values in young.items():
+        color, dashes, _ = styles[name]
+        axes.plot(np.radians(angles), values / scale.size, color=color, lw=2, ls=dashes)
+        handles.append(Line2D([], [], color=color, lw=2, ls=dashes))
+        extremes = dict.fromkeys(quantity(float(value), "Pa") for value in (values.min(), values.max()))
+        labels.append(f"{display_name(result, name)}: {' to '.join(extremes)}")
+    axes.set_ylim(0, 1.12 * largest / scale.size)
+    axes.set_yticks(_ticks(largest / scale.size))
+    axes.set_rlabel_position(22.5)  # type: ignore[attr-defined]
+    axes.set_thetagrids(np.arange(0, 360, 45))  # type: ignore[attr-defined]
+    axes.tick_params(pad=2)
+    axes.spines["polar"].set_visible(False)
+    figure.text(0.5, 1 - 0.19 / total[1], f"{title} [{scale.unit}]", weight="bold", size=9, va="center", ha="center")
+    figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 0.02), borderpad=0, fontsize=8)
+    return figure
+
+
+def _ticks(largest: float) -> Floats:
+    """Three or four round numbers from zero on."""
+    from matplotlib.ticker import MaxNLocator
+
+    ticks = np.asarray(MaxNLocator(4).tick_values(0, largest))
+    return ticks[(ticks > 0) & (ticks <= 1.1 * largest)]
