@@ -1,19 +1,18 @@
-"""Finite elements on the same mesh, the embedded reference: assembled with scikit-fem, full integration."""
+"""Finite elements on the same mesh, the embedded reference: shape functions and quadrature by scikit-fem."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, Functional, LinearForm, MeshQuad
+from skfem import Basis, ElementQuad1, MeshQuad
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import PlaneStress
 from truespring.mesh import Mesh
 from truespring.models.laws import LAWS, Constants, Law, Response
-from truespring.potential import SparseMatrix
+from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
 # scikit-fem's mesh and element of each kind, and the order of its quadrature: 2 x 2 Gauss points
@@ -62,7 +61,8 @@ class FemPotential:
 
     With W the law's energy density, S its stress and A its elasticity at the deformation gradient F:
     energy W, gradient F S : grad v, Hessian F^T grad u : A : F^T grad v + S : (grad u^T grad v).
-    The linear law has F = I in the last two and no geometric part.
+    The linear law has F = I in the last two and no geometric part. Elements are summed into the
+    same fixed pattern as springs are.
     """
 
     mesh: Mesh
@@ -80,17 +80,27 @@ class FemPotential:
     def _basis(self) -> Any:
         mesh_class, element_class, order = _SKFEM[self.mesh.element]
         grid = mesh_class(
-            np.ascontiguousarray(self.mesh.nodes.T),
-            np.ascontiguousarray(self.mesh.elements.T),
-            validate=False,
+            np.ascontiguousarray(self.mesh.nodes.T), np.ascontiguousarray(self.mesh.elements.T), validate=False
         )
-        return Basis(grid, ElementVector(element_class()), intorder=order)
+        return Basis(grid, element_class(), intorder=order)
+
+    @cached_property
+    def _shape_gradients(self) -> Floats:
+        """Gradients of the shape functions [1/m], axes (node of the element, direction, element, point)."""
+        return np.stack([function.grad for (function,) in self._basis.basis])
+
+    @cached_property
+    def _volumes(self) -> Floats:
+        """Reference volume of each Gauss point [m^3], axes (element, point)."""
+        return np.asarray(self.thickness * self._basis.dx)
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return Pattern(self.mesh.elements, *self.nodes.shape)
 
     def _deformation(self, positions: Floats) -> Floats:
         """Deformation gradient at the Gauss points, axes (i, j, element, point)."""
-        displacement = (positions - self.nodes).ravel()
-        gradient = self._basis.interpolate(displacement).grad
-        return np.asarray(gradient + np.eye(len(gradient))[:, :, None, None])
+        return np.asarray(np.einsum("eai,ajeq->ijeq", positions[self.mesh.elements], self._shape_gradients))
 
     def _respond(self, positions: Floats) -> tuple[Floats, Response]:
         """Deformation gradient and the law's response; the last ones are kept, for energy, gradient and Hessian."""
@@ -111,7 +121,7 @@ class FemPotential:
         density = response.energy
         if not np.isfinite(density).all() or (self.law.barrier and (_determinant(F) <= 0).any()):
             return float("inf")
-        return float(Functional(lambda w: self.thickness * density).assemble(self._basis))
+        return float((density * self._volumes).sum())
 
     def stress(self, positions: Floats) -> Floats:
         """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (i, j, element, point)."""
@@ -121,26 +131,21 @@ class FemPotential:
         """Internal force [N], shape (n_nodes, dim)."""
         F, response = self._respond(positions)
         first = np.einsum("ik...,kj...->ij...", F, response.stress) if self.law.finite else response.stress
-        form = LinearForm(lambda v, w: self.thickness * np.einsum("ij...,ij...", first, v.grad))
-        return np.asarray(form.assemble(self._basis)).reshape(positions.shape)
+        forces = np.einsum("ijeq,ajeq->eai", first * self._volumes, self._shape_gradients)
+        return self._pattern.vector(forces).reshape(positions.shape)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [Pa] makes the geometric part, by default that of the positions."""
-        return sparse.csr_array(self._tangent(positions, stress).tocsr())
+        return self._pattern.matrix(self.element_hessians(positions, stress))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Sum of the element Hessians, each with its negative eigenvalues cut off [N/m]."""
-        tangent = self._tangent(positions, None)
-        local = tangent.tolocal()
-        values, vectors = np.linalg.eigh((local + local.swapaxes(1, 2)) / 2)
-        clipped = np.einsum("eik,ek,ejk->eij", vectors, np.maximum(values, 0.0), vectors)
-        return sparse.csr_array(tangent.fromlocal(clipped).tocsr())
+        blocks = self.element_hessians(positions)
+        values, vectors = np.linalg.eigh((blocks + blocks.swapaxes(1, 2)) / 2)
+        return self._pattern.matrix(np.einsum("eik,ek,ejk->eij", vectors, np.maximum(values, 0.0), vectors))
 
-    def element_hessians(self, positions: Floats) -> Floats:
+    def element_hessians(self, positions: Floats, stress: Floats | None = None) -> Floats:
         """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
-        return np.asarray(self._tangent(positions, None).tolocal())
-
-    def _tangent(self, positions: Floats, stress: Floats | None) -> Any:
         F, response = self._respond(positions)
         if self.law.finite:
             S = response.stress if stress is None else stress
@@ -148,11 +153,10 @@ class FemPotential:
             tangent += np.einsum("ab,jl...->ajbl...", np.eye(len(F)), S)
         else:
             tangent = response.elasticity
-
-        def contract(u: Any, v: Any, w: Any) -> Any:
-            return self.thickness * np.einsum("ajbl...,aj...,bl...->...", tangent, v.grad, u.grad)
-
-        return BilinearForm(contract).coo_data(self._basis)
+        half = np.einsum("ijkleq,bleq->ijkbeq", tangent * self._volumes, self._shape_gradients)
+        blocks = np.einsum("ajeq,ijkbeq->eaibk", self._shape_gradients, half)
+        size = self._pattern.dofs.shape[1]
+        return np.asarray(blocks.reshape(-1, size, size))
 
     @property
     def cells(self) -> tuple[str, Ints]:
@@ -163,9 +167,8 @@ class FemPotential:
         """True stress [Pa], padded to 3 by 3 and flattened, and strain energy [J] of each element."""
         stress = np.zeros((len(self.mesh.elements), 3, 3))
         stress[:, : self.mesh.dim, : self.mesh.dim] = self.cauchy_stress(positions)
-        density = self._respond(positions)[1].energy
-        energy = Functional(lambda w: self.thickness * density).elemental(self._basis)
-        return {"stress": stress.reshape(-1, 9), "strain_energy": np.asarray(energy)}
+        energy = (self._respond(positions)[1].energy * self._volumes).sum(axis=1)
+        return {"stress": stress.reshape(-1, 9), "strain_energy": energy}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """True stress averaged over the points of each element [Pa], shape (n_elements, dim, dim).

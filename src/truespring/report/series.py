@@ -47,7 +47,7 @@ def _write_state(path: Path, state: State, file: FilePath) -> None:
 
 def write_stl(path: Path, file: FilePath) -> None:
     """Write the body of the last state as binary STL [m], in the plane z = 0; nothing where there is no body."""
-    import trimesh
+    import meshio
 
     if path.surface is not None:
         points, triangles = path.surface.points, path.surface.triangles
@@ -55,7 +55,7 @@ def write_stl(path: Path, file: FilePath) -> None:
         points, triangles = path.states[-1].positions, _split(path.problem.mesh.elements)
     else:
         return
-    trimesh.Trimesh(_in_space(points), triangles, process=False).export(file, file_type="stl")
+    meshio.Mesh(_in_space(points), [("triangle", triangles)]).write(file, file_format="stl", binary=True)
 
 
 def _split(quadrilaterals: Ints) -> Ints:

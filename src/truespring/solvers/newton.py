@@ -18,8 +18,8 @@ Reporter = Callable[[float, int, float], None]
 _EPS = float(np.finfo(float).eps)
 # Energies that differ by less than this share cannot be told apart; see _search.
 _DROWNED = 1e-9
-# Rounding of the positions excuses a residual up to this share of the forces, and no more.
-_LARGEST_ROUNDING = 1e-6
+# Rounding is estimated for bodies up to so many times their rest size.
+_LARGEST_STRETCH = 100.0
 # Armijo's constant, and how far one backtracking step may cut (Nocedal and Wright, 3.1 and 3.5).
 _ARMIJO, _SHORTEST_CUT, _LONGEST_CUT = 1e-4, 0.1, 0.5
 _MIN_STEP, _LONGEST_STEP = 1e-9, 1024.0
@@ -215,8 +215,7 @@ class _Balance:
             if residual < best.residual:
                 best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self.tangent(positions)
-            rounding = min(self._rounding(tangent, positions), _LARGEST_ROUNDING * scale)
-            if size <= max(self.settings.tolerance * scale, rounding):
+            if size <= max(self.settings.tolerance * scale, self._rounding(tangent, positions)):
                 energy = self.potential.energy(positions)
                 state = Equilibrium(load_factor, positions, internal, energy, iteration, residual, converged=True)
                 return self._judged(state, tangent)
@@ -228,9 +227,12 @@ class _Balance:
         return replace(best, energy=self.potential.energy(best.positions), iterations=iteration)
 
     def _rounding(self, tangent: SparseMatrix, positions: Floats) -> float:
-        """The unbalanced force that rounding of the positions alone makes [N]: no residual can go below."""
-        centred = (positions - positions.mean(axis=0)).ravel()[self.free]
-        return 8 * _EPS * float(np.linalg.norm(abs(tangent) @ np.abs(centred)))
+        """The unbalanced force that rounding of the positions alone makes [N]: no residual can go below.
+
+        A body that runs away without bound is not excused by its own size.
+        """
+        centred = np.abs(positions - positions.mean(axis=0)).ravel()[self.free]
+        return 8 * _EPS * float(np.linalg.norm(abs(tangent) @ np.minimum(centred, _LARGEST_STRETCH * self.size)))
 
     def _judged(self, state: Equilibrium, tangent: SparseMatrix) -> Equilibrium:
         """Add the inertia of the tangent."""
