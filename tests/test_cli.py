@@ -230,7 +230,7 @@ def test_a_deformed_mesh_of_another_program(tmp_path: Path, out: Path, capsys: p
 
 def test_the_command_is_installed_and_answers() -> None:
     shown = subprocess.run(
-        [sys.executable, "-c", "import sys; from truespring.cli import main; sys.exit(main())", "--help"],
+        [sys.executable, "-m", "truespring", "--help"],
         capture_output=True,
         text=True,
         check=True,

@@ -9,6 +9,7 @@ SOURCE = Path(truespring.__file__).parent
 
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
+    "__main__": {"cli"},
     "cli": {"study", "report"},
     "study": {
         "report",
@@ -93,4 +94,4 @@ def test_the_library_neither_prints_nor_exits() -> None:
             calls = [node.func for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.Call)]
             named = {call.id for call in calls if isinstance(call, ast.Name)}
             assert room == "cli" or not named & {"print", "exit", "input"}, file
-            assert "sys.exit" not in file.read_text(encoding="utf-8"), file
+            assert room == "__main__" or "sys.exit" not in file.read_text(encoding="utf-8"), file

@@ -3,7 +3,16 @@
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PlainValidator, WithJsonSchema
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    WithJsonSchema,
+    field_validator,
+)
 
 from truespring.errors import TruespringError, nearest
 from truespring.mesh import Box, Near, Plane, Selection
@@ -76,6 +85,8 @@ def _selection(value: Any) -> Selection:
     if key == "near":
         return Near(_point(what))
     if key == "box":
+        if isinstance(what, list) and len(what) in (4, 6):  # the corners in one list
+            what = [what[: len(what) // 2], what[len(what) // 2 :]]
         if not isinstance(what, list) or len(what) != 2:
             raise TruespringError(f"box = {what!r}: two corners are wanted, [[xmin, ymin], [xmax, ymax]]")
         return Box(_point(what[0]), _point(what[1]))
@@ -103,7 +114,7 @@ _ON_SCHEMA = {
                 ("x", {"type": ["number", "string"]}),
                 ("y", {"type": ["number", "string"]}),
                 ("z", {"type": ["number", "string"]}),
-                ("box", {"type": "array", "items": {"type": "array"}, "minItems": 2, "maxItems": 2}),
+                ("box", {"type": "array", "minItems": 2, "maxItems": 6}),
                 ("near", {"type": "array", "items": {"type": ["number", "string"]}}),
             )
         ),
@@ -185,7 +196,14 @@ class SpringsTable(Table):
     stiffness: StiffnessTable | None = None
     sharing: Literal["summed", "single"] = "summed"
     allow_negative: bool = False
-    volume: Literal[False] = False
+    volume: bool = False
+
+    @field_validator("volume")
+    @classmethod
+    def _no_area_term(cls, volume: bool) -> bool:
+        if volume:
+            raise ValueError("volume = true: there is no area term yet; leave the key out, or take an fem model")
+        return volume
 
 
 class FemTable(Table):
