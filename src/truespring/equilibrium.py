@@ -53,6 +53,7 @@ class State:
         residual: relative unbalanced force [-].
         negative_eigenvalues: of the tangent; 0 is stable, None is not proven.
         branched: true where an unstable equilibrium was left for a stable one nearby.
+        snapped: true where the body jumped past unstable states.
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
     """
@@ -68,6 +69,7 @@ class State:
     branched: bool
     area_ratio: float
     stretch: tuple[float, float] | None
+    snapped: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -190,6 +192,7 @@ def _state(problem: Problem, potential: Potential, found: Equilibrium) -> State:
         residual=found.residual,
         negative_eigenvalues=found.negative_eigenvalues,
         branched=found.branched,
+        snapped=found.snapped,
         area_ratio=problem.mesh.smallest_area_ratio(found.positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
@@ -245,6 +248,12 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
         warnings.append(
             f"stability was lost before load factor {branched[0].load_factor:.6g}: the path goes on along a stable "
             "branch nearby (buckling); the side it took is arbitrary"
+        )
+    snapped = [state for state in states if state.snapped]
+    if snapped:
+        warnings.append(
+            f"the body snapped to another shape before load factor {snapped[0].load_factor:.6g}: the states that it "
+            "jumped over are not on the path; take more load_steps to see where"
         )
     if any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent could not be found")

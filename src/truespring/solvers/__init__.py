@@ -1,5 +1,5 @@
 """Solvers: how equilibrium is found. They see potentials and loadings only."""
 
-from truespring.solvers.newton import Equilibrium as Equilibrium
+from truespring.solvers.balance import Equilibrium as Equilibrium
+from truespring.solvers.balance import Reporter as Reporter
 from truespring.solvers.newton import Newton as Newton
-from truespring.solvers.newton import Reporter as Reporter

@@ -1,0 +1,59 @@
+"""Branching: from an unstable equilibrium to a stable one of lower energy nearby."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from truespring.solvers.balance import Balance, Found
+
+# Leaps along the mode by these shares of the body's size are tried, each with so many undamped iterations;
+# then a descent from nearby.
+_LEAPS, _UNDAMPED_ITERATIONS, _NUDGE = (0.03, 0.1, 0.2, 0.3), 25, 1e-3
+_MAX_ESCAPES = 3
+
+
+def stabilised(balance: Balance, found: Found) -> Found:
+    """Return a stable equilibrium of lower energy reached from an unstable one; `found` where there is none."""
+    for _ in range(_MAX_ESCAPES):
+        if not found.state.converged or not found.state.negative_eigenvalues:
+            break
+        left = _escaped(balance, found)
+        if left is None:
+            break
+        found = left
+    return found
+
+
+def _escaped(balance: Balance, unstable: Found) -> Found | None:
+    """Leave an unstable equilibrium along its mode, to the side of lower energy; None where that fails.
+
+    Undamped Newton is tried from states x + a v + w far along the mode v, where w takes the stretch out
+    that a v makes in a slender body: H w = -(g(x + a v) + g(x - a v) - 2 g(x)) / 2, the second order of
+    Koiter's expansion. A descent with line search from nearby follows where none leads to a stable
+    state of lower energy.
+    """
+    state, tangent = unstable.state, unstable.tangent
+    assert tangent is not None  # it was found negative by factorising
+    level, spent = state.load_factor, state.iterations
+    mode = balance.size * tangent.lowest_mode()
+    unit = mode / np.linalg.norm(mode)
+    energy, _ = balance.total_energy(state.positions, level)
+    at_state = balance.force(state.positions, level)
+    for share in (*_LEAPS, _NUDGE):
+        leaping = share != _NUDGE
+        sides = [balance.moved(state.positions, side * share * mode) for side in (1, -1)]
+        energies = [balance.total_energy(side, level)[0] for side in sides]
+        if not np.isfinite(energies).all():
+            continue
+        start = sides[int(np.argmin(energies))]
+        if leaping:
+            bent = -tangent.solve(balance.force(sides[0], level) + balance.force(sides[1], level) - 2 * at_state) / 2
+            start = balance.moved(start, bent - unit * (unit @ bent))
+            if not np.isfinite(balance.total_energy(start, level)[0]):
+                continue
+        found = balance.descend(level, start, _UNDAMPED_ITERATIONS if leaping else None)
+        spent += found.state.iterations
+        lower = found.state.converged and balance.total_energy(found.state.positions, level)[0] < energy
+        if lower and (not leaping or found.state.negative_eigenvalues == 0):
+            return found._replace(state=replace(found.state, iterations=spent, branched=True))
+    return None
