@@ -113,6 +113,7 @@ def test_shallow_truss_beyond_its_limit_hangs(rise: float) -> None:
         sunk = -path.states[-1].displacement[1, 1]
         assert sunk > 2 * rise
         assert shallow_truss_force(sunk, 1.0, rise, stiffness) == pytest.approx(1.05 * limit, rel=1e-9)
+        assert any("snapped" in warning for warning in path.warnings)
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)

@@ -374,3 +374,18 @@ def test_the_least_support_that_holds_is_enough_anywhere() -> None:
         assert path.status is ts.Status.CONVERGED
         ends = path.states[-1].reaction[:, 1].sum()
         assert ends == pytest.approx(1e-3 * size, rel=1e-8)
+
+
+def test_springs_unstable_without_load_are_not_loaded() -> None:
+    """Rectangles beyond an aspect of sqrt(3) take negative springs for an isotropic lattice: it hourglasses at rest."""
+    problem = ts.Problem(
+        mesh=ts.rectangle((4.0, 1.0), (2, 2)),
+        material=ts.Material(1.0, 1 / 3),
+        section=ts.PlaneStress(1.0),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.1, 0.0))],
+    )
+    path = ts.solve(problem, ts.Springs(rule="isotropic", allow_negative=True))
+    assert path.status is ts.Status.UNSTABLE
+    assert path.load_factor == 0.0
+    assert np.linalg.eigvalsh(path.potential.hessian(problem.mesh.nodes).toarray())[0] < 0

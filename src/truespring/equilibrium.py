@@ -53,7 +53,7 @@ class State:
         residual: relative unbalanced force [-].
         negative_eigenvalues: of the tangent; 0 is stable, None is not proven.
         branched: true where an unstable equilibrium was left for a stable one nearby.
-        snapped: true where the body jumped past unstable states.
+        snapped: true where the body moved much further than the step before lets expect.
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
     """
@@ -252,8 +252,8 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
     snapped = [state for state in states if state.snapped]
     if snapped:
         warnings.append(
-            f"the body snapped to another shape before load factor {snapped[0].load_factor:.6g}: the states that it "
-            "jumped over are not on the path; take more load_steps to see where"
+            f"just before load factor {snapped[0].load_factor:.6g} the body moved much further than the step before "
+            "lets expect: it may have snapped past unstable states, which are not on the path; more load_steps tell"
         )
     if any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent could not be found")

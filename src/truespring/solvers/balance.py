@@ -37,7 +37,7 @@ class Equilibrium:
         residual: unbalanced force over the largest of applied, reaction and internal force [-].
         negative_eigenvalues: of the tangent on the free directions: 0 if stable, None if not known.
         branched: true where an unstable equilibrium was left for a stable one nearby.
-        snapped: true where the body jumped past unstable states.
+        snapped: true where the body moved much further than the step before lets expect.
     """
 
     load_factor: float
@@ -53,14 +53,10 @@ class Equilibrium:
 
 
 class Found(NamedTuple):
-    """A state, the factorised tangent there (None where it is singular or was not needed), and how it was found.
-
-    `detour` is true where the way led through states whose tangent is not positive.
-    """
+    """A state and the factorised tangent there, None where it is singular or the state is no equilibrium."""
 
     state: Equilibrium
     tangent: Factorisation | None = None
-    detour: bool = False
 
 
 class Step(NamedTuple):
@@ -121,7 +117,6 @@ class Balance:
         """
         nowhere = np.full_like(positions, np.nan)
         best = Equilibrium(load_factor, positions, nowhere, np.inf, 0, np.inf, converged=False)
-        detour = False
         for iteration in range((undamped_iterations or self.max_iterations) + 1):
             internal = self.potential.gradient(positions)
             force, scale = self._unbalanced(internal, load_factor)
@@ -135,12 +130,11 @@ class Balance:
             if size <= max(self.tolerance * scale, self._rounding(tangent, positions)):
                 energy = self.potential.energy(positions)
                 state = Equilibrium(load_factor, positions, internal, energy, iteration, residual, converged=True)
-                return _judged(state, tangent, detour)
+                return _judged(state, tangent)
             if undamped_iterations:
                 moved = self._leap(positions, tangent, force)
             else:
                 step = self._step(positions, tangent, force)
-                detour = detour or (step is not None and not step.newton)
                 moved = step and self._search(load_factor, positions, step)
             if moved is None:
                 break
@@ -221,12 +215,12 @@ class Balance:
         return moved
 
 
-def _judged(state: Equilibrium, tangent: SparseMatrix, detour: bool) -> Found:
+def _judged(state: Equilibrium, tangent: SparseMatrix) -> Found:
     """Add the inertia of the tangent to an equilibrium."""
     if not tangent.shape[0]:
         return Found(replace(state, negative_eigenvalues=0))
     try:
         factors = factorise(tangent)
     except SingularMatrixError:
-        return Found(replace(state, negative_eigenvalues=None), detour=detour)
-    return Found(replace(state, negative_eigenvalues=factors.negative_eigenvalues), factors, detour)
+        return Found(replace(state, negative_eigenvalues=None))
+    return Found(replace(state, negative_eigenvalues=factors.negative_eigenvalues), factors)

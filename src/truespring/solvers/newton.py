@@ -11,8 +11,8 @@ from truespring.potential import Loading, Potential
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
 
-# A body that passes unstable states and moves so many times as far as in the step before has snapped.
-_SNAP = 4.0
+# A body that moves so many times as far as the step before lets expect may have snapped.
+_SNAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Newton:
             if not wanted and strict:
                 strict, step = False, 1.0 / self.load_steps
                 continue
-            snapped = reached.detour and _snapped(reached.state, last.state, previous)
+            snapped = _snapped(reached.state, last.state, previous)
             state = replace(reached.state, iterations=spent, snapped=snapped)
             previous, last, spent = last.state, reached._replace(state=state), 0
             step = min(2 * step, 1.0 / self.load_steps)
