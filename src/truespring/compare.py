@@ -62,6 +62,16 @@ class Comparison:
         return self._at_full_load(self.max_errors)
 
     @property
+    def force_error(self) -> float | None:
+        """Difference over size of the reactions to a prescribed motion at full load; None where loads are given."""
+        mine, theirs = self.model.at(1.0), self.reference.at(1.0)
+        if self.model.problem.loads or mine is None or theirs is None or self.reference.potential is None:
+            return None
+        wanted = self.reference.applied_force(theirs)
+        size = float(np.linalg.norm(wanted))
+        return float(np.linalg.norm(self.model.applied_force(mine) - wanted)) / size if size else None
+
+    @property
     def agrees_up_to_load_factor(self) -> float | None:
         """The largest level up to which, without a gap from zero, the rms error is under the tolerance.
 
@@ -122,7 +132,9 @@ def most_moved(path: Path) -> int:
     """Return the node that moves most at the last level; of several, the one with smaller coordinates."""
     if not path.states:
         return 0
-    moved = np.linalg.norm(path.states[-1].displacement, axis=1)
+    # A node whose motion is prescribed in full tells nothing of the model.
+    told = path.problem.loading.held.all(axis=1)
+    moved = np.linalg.norm(path.states[-1].displacement, axis=1) * (told.all() | ~told)
     ties = np.flatnonzero(moved >= moved.max() * (1 - 1e-9))
     return int(min(ties, key=lambda node: tuple(path.problem.mesh.nodes[node])))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
+from truespring.models.fem import element_matrices
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs
 from truespring.problem import Problem
@@ -25,6 +26,7 @@ class Moduli:
         young_wanted, poisson_wanted: what a test within the plane would find on the material [Pa], [-];
             in plane strain E / (1 - nu^2) and nu / (1 - nu).
         bending: EI of a strip n elements deep, bent along x, over that of the material; n to factor.
+        fem_bending: the same of linear finite elements on this mesh: the error of the reference itself.
         depth: the number of elements through the depth (y) of this mesh, None where it is no lattice.
     """
 
@@ -32,6 +34,7 @@ class Moduli:
     young_wanted: float
     poisson_wanted: float
     bending: MappingProxyType[int, float]
+    fem_bending: MappingProxyType[int, float]
     depth: int | None
 
     @cached_property
@@ -85,8 +88,15 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
         raise ModelError("these springs do not resist every strain: edges and diagonals must both carry")
     young, poisson = section.plane_moduli(material)
     depth = _lattice_depth(problem)
-    factors = {n: _bending_factor(problem, springs, n) for n in (*DEPTHS, depth or 1)} if depth else {}
-    return Moduli(elasticity, young, poisson, MappingProxyType(factors), depth)
+    depths = sorted({*DEPTHS, depth}) if depth else []
+    return Moduli(
+        elasticity=elasticity,
+        young_wanted=young,
+        poisson_wanted=poisson,
+        bending=MappingProxyType({n: _bending_factor(problem, _spring_rows(problem, springs, n)) for n in depths}),
+        fem_bending=MappingProxyType({n: _bending_factor(problem, [element_matrices(problem)[0]] * n) for n in depths}),
+        depth=depth,
+    )
 
 
 def _link_vectors(problem: Problem) -> Floats:
@@ -102,49 +112,58 @@ def _lattice_depth(problem: Problem) -> int | None:
     across = _link_vectors(problem)
     same = np.abs(across - across[:1]).max() <= 1e-6 * np.abs(across).max()
     upright = abs(across[0, 0, 1]) + abs(across[0, 1, 0]) <= 1e-6 * np.abs(across).max()
-    if not (same and upright):
+    if not (same and upright and across[0, 0, 0] > 0 and across[0, 1, 1] > 0):
         return None
     return round(float((mesh.upper - mesh.lower)[1] / across[0, 1, 1]))
 
 
-def _bending_factor(problem: Problem, springs: Springs, depth: int) -> float:
-    """EI of a strip `depth` elements deep under pure bending along x, over E t H^3 / 12 of the section.
+def _spring_rows(problem: Problem, springs: Springs, depth: int) -> list[Floats]:
+    """Return the element matrices [N/m] of a column of a strip, `depth` rows from bottom to top.
 
-    One column of the strip is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that
-    repeats from column to column and makes the energy least; EI is twice that energy by length.
-    On squares with summed sharing it is e0 (1 - 1/n^2) + 6 a / n^2 with e0 = E_0 / E.
+    With sharing "single" an edge between two elements belongs by half to each.
+    """
+    kind = problem.mesh.kind
+    stiffness = springs.element_stiffness(problem)[0]
+    across = _link_vectors(problem)[0]
+    direction = across / np.linalg.norm(across, axis=1)[:, None]
+    stencils = np.zeros((len(kind.links), len(kind.corners), problem.mesh.dim))
+    for stencil, (first, second), n in zip(stencils, kind.links, direction, strict=True):
+        stencil[first], stencil[second] = -n, n
+    flat = stencils.reshape(len(kind.links), -1)
+    rows = []
+    for row in range(depth):
+        share = np.ones(len(kind.links))
+        if springs.sharing == "single":
+            share = 1 / np.array(kind.sharing)
+            share[0] = 1.0 if row == 0 else share[0]
+            share[2] = 1.0 if row == depth - 1 else share[2]
+        rows.append(np.einsum("l,li,lj->ij", share * stiffness, flat, flat))
+    return rows
+
+
+def _bending_factor(problem: Problem, rows: list[Floats]) -> float:
+    """EI of a strip of elements under pure bending along x, over E t H^3 / 12 of the material in its section.
+
+    `rows` are the matrices of a column of elements. It is bent to unit curvature, u = (-x y, x^2 / 2),
+    plus a displacement that repeats from column to column and makes the energy least; EI is twice
+    that energy by length. For springs on squares with summed sharing it is
+    e0 (1 - 1/n^2) + 6 a / n^2, e0 = E_0 / E.
     """
     material, section = require_body(problem)
     mesh = problem.mesh
-    stiffness = springs.element_stiffness(problem)[0]
-    corner = mesh.nodes[mesh.elements[0]] - mesh.nodes[mesh.elements[0, 0]]
-    width, height = corner[2]
+    width, height = (mesh.nodes[mesh.elements[0]] - mesh.nodes[mesh.elements[0, 0]])[2]
+    depth = len(rows)
     levels = (np.arange(depth + 1) - depth / 2) * height
-    springs_of_column: dict[tuple[int, int, int], list[float]] = {}
-    for row in range(depth):
-        for (first, second), k in zip(mesh.kind.links, stiffness, strict=True):
-            ends = sorted(
-                (round(corner[node, 0] / width), row + round(corner[node, 1] / height)) for node in (first, second)
-            )
-            (column_a, a), (column_b, b) = ends
-            # Both uprights of a column are the same spring of the repeating strip.
-            springs_of_column.setdefault((a, b, column_b - column_a), []).append(float(k))
-    rows, weights = [], []
-    for (a, b, step), parts in springs_of_column.items():
-        k = sum(parts) if springs.sharing == "summed" else float(np.mean(parts))
-        across = np.array([step * width, levels[b] - levels[a]])
-        n = across / np.linalg.norm(across)
-        bent = np.array([-step * width * levels[b], step * width**2 / 2])
-        elongation = np.zeros(2 * (depth + 1) + 1)
-        elongation[2 * b : 2 * b + 2] += n
-        elongation[2 * a : 2 * a + 2] -= n
-        elongation[-1] = n @ bent
-        rows.append(elongation)
-        weights.append(k)
-    system, weight = np.array(rows), np.array(weights)
-    matrix = system.T @ (weight[:, None] * system)
-    free = -np.linalg.pinv(matrix[:-1, :-1], rcond=1e-10, hermitian=True) @ matrix[:-1, -1]
+    n_free = 2 * (depth + 1)
+    energy = np.zeros((n_free + 1, n_free + 1))
+    for row, matrix in enumerate(rows):
+        # Corners anticlockwise: each moves with its level, those on the right by the bending besides.
+        moved = np.zeros((8, n_free + 1))
+        for corner, (on_right, level) in enumerate(((0, row), (1, row), (1, row + 1), (0, row + 1))):
+            moved[2 * corner : 2 * corner + 2, 2 * level : 2 * level + 2] = np.eye(2)
+            moved[2 * corner : 2 * corner + 2, -1] = on_right * np.array([-width * levels[level], width**2 / 2])
+        energy += moved.T @ matrix @ moved
+    free = -np.linalg.pinv(energy[:-1, :-1], rcond=1e-10, hermitian=True) @ energy[:-1, -1]
     unit = np.append(free, 1.0)
-    energy_twice = float(unit @ matrix @ unit)
     young, _ = section.plane_moduli(material)
-    return float(energy_twice / width / (young * section.thickness * (depth * height) ** 3 / 12))
+    return float(unit @ energy @ unit / width / (young * section.thickness * (depth * height) ** 3 / 12))

@@ -50,7 +50,8 @@ def moduli_values(moduli: Moduli) -> dict[str, Any]:
         "anisotropy": moduli.zener,
         "young_45": moduli.young(45),
         "poisson_45": moduli.poisson(45),
-        "bending_factor": {str(depth): factor for depth, factor in sorted(moduli.bending.items())},
+        "bending_factor": {str(depth): factor for depth, factor in moduli.bending.items()},
+        "fem_bending_factor": {str(depth): factor for depth, factor in moduli.fem_bending.items()},
     }
 
 
@@ -61,6 +62,8 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
         "max_error": comparison.max_error,
         "agrees_up_to_load_factor": comparison.agrees_up_to_load_factor,
     }
+    if comparison.force_error is not None:
+        values["force_error"] = comparison.force_error
     if (surface := comparison.surface) is not None:
         values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
         values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
