@@ -21,9 +21,11 @@ models = {
 
 def main() -> dict[str, ts.Comparison]:
     newton = ts.Newton(load_steps=10)
-    probe = ts.named_point(problem.mesh, "right-middle")
     springs = ts.solve(problem, ts.Springs(rule="lloyd"), newton)
-    return {name: ts.compare(springs, ts.solve(problem, model, newton), probe=probe) for name, model in models.items()}
+    return {
+        name: ts.compare(springs, ts.solve(problem, model, newton), probe="right-middle")
+        for name, model in models.items()
+    }
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ ALLOWED = {
     "report": {"compare", "equilibrium", "models", "potential", "problem", "mesh", "material"},
     "compare": {"equilibrium", "mesh"},
     "reference": {"equilibrium", "problem", "mesh", "units"},
-    "equilibrium": {"models", "solvers", "potential", "problem", "mesh"},
+    "equilibrium": {"models", "solvers", "potential", "problem", "mesh", "material"},
     "models": {"potential", "problem", "mesh", "material"},
     "solvers": {"potential"},
     "problem": {"potential", "mesh", "material"},

@@ -20,7 +20,10 @@ from truespring.mesh import Plane as Plane
 from truespring.mesh import named_point as named_point
 from truespring.mesh import nearest_node as nearest_node
 from truespring.mesh import rectangle as rectangle
+from truespring.models import LAWS as LAWS
+from truespring.models import RULES as RULES
 from truespring.models import Fem as Fem
+from truespring.models import Moduli as Moduli
 from truespring.models import SpringNetwork as SpringNetwork
 from truespring.models import Springs as Springs
 from truespring.models import UserStiffness as UserStiffness
@@ -29,3 +32,35 @@ from truespring.problem import Fixed as Fixed
 from truespring.problem import Force as Force
 from truespring.problem import Problem as Problem
 from truespring.solvers import Newton as Newton
+
+__all__ = [
+    "LAWS",
+    "RULES",
+    "Box",
+    "Comparison",
+    "Fem",
+    "Fixed",
+    "Force",
+    "Material",
+    "Mesh",
+    "Moduli",
+    "Near",
+    "Newton",
+    "Path",
+    "Plane",
+    "PlaneStrain",
+    "PlaneStress",
+    "Problem",
+    "SpringNetwork",
+    "Springs",
+    "State",
+    "Status",
+    "TruespringError",
+    "UserStiffness",
+    "compare",
+    "moduli",
+    "named_point",
+    "nearest_node",
+    "rectangle",
+    "solve",
+]

@@ -121,18 +121,18 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
         summaries = {result.stem: summary(result) for result in results}
         _print_json(summaries if len(results) > 1 else summaries[results[0].stem])
     for result in results:
-        _say_failures(result, options.out)
+        _say_failures(result, options.out, shown=not console.quiet)
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
 
 
-def _say_failures(result: "Result", out: Path) -> None:
-    """Name on standard error what did not converge, with the last good level and what to try."""
+def _say_failures(result: "Result", out: Path, shown: bool) -> None:
+    """Name on standard error what did not converge and, unless `shown` already, why and what to try."""
     for name, path in result.paths.items():
         if str(path.status) != "converged":
             print(  # noqa: T201
                 f"truespring: {result.stem}: model '{name}' is {path.status}; "
                 f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
-                *(f"truespring:   {warning}" for warning in path.warnings),
+                *(f"truespring:   {warning}" for warning in path.warnings if not shown),
                 sep="\n",
                 file=sys.stderr,
             )
@@ -168,7 +168,7 @@ def _print_json(value: Any) -> None:
 def _console(options: argparse.Namespace) -> "Console":
     from rich.console import Console
 
-    return Console(quiet=options.quiet or options.json, highlight=False)
+    return Console(quiet=options.quiet or options.json, highlight=False, markup=False, emoji=False)
 
 
 @contextmanager
@@ -193,11 +193,17 @@ def _progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float
 
 def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
-    force = ", ".join(f"{component:g}" for component in plan["total_force"])
-    console.print(f"[bold]{plan['title']}[/bold]")
+    material, section = plan["material"], plan["section"]
+    size = " by ".join(f"{extent:g} m" for extent in plan["size"])
+    console.print(f"{plan['title']}\n{size}, {section['kind']}, thickness {section['thickness']:g} m")
+    console.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
     console.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
     console.print(f"held nodes: {held}")
-    console.print(f"total force ({force}) N in {plan['load_steps']} load steps")
+    force = ", ".join(f"{component:g}" for component in plan["total_force"])
+    motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
+    console.print(f"total force ({force}) N{motion}, in {plan['load_steps']} load steps")
+    probe = "the node that moves most" if plan["probe"] is None else f"the node at {plan['probe']} m"
+    console.print(f"probe: {probe}")
     for name, model in plan["models"].items():
         console.print(f"  {name}: {model['label']}", *(f"\n    warning: {text}" for text in model.get("warnings", ())))
     compare = plan["compare"]

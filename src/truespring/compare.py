@@ -8,7 +8,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.equilibrium import Path, State
 from truespring.errors import ProblemError
-from truespring.mesh import SurfaceDistance, surface_distance
+from truespring.mesh import SurfaceDistance, named_point, surface_distance
 
 #: What "agrees" means where nothing else is said: an rms error of 5 %.
 TOLERANCE = 0.05
@@ -93,17 +93,25 @@ class Comparison:
         return f"{self.model.label} against {self.reference.label}: {self.rms_error:.1%} rms at full load{within}"
 
 
-def compare(model: Path, reference: Path, probe: int | None = None, tolerance: float = TOLERANCE) -> Comparison:
+def compare(
+    model: Path,
+    reference: Path,
+    probe: int | str | None = None,
+    tolerance: float = TOLERANCE,
+) -> Comparison:
     """Compare two paths of one problem at the loaded levels that both have.
 
-    `probe` is a node number, by default the node of `model` that moves most. Raises ProblemError
-    where the paths are not of the same mesh.
+    `probe` is a node number or a named point such as "right-middle", by default the node of `model`
+    that moves most. Raises ProblemError where the paths are not of the same mesh, MeshError where
+    there is no such point.
     """
     nodes = model.problem.mesh.nodes
     if nodes.shape != reference.problem.mesh.nodes.shape or not np.allclose(
         nodes, reference.problem.mesh.nodes, rtol=0, atol=1e-9 * model.problem.mesh.diameter
     ):
         raise ProblemError("only paths on the same nodes can be compared")
+    if isinstance(probe, str):
+        probe = named_point(model.problem.mesh, probe)
     watched = most_moved(model) if probe is None else probe
     pairs = [(state, reference.at(state.load_factor)) for state in model.states if state.load_factor > 0]
     both = [(mine, theirs) for mine, theirs in pairs if theirs is not None]

@@ -9,6 +9,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
+from truespring.material import PlaneStrain
 from truespring.mesh import Surface
 from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, moduli
 from truespring.potential import Potential, Stretched
@@ -32,15 +33,14 @@ class Status(StrEnum):
 
 _ADVICE = {
     Status.CONVERGED: "every load level ended at a stable equilibrium",
-    Status.UNSTABLE: "an equilibrium is unstable: a real body would leave it; add a small imperfection or load less",
-    Status.INVERTED: "an element is turned inside out: load less, refine the mesh, or take a law with a barrier "
-    "(neo-hookean)",
-    Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached: load less, take more load_steps, "
-    "or another law; St. Venant-Kirchhoff gives way in compression, Hencky has a largest load in tension",
+    Status.UNSTABLE: "a real body would leave such a state; load less, or add a small side force to choose a branch",
+    Status.INVERTED: "an element is turned inside out; load less or refine the mesh",
+    Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; load less, take more load_steps, "
+    "or another law: each bears a largest load",
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class State:
     """An equilibrium of a body.
 
@@ -70,6 +70,12 @@ class State:
     area_ratio: float
     stretch: tuple[float, float] | None
     snapped: bool = False
+
+    def __repr__(self) -> str:
+        return (
+            f"State(load_factor={self.load_factor:g}, energy={self.energy:.6g} J, iterations={self.iterations}, "
+            f"negative_eigenvalues={self.negative_eigenvalues}, area_ratio={self.area_ratio:.3g}, stretch={self.stretch})"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,6 +154,8 @@ def solve(
     problem then needs no material). A failure is not an exception: see Path.status and Path.best.
     Raises ModelError where the model does not fit the problem.
     """
+    if not isinstance(model, Potential) and not hasattr(model, "potential"):
+        raise ModelError(f"{model!r} is no model: give Springs(rule=...), Fem(law=...) or a SpringNetwork")
     started = time.perf_counter()
     potential = model if isinstance(model, Potential) else model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape:
@@ -213,13 +221,20 @@ def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]
     if realised is None:
         return ()
     young, poisson = realised.young(), realised.poisson()
-    differs = abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01
-    if not differs:
-        return ()
-    return (
-        f"these springs realise Young's modulus {young:.6g} Pa and Poisson's ratio {poisson:.4g} along x; the material "
-        f"in its section has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}",
-    )
+    warnings = []
+    if abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01:
+        explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
+        warnings.append(
+            f"these springs realise Young's modulus {young:.6g} Pa and Poisson's ratio {poisson:.4g} along x; the "
+            f"material in its section has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
+        )
+    factor = realised.bending[realised.depth] if realised.depth else 1.0
+    if abs(factor - 1) > 0.05:
+        warnings.append(
+            f"bent along x, {realised.depth} elements deep, these springs have {factor:.4g} times the bending "
+            "stiffness EI of the material"
+        )
+    return tuple(warnings)
 
 
 def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) -> tuple[str, ...]:
@@ -227,21 +242,22 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
     if best is not None:
         last = f"{states[-1].load_factor:.6g}" if states else "none"
         warnings.append(
-            f"no equilibrium found at load factor {best.load_factor:.6g} (relative residual {best.residual:.1e}); "
+            f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
             f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]
     if inverted:
         advice = "a linear model does not notice" if linear else Status.INVERTED.advice
         warnings.append(
-            f"an element is inverted from load factor {inverted[0].load_factor:.6g} on "
+            f"inverted from load factor {inverted[0].load_factor:.6g} on "
             f"(smallest area ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
         )
     unstable = [state for state in states if state.negative_eigenvalues]
     if unstable:
+        count = unstable[0].negative_eigenvalues
         warnings.append(
-            f"the equilibrium at load factor {unstable[0].load_factor:.6g} is unstable "
-            f"({unstable[0].negative_eigenvalues} negative eigenvalues of the tangent): {Status.UNSTABLE.advice}"
+            f"unstable at load factor {unstable[0].load_factor:.6g} ({count} negative "
+            f"eigenvalue{'s' if count != 1 else ''} of the tangent): {Status.UNSTABLE.advice}"
         )
     branched = [state for state in states if state.branched]
     if branched:

@@ -20,6 +20,10 @@ class ProblemError(TruespringError):
     """What is asked cannot be solved as it stands: supports, loads, material or section."""
 
 
+class NoLoadError(ProblemError):
+    """Nothing loads the body."""
+
+
 class ModelError(TruespringError):
     """A model cannot be built for this problem: an unknown rule or law, or one that does not fit."""
 

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.errors import ProblemError
+from truespring.errors import NoLoadError, ProblemError
 from truespring.material import Material, Section
 from truespring.mesh import Mesh, Selection, select, shares
 from truespring.mesh.selections import AXES
@@ -18,6 +19,7 @@ from truespring.potential import Loading
 class Fixed:
     """A support: the directions `fix` of the nodes `on` are held (all of them by default).
 
+    `on` is a side ("left", "right", "bottom", "top"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
     `displacement` [m], one value a direction, moves them instead; it scales with the load factor.
     """
 
@@ -28,7 +30,10 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Force:
-    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`."""
+    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`.
+
+    `on` is a side ("left", "right", "bottom", "top"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
+    """
 
     on: Selection
     total: Sequence[float]
@@ -50,13 +55,13 @@ class Problem:
     loads: Sequence[Force] = field(default=())
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "supports", tuple(self.supports))
-        object.__setattr__(self, "loads", tuple(self.loads))
+        object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports"))
+        object.__setattr__(self, "loads", _several(self.loads, Force, "loads"))
         if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
         loading = self.loading
         if not loading.external_force.any() and not loading.displacement.any():
-            raise ProblemError("nothing loads the body: give a load, or a support with a displacement that is not zero")
+            raise NoLoadError("nothing loads the body: give a load, or a support with a displacement that is not zero")
         self._refuse_rigid_motion()
 
     @cached_property
@@ -109,6 +114,14 @@ class Problem:
         )
 
 
+def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:
+    """Return one or several of a kind as a tuple."""
+    several = (given,) if isinstance(given, kind) else given
+    if not isinstance(several, Sequence) or not all(isinstance(one, kind) for one in several):
+        raise ProblemError(f"{name} = {given!r}: a list of {kind.__name__} is wanted")
+    return tuple(several)
+
+
 def rigid_body_modes(nodes: Floats) -> Floats:
     """Return translations, then infinitesimal rotations about the centre, shape (n_dof, 3 or 6), each of size 1."""
     n_nodes, dim = nodes.shape
@@ -124,7 +137,10 @@ def rigid_body_modes(nodes: Floats) -> Floats:
 
 
 def _components(values: Sequence[float], dim: int, name: str, unit: str) -> Floats:
-    components = np.array([float(value) for value in values])
+    try:
+        components = np.array([float(value) for value in values])
+    except (TypeError, ValueError):
+        raise ProblemError(f"{name} = {values!r}: one number [{unit}] a direction is wanted") from None
     if len(components) != dim:
         raise ProblemError(
             f"{name} = {list(values)} [{unit}] has {len(components)} values, the body has {dim} directions"

@@ -55,9 +55,7 @@ def _parse(text: str, unit: str, allowed: str) -> float:
     except pint.DimensionalityError as error:
         found = "has no unit" if str(error.units1) == "dimensionless" else f"is in {error.units1}, not in {unit}"
         raise TruespringError(f"'{text}' {found}: {allowed}") from None
-    except pint.UndefinedUnitError as error:
-        raise TruespringError(
-            f"'{text}' has an unknown unit '{error.unit_names}' (upper and lower case matter): {allowed}"
-        ) from None
+    except pint.UndefinedUnitError:
+        raise TruespringError(f"'{text}' has an unknown unit (upper and lower case matter): {allowed}") from None
     except Exception:  # pint passes on whatever its parser met: tokenize, arithmetic, attribute errors
         raise TruespringError(f"'{text}' cannot be read: {allowed}") from None

@@ -105,9 +105,12 @@ def _box(mesh: Mesh, lower: tuple[float, ...], upper: tuple[float, ...]) -> Ints
 
 
 def _numbers(mesh: Mesh, numbers: Sequence[int]) -> Ints:
-    found = np.unique(np.asarray(numbers))
+    found = np.unique(np.asarray(numbers)) if isinstance(numbers, Sequence | np.ndarray) else np.zeros(0)
     if not found.size or not np.issubdtype(found.dtype, np.integer):
-        raise MeshError(f"{numbers!r} selects no node: give node numbers, a side, a plane, a box or a point")
+        raise MeshError(
+            f"{numbers!r} selects no node: give a side such as 'left', a point such as 'right-middle', "
+            "Plane('x', 0.0), Box((0.0, 0.0), (1.0, 1.0)), Near((0.0, 0.0)) or node numbers"
+        )
     if found[0] < 0 or found[-1] >= mesh.n_nodes:
         raise MeshError(f"node {found[0] if found[0] < 0 else found[-1]} does not exist: 0 to {mesh.n_nodes - 1}")
     return found

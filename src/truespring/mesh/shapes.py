@@ -56,4 +56,7 @@ def refuse_too_large(n_nodes: int) -> None:
 def _pair(values: Sequence[float], name: str) -> tuple[float, float]:
     if len(values) != 2:
         raise MeshError(f"{name} = {list(values)}: a rectangle takes two values, along x and y")
-    return float(values[0]), float(values[1])
+    try:
+        return float(values[0]), float(values[1])
+    except (TypeError, ValueError):
+        raise MeshError(f"{name} = {list(values)}: numbers are wanted, lengths in metres") from None

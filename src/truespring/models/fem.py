@@ -22,7 +22,7 @@ _SKFEM = {"quadrilateral": (MeshQuad, ElementQuad1, 3)}
 
 @dataclass(frozen=True)
 class Fem:
-    """The finite element model with the constitutive `law`, a key of LAWS."""
+    """The finite element model with the constitutive `law`: linear, saint-venant-kirchhoff, neo-hookean or hencky."""
 
     law: str
 

@@ -17,7 +17,7 @@ from truespring.problem import Problem
 DEPTHS = (1, 2, 3, 4, 6, 8)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Moduli:
     """Effective linear moduli of a plane spring lattice, beside those of the material in its section.
 
@@ -36,6 +36,12 @@ class Moduli:
     bending: MappingProxyType[int, float]
     fem_bending: MappingProxyType[int, float]
     depth: int | None
+
+    def __repr__(self) -> str:
+        return (
+            f"Moduli(young={self.young():.6g} Pa, poisson={self.poisson():.4g}, young(45)={self.young(45):.6g} Pa, "
+            f"poisson(45)={self.poisson(45):.4g}, zener={self.zener:.4g})"
+        )
 
     @cached_property
     def _compliance(self) -> Floats:

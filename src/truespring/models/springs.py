@@ -128,7 +128,7 @@ class Springs:
     """The mass-spring model: every element's edges and diagonals carry springs.
 
     Attributes:
-        rule: a key of RULES, how stiffness follows from the material.
+        rule: how stiffness follows from the material: lloyd, isotropic, least-squares or projected (see RULES).
         stiffness: numbers of the user's own instead of a rule, in units of thickness times Young's modulus.
         sharing: "summed" adds the springs of elements that share a pair of nodes,
             "single" takes one spring a pair (their mean).
@@ -143,6 +143,8 @@ class Springs:
     def __post_init__(self) -> None:
         if (self.rule is None) == (self.stiffness is None):
             raise ModelError(f"springs take either a rule ({', '.join(RULES)}) or a stiffness of your own")
+        if self.stiffness is not None and not isinstance(self.stiffness, UserStiffness):
+            raise ModelError(f"stiffness = {self.stiffness!r}: give UserStiffness(edge=..., diagonal=...)")
         if self.rule is not None and self.rule not in RULES:
             raise ModelError(f"rule = '{self.rule}' is unknown{nearest(self.rule, RULES)}; allowed: {', '.join(RULES)}")
         if self.sharing not in ("summed", "single"):

@@ -1,61 +1,74 @@
 """Deformed bodies as files: a VTU series for ParaView and an STL of the last state."""
 
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.equilibrium import Path, State
+from truespring.mesh import Surface
 from truespring.potential import Visible
+
+if TYPE_CHECKING:
+    import meshio
 
 
 def write_series(path: Path, folder: FilePath, name: str) -> None:
     """Write NAME.pvd and, in the folder NAME beside it, one .vtu a state; SI units.
 
-    Points carry displacement and reaction; cells what their potential tells: tension, stretch and
-    strain energy of springs, stress and strain energy of elements. A state that is no equilibrium
-    (Path.best) is left out.
+    Points stand where they were at rest, as is the custom: ParaView's "Warp By Vector" moves them.
+    They carry displacement and reaction; cells what their potential tells: tension, stretch,
+    stiffness and strain energy of springs, stress and strain energy of elements. Of a path that is
+    no more than a surface, the surface. A state that is no equilibrium (Path.best) is left out.
     """
     levels = folder / name
     levels.mkdir(parents=True, exist_ok=True)
     for old in levels.glob(f"{name}_*.vtu"):
         old.unlink()
+    bodies = [(state.load_factor, _state_mesh(path, state)) for state in path.states]
+    if not bodies and path.surface is not None:
+        bodies = [(path.surface.load_factor, _surface_mesh(path.surface))]
     entries = []
-    for number, state in enumerate(path.states):
+    for number, (load_factor, body) in enumerate(bodies):
         file = levels / f"{name}_{number:04d}.vtu"
-        _write_state(path, state, file)
-        entries.append(f'<DataSet timestep="{state.load_factor!r}" file={quoteattr(f"{name}/{file.name}")}/>')
+        body.write(file, file_format="vtu")
+        entries.append(f'<DataSet timestep="{load_factor!r}" file={quoteattr(f"{name}/{file.name}")}/>')
     collection = "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries])
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
 
 
-def _write_state(path: Path, state: State, file: FilePath) -> None:
+def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
     import meshio
 
     mesh = path.problem.mesh
     visible = path.potential if isinstance(path.potential, Visible) else None
     kind, cells = visible.cells if visible else (mesh.kind.vtk, mesh.elements)
     fields = visible.cell_fields(state.positions) if visible else {}
-    meshio.Mesh(
-        _in_space(mesh.nodes + state.displacement),
+    return meshio.Mesh(
+        _in_space(mesh.nodes),
         [(kind, cells)],
         point_data={"displacement": _in_space(state.displacement), "reaction": _in_space(state.reaction)},
         cell_data={field: [values] for field, values in fields.items()},
-    ).write(file, file_format="vtu")
+    )
+
+
+def _surface_mesh(surface: Surface) -> "meshio.Mesh":
+    import meshio
+
+    return meshio.Mesh(_in_space(surface.points), [("triangle", surface.triangles)])
 
 
 def write_stl(path: Path, file: FilePath) -> None:
     """Write the body of the last state as binary STL [m], in the plane z = 0; nothing where there is no body."""
-    import meshio
-
     if path.surface is not None:
-        points, triangles = path.surface.points, path.surface.triangles
+        surface = path.surface
     elif path.states and path.problem.mesh.element != "line":
-        points, triangles = path.states[-1].positions, _split(path.problem.mesh.elements)
+        surface = Surface(path.states[-1].positions, _split(path.problem.mesh.elements))
     else:
         return
-    meshio.Mesh(_in_space(points), [("triangle", triangles)]).write(file, file_format="stl", binary=True)
+    _surface_mesh(surface).write(file, file_format="stl", binary=True)
 
 
 def _split(quadrilaterals: Ints) -> Ints:

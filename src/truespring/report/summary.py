@@ -15,13 +15,14 @@ def summary(result: Result) -> dict[str, Any]:
     return {
         "title": result.title,
         "truespring": version("truespring"),
-        "models": {name: _model(path) for name, path in result.paths.items()},
+        "models": {name: _model(path, result.probe) for name, path in result.paths.items()},
+        "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
         "comparison": {name: _comparison(one) for name, one in result.comparisons.items()},
         "closest": result.closest,
     }
 
 
-def _model(path: Path) -> dict[str, Any]:
+def _model(path: Path, probe: int) -> dict[str, Any]:
     last = path.states[-1] if path.states else None
     values = {
         "kind": path.kind,
@@ -32,6 +33,8 @@ def _model(path: Path) -> dict[str, Any]:
         "seconds": path.seconds,
         "n_nodes": path.problem.mesh.n_nodes,
         "n_unknowns": int((~path.problem.loading.held).sum()),
+        "probe_displacement": last.displacement[probe].tolist() if last else None,
+        "force": path.applied_force(last).tolist() if last else None,
         "residual": _known(last.residual) if last else None,
         "negative_eigenvalues": last.negative_eigenvalues if last else None,
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),

@@ -13,17 +13,18 @@ if TYPE_CHECKING:
 
 def moduli_table(title: str, moduli: Moduli) -> "Table":
     """Return what springs realise beside what the material has in its section."""
-    table = _table(title, "", "springs", "material")
+    table = _table(title, "", "springs", "four-node FEM", "material")
     young, poisson = f"{moduli.young_wanted:.6g}", f"{moduli.poisson_wanted:.4f}"
-    table.add_row("Young's modulus at 0 degrees [Pa]", f"{moduli.young():.6g}", young)
-    table.add_row("Young's modulus at 45 degrees [Pa]", f"{moduli.young(45):.6g}", young)
-    table.add_row("Poisson's ratio at 0 degrees", f"{moduli.poisson():.4f}", poisson)
-    table.add_row("Poisson's ratio at 45 degrees", f"{moduli.poisson(45):.4f}", poisson)
-    table.add_row("Zener ratio", f"{moduli.zener:.4f}", "1.0000")
-    for depth, factor in sorted(moduli.bending.items()):
+    table.add_row("Young's modulus at 0 degrees [Pa]", f"{moduli.young():.6g}", young, young)
+    table.add_row("Young's modulus at 45 degrees [Pa]", f"{moduli.young(45):.6g}", young, young)
+    table.add_row("Poisson's ratio at 0 degrees", f"{moduli.poisson():.4f}", poisson, poisson)
+    table.add_row("Poisson's ratio at 45 degrees", f"{moduli.poisson(45):.4f}", poisson, poisson)
+    table.add_row("Zener ratio", f"{moduli.zener:.4f}", "1.0000", "1.0000")
+    for depth, factor in moduli.bending.items():
         elements = "element" if depth == 1 else "elements"
         here = " (this mesh)" if depth == moduli.depth else ""
-        table.add_row(f"bending factor EI, {depth} {elements} deep{here}", f"{factor:.4f}", "1.0000")
+        fem = f"{moduli.fem_bending[depth]:.4f}"
+        table.add_row(f"bending factor EI, {depth} {elements} deep{here}", f"{factor:.4f}", fem, "1.0000")
     return table
 
 
@@ -43,9 +44,11 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
 
 
 def _error_table(result: Result) -> "Table":
-    table = _table(f"'{result.model}' against", "reference", "", "probe", "rms", "largest", "agrees up to")
+    forced = any(one.force_error is not None for one in result.comparisons.values())
+    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to")
+    table = _table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
-        errors = (one.probe_error, one.rms_error, one.max_error)
+        errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
         shown = ("-" if error is None else f"{error:.2%}" for error in errors)
         up_to = one.agrees_up_to_load_factor
         table.add_row(name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}")

@@ -18,14 +18,14 @@ def stabilised(balance: Balance, found: Found) -> Found:
         if not found.state.converged or not found.state.negative_eigenvalues:
             break
         left = _escaped(balance, found)
-        if left is None:
-            break
+        if left.state.positions is found.state.positions:
+            return left
         found = left
     return found
 
 
-def _escaped(balance: Balance, unstable: Found) -> Found | None:
-    """Leave an unstable equilibrium along its mode, to the side of lower energy; None where that fails.
+def _escaped(balance: Balance, unstable: Found) -> Found:
+    """Leave an unstable equilibrium along its mode, to the side of lower energy; stay there where that fails.
 
     Undamped Newton is tried from states x + a v + w far along the mode v, where w takes the stretch out
     that a v makes in a slender body: H w = -(g(x + a v) + g(x - a v) - 2 g(x)) / 2, the second order of
@@ -56,4 +56,4 @@ def _escaped(balance: Balance, unstable: Found) -> Found | None:
         lower = found.state.converged and balance.total_energy(found.state.positions, level)[0] < energy
         if lower and (not leaping or found.state.negative_eigenvalues == 0):
             return found._replace(state=replace(found.state, iterations=spent, branched=True))
-    return None
+    return unstable._replace(state=replace(state, iterations=spent))

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from truespring.equilibrium import Path
-from truespring.errors import StudyError, TruespringError, close_words, nearest
+from truespring.errors import NoLoadError, StudyError, TruespringError, close_words, nearest
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
 from truespring.mesh import Mesh, Near, named_point, nearest_node, rectangle, select
 from truespring.models import Fem, Model, Springs, UserStiffness, moduli
@@ -128,8 +128,11 @@ class _Builder:
             with self.at("load", number, "on"):
                 select(mesh, load.on)
             loads.append(Force(load.on, load.force))
-        with self.at("support" if loads else "load"):
+        try:
             return Problem(mesh, material, section, supports, loads)
+        except TruespringError as error:
+            with self.at("load" if isinstance(error, NoLoadError) else "support"):
+                raise
 
     def entry(self, problem: Problem, name: str, table: Any) -> Model | Path:
         with self.at("models", name):

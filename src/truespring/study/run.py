@@ -1,16 +1,21 @@
 """Running studies: solve what a study asks, compare, and write what it leaves behind."""
 
+import dataclasses
 import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from truespring.compare import compare, most_moved
 from truespring.equilibrium import Path, model_warnings, solve
 from truespring.errors import StudyError
+from truespring.material import PlaneStress
 from truespring.mesh.selections import AXES
 from truespring.models import Fem, Moduli, Springs, moduli
+from truespring.problem import Problem
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
 from truespring.report.series import write_series, write_stl
@@ -82,6 +87,7 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
     """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures too."""
     folder = out / result.stem
     folder.mkdir(parents=True, exist_ok=True)
+    _clear(folder)
     write_curves(result, folder / "curves.csv")
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -94,6 +100,22 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
 
         save_figures(result, folder / "figures")
         write_page([result], folder / "report.html", _command([result], out))
+
+
+def _clear(folder: FilePath) -> None:
+    """Remove what a former run of the study left, so that no model of then stands beside those of now."""
+    try:
+        former = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["models"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    for name in former:
+        files = [folder / f"{name}.pvd", folder / f"deformed_{name}.stl", *(folder / name).glob(f"{name}_*.vtu")]
+        for file in [*files, *(folder / "figures").glob("*.png"), *(folder / "figures").glob("*.svg")]:
+            file.unlink(missing_ok=True)
+        for emptied in (folder / name, folder / "figures"):
+            if emptied.is_dir() and not any(emptied.iterdir()):
+                emptied.rmdir()
+    (folder / "report.html").unlink(missing_ok=True)
 
 
 def write_overview(results: Sequence[Result], out: FilePath) -> None:
@@ -109,19 +131,31 @@ def _command(results: Sequence[Result], out: FilePath) -> str:
 
 def plan(study: Study) -> dict[str, Any]:
     """Return what would be run, solving nothing: sizes, loads, supports, and what the springs realise."""
-    mesh, loading = study.problem.mesh, study.problem.loading
+    problem = study.problem
+    mesh, loading = problem.mesh, problem.loading
     return {
         "title": study.title,
+        "size": (mesh.upper - mesh.lower).tolist(),
         "n_nodes": mesh.n_nodes,
         "n_elements": len(mesh.elements),
+        "material": dataclasses.asdict(problem.material) if problem.material else None,
+        "section": _section(problem),
         "n_unknowns": int((~loading.held).sum()),
         "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
         "total_force": loading.external_force.sum(axis=0).tolist(),
+        "largest_motion": float(np.linalg.norm(loading.displacement, axis=1).max()),
         "load_steps": study.solver.load_steps,
         "models": {name: _entry_plan(study, entry) for name, entry in study.entries.items()},
         "compare": {"model": study.model, "references": list(study.references), "tolerance": study.tolerance},
         "probe": None if study.probe is None else mesh.nodes[study.probe].tolist(),
     }
+
+
+def _section(problem: Problem) -> dict[str, Any] | None:
+    if problem.section is None:
+        return None
+    kind = "plane-stress" if isinstance(problem.section, PlaneStress) else "plane-strain"
+    return {"kind": kind, "thickness": problem.section.thickness}
 
 
 def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
