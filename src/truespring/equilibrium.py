@@ -74,7 +74,7 @@ class State:
     def __repr__(self) -> str:
         return (
             f"State(load_factor={self.load_factor:g}, energy={self.energy:.6g} J, iterations={self.iterations}, "
-            f"negative_eigenvalues={self.negative_eigenvalues}, area_ratio={self.area_ratio:.3g}, stretch={self.stretch})"
+            f"negative_eigenvalues={self.negative_eigenvalues}, area_ratio={self.area_ratio:.3g})"
         )
 
 
