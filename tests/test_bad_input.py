@@ -92,6 +92,24 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
     "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
     "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, stl")),
+    "decimal comma": (('["0 N", "-0.01 N"]', '["0 N", "-0,01 N"]'), ("load.1.force.2", "-0,01 N", "comma")),
+    "blank in a number": (('["0 N", "-0.01 N"]', '["0 N", "1 000 N"]'), ("load.1.force.2", "1 000 N")),
+    "arithmetic in a number": (('["0 N", "-0.01 N"]', '["0 N", "9**9**9 N"]'), ("load.1.force.2", "9**9**9 N")),
+    "unit alone": (('["0 N", "-0.01 N"]', '["0 N", "N"]'), ("load.1.force.2", "'N'")),
+    "number beyond all": (('young = "10 kPa"', f"young = 1{'0' * 400}"), ("material.young", "finite")),
+    "stiffer than anything": (('young = "10 kPa"', "young = 1e300"), ("material.young", "1e+300", "range")),
+    "elements beyond all": (("elements = [8, 2]", f"elements = [1{'0' * 30}, 1]"), ("mesh.elements.1",)),
+    "motion of a free direction": (
+        ("[[load]]", '[[support]]\non = "right"\nfix = ["x"]\ndisplacement = ["1 mm", "-8 mm"]\n\n[[load]]'),
+        ("support", "along y", "leaves free"),
+    ),
+    "load on a held side": (('on = "right"', 'on = "left-top"'), ("load", "direction that is free")),
+    "model name of an output": (("[models.linear]", "[models.figures]"), ("models", "'figures'")),
+    "model names of one letter case": (("[models.linear]", "[models.SPRINGS]"), ("models", "'SPRINGS'")),
+    "springs that push where they are pulled": (
+        ('rule = "lloyd"', "stiffness = { edge = -0.05, diagonal = 0.5 }\nallow_negative = true"),
+        ("models.springs", "do not resist"),
+    ),
     "model name with a slash": (("[models.linear]", '[models."a/b"]'), ("models.a/b", "name")),
     "probe unknown": (('"right-middle"', '"right-mid"'), ("compare.probe", "did you mean 'right-middle'")),
     "probe of one number": (('"right-middle"', "[0.04]"), ("compare.probe", "coordinates")),
@@ -165,7 +183,7 @@ def test_two_studies_of_one_stem_are_refused(tmp_path: Path, capsys: pytest.Capt
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path)
     assert main(["verify", str(file), "--out", str(file)]) == 2
-    assert "folder is wanted" in capsys.readouterr().err
+    assert "cannot be written" in capsys.readouterr().err
 
 
 def test_what_only_solving_can_tell_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -174,6 +174,34 @@ def test_prescribed_motion_without_loads(tmp_path: Path) -> None:
     assert float(linear[-1]["fx"]) * 0.004 / 2 == pytest.approx(energy, rel=1e-9)
 
 
+def test_the_reaction_counts_every_held_direction_of_what_moves(tmp_path: Path) -> None:
+    """Both directions of the right side are held, one of them at rest: the curves tell the force on all of it."""
+    text = changed((MOVED[0], MOVED[1].replace('fix = ["x"]\n', "").replace('["4 mm", "0 mm"]', '["0 mm", "-8 mm"]')))
+    assert main(["solve", str(written(tmp_path, text)), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    table = [row for row in rows(tmp_path / "out" / "study" / "curves.csv") if row["model"] == "springs"]
+    last = meshio.read(tmp_path / "out" / "study" / "springs" / "springs_0002.vtu")
+    right = np.isclose(last.points[:, 0], 0.04)
+    force = last.point_data["reaction"][right].sum(axis=0)
+    assert force[0] > 0.1 * abs(force[1])
+    assert [float(table[-1]["fx"]), float(table[-1]["fy"])] == pytest.approx(force[:2], rel=1e-12)
+
+
+def test_results_of_a_former_run_are_cleared(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["verify", str(written(tmp_path)), "--out", str(out), "--quiet"]) == 0
+    (out / "study" / "notes.txt").write_text("mine", encoding="utf-8")
+    renamed = changed(("[models.linear]", "[models.hooke]"))
+    assert main(["solve", str(written(tmp_path, renamed)), "--out", str(out), "--quiet"]) == 0
+    names = {path.name for path in (out / "study").iterdir()}
+    assert "notes.txt" in names and "hooke.pvd" in names
+    assert not names & {"linear", "linear.pvd", "deformed_linear.stl", "figures", "report.html"}
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
+    file = written(tmp_path, "\ufeff" + changed(("[material]", "[ material ]")))
+    assert main(["check", str(file), "--quiet"]) == 0
+
+
 def test_a_failure_keeps_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """St. Venant-Kirchhoff bears no nominal stress below -E sqrt(3) / 9 in uniaxial compression; springs go on."""
     pressed = changed(

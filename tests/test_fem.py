@@ -258,3 +258,28 @@ def test_a_linear_path_is_linear_and_the_others_are_not(law: str) -> None:
     assert drift < 1e-9 if law == "linear" else drift > 1e-3
     if law == "linear":
         assert max(state.iterations for state in path.states) <= 1
+
+
+@pytest.mark.parametrize("poisson", [-0.9, -0.5, -0.2])
+@pytest.mark.parametrize("squeeze", [0.3, 0.6, 0.9, 1.3])
+def test_neo_hookean_plane_stress_has_a_thickness_or_no_energy(poisson: float, squeeze: float) -> None:
+    """Below zero there is no free thickness under strong compression: infinite energy, never a wrong stress."""
+    problem = ts.Problem(
+        ts.rectangle((1.0, 1.0), (1, 1)),
+        ts.Material(1.0, poisson),
+        ts.PlaneStress(1.0),
+        [ts.Fixed("left")],
+        [ts.Force("right", (1.0, 0.0))],
+    )
+    potential = ts.Fem("neo-hookean").potential(problem)
+
+    def energy(stretch: float) -> float:
+        return potential.energy(problem.mesh.nodes * stretch)
+
+    if not np.isfinite(energy(squeeze)):
+        assert squeeze < 0.9
+        return
+    step = 1e-5
+    slope = (energy(squeeze + step) - energy(squeeze - step)) / (2 * step)
+    forces = potential.gradient(problem.mesh.nodes * squeeze)
+    assert slope == pytest.approx((forces * problem.mesh.nodes).sum(), rel=1e-6)

@@ -219,3 +219,18 @@ def test_springs_with_other_moduli_than_the_material_say_so() -> None:
 def test_edges_without_diagonals_do_not_resist_shear() -> None:
     with pytest.raises(ts.TruespringError, match="every strain"):
         ts.moduli(block(), ts.Springs(stiffness=ts.UserStiffness(0.5, 0.0)))
+
+
+def test_what_differs_in_another_direction_only_is_said_too() -> None:
+    """These springs have the material's moduli along x (nu 0.2) and 0.625 E at 45 degrees."""
+    problem = ts.Problem(
+        ts.rectangle((4.0, 4.0), (4, 4)),
+        ts.Material(1.0, 0.2),
+        ts.PlaneStress(1.0),
+        [ts.Fixed("left")],
+        [ts.Force("right", (0.01, 0.0))],
+    )
+    path = ts.solve(problem, ts.Springs(stiffness=ts.UserStiffness(edge=5 / 12, diagonal=5 / 24)))
+    assert path.moduli is not None
+    assert path.moduli.young() == pytest.approx(1.0) and path.moduli.young(45) == pytest.approx(0.625)
+    assert any("0.625 Pa" in warning and "45 degrees" in warning for warning in path.warnings)

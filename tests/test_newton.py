@@ -389,3 +389,24 @@ def test_springs_unstable_without_load_are_not_loaded() -> None:
     assert path.status is ts.Status.UNSTABLE
     assert path.load_factor == 0.0
     assert np.linalg.eigvalsh(path.potential.hessian(problem.mesh.nodes).toarray())[0] < 0
+
+
+@pytest.mark.parametrize("model", [ts.Springs("isotropic"), ts.Fem("linear"), ts.Fem("saint-venant-kirchhoff")])
+@pytest.mark.parametrize("share", [1e-3, 1e-5, 1e-7])
+def test_a_slender_body_follows_a_load_that_nearly_drowns(model: ts.Springs | ts.Fem, share: float) -> None:
+    """Under tiny loads the answer is linear in them, though rounding of the positions makes forces as large."""
+    length, height = 1.0, 0.005
+    tip = share * length
+    problem = ts.Problem(
+        mesh=ts.rectangle((length, height), (400, 2)),
+        material=ts.Material(1e6, 1 / 3),
+        section=ts.PlaneStress(1.0),
+        supports=[ts.Fixed("left")],
+        loads=[ts.Force("right", (0.0, -3 * 1e6 * height**3 / 12 * tip))],
+    )
+    path = ts.solve(problem, model, ts.Newton(load_steps=4))
+    assert path.status is ts.Status.CONVERGED
+    moved = [-state.displacement[ts.named_point(problem.mesh, "right-middle"), 1] for state in path.states]
+    shares = np.array(moved[1:]) / moved[-1]
+    assert shares == pytest.approx([0.25, 0.5, 0.75, 1.0], rel=3e-3)
+    assert 0.5 * tip < moved[-1] < 1.1 * tip

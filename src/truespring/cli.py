@@ -97,9 +97,10 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.report.tables import moduli_table, result_tables
     from truespring.study import read_studies, realised_moduli, run, write, write_overview
 
-    if options.out.exists() and not options.out.is_dir():
-        raise TruespringError(f"--out {options.out}: is a file, a folder is wanted")
     studies = read_studies(options.study)
+    with _writing(options.out):  # before anything is solved
+        for study in studies:
+            (options.out / study.stem).mkdir(parents=True, exist_ok=True)
     console = _console(options)
     results = []
     for study in studies:
@@ -108,14 +109,13 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
         with _progress(options) as progress:
             result = run(study, progress, comparing)
         results.append(result)
-        try:
+        with _writing(options.out):
             write(result, options.out, report=comparing)
-        except OSError as error:
-            raise TruespringError(f"--out {options.out}: cannot be written: {error.strerror}") from None
         for part in result_tables(result):
             console.print(part)
     if comparing:
-        write_overview(results, options.out)
+        with _writing(options.out):
+            write_overview(results, options.out)
         console.print(f"report: {options.out / 'report.html'}", soft_wrap=True)
     if options.json:
         summaries = {result.stem: summary(result) for result in results}
@@ -123,6 +123,15 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     for result in results:
         _say_failures(result, options.out, shown=not console.quiet)
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
+
+
+@contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        place = error.filename or out
+        raise TruespringError(f"--out {out}: {place} cannot be written: {error.strerror}") from None
 
 
 def _say_failures(result: "Result", out: Path, shown: bool) -> None:

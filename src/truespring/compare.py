@@ -65,7 +65,12 @@ class Comparison:
     def force_error(self) -> float | None:
         """Difference over size of the reactions to a prescribed motion at full load; None where loads are given."""
         mine, theirs = self.model.at(1.0), self.reference.at(1.0)
-        if self.model.problem.loads or mine is None or theirs is None or self.reference.potential is None:
+        if (
+            not self.model.problem.loading.driven_by_motion
+            or mine is None
+            or theirs is None
+            or self.reference.potential is None
+        ):
             return None
         wanted = self.reference.applied_force(theirs)
         size = float(np.linalg.norm(wanted))

@@ -16,6 +16,9 @@ from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.solvers import Equilibrium, Newton, Reporter
 
+# A relative residual above this is worth a word; it can only come from loads that drown in rounding.
+_LOOSE = 1e-6
+
 
 class Status(StrEnum):
     """How a path ended; `advice` says what it means and what to try."""
@@ -116,8 +119,10 @@ class Path:
 
     @property
     def load_factor(self) -> float:
-        """The last load level reached."""
-        return self.states[-1].load_factor if self.states else 0.0
+        """The last load level reached; of a surface that was read, its own."""
+        if self.states:
+            return self.states[-1].load_factor
+        return self.surface.load_factor if self.surface else 0.0
 
     @property
     def complete(self) -> bool:
@@ -135,11 +140,16 @@ class Path:
         return self.states[found[0]] if found.size else None
 
     def applied_force(self, state: State) -> Floats:
-        """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion."""
+        """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion.
+
+        The reaction of all nodes that move with the largest motion, not against it: of two sides pulled
+        apart, one. Not a number where it is not known.
+        """
         loading = self.problem.loading
-        if self.problem.loads:
+        if not loading.driven_by_motion:
             return np.asarray(state.load_factor * loading.external_force.sum(axis=0))
-        return np.asarray((state.reaction * (loading.displacement != 0)).sum(axis=0))
+        largest = loading.displacement[np.linalg.norm(loading.displacement, axis=1).argmax()]
+        return np.asarray(state.reaction[loading.displacement @ largest > 0].sum(axis=0))
 
 
 def solve(
@@ -220,13 +230,18 @@ def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]
     """Return what should be known of springs before they are solved: moduli other than the material's."""
     if realised is None:
         return ()
-    young, poisson = realised.young(), realised.poisson()
     warnings = []
-    if abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01:
+    found = {angle: (realised.young(angle), realised.poisson(angle)) for angle in (0, 45, 90)}
+    if any(
+        abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01
+        for young, poisson in found.values()
+    ):
+        shown = {f"{young:.6g} Pa and {poisson:.4g}": angle for angle, (young, poisson) in reversed(found.items())}
+        said = ", ".join(f"{moduli} at {angle} degrees" for moduli, angle in reversed(shown.items()))
         explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
         warnings.append(
-            f"these springs realise Young's modulus {young:.6g} Pa and Poisson's ratio {poisson:.4g} along x; the "
-            f"material in its section has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
+            f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
+            f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
         )
     factor = realised.bending[realised.depth] if realised.depth else 1.0
     if abs(factor - 1) > 0.05:
@@ -240,7 +255,13 @@ def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]
 def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) -> tuple[str, ...]:
     warnings = []
     if best is not None:
-        last = f"{states[-1].load_factor:.6g}" if states else "none"
+        bad = [
+            state.load_factor
+            for state in states
+            if state.negative_eigenvalues or (state.area_ratio <= 0 and not linear)
+        ]
+        good = [state.load_factor for state in states if not bad or state.load_factor < bad[0]]
+        last = f"{good[-1]:.6g}" if good else "none"
         warnings.append(
             f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
             f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
@@ -271,6 +292,9 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
             f"just before load factor {snapped[0].load_factor:.6g} the body moved much further than the step before "
             "lets expect: it may have snapped past unstable states, which are not on the path; more load_steps tell"
         )
+    loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
+    if loose > _LOOSE:
+        warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load drowns in rounding")
     if any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent could not be found")
     return tuple(warnings)

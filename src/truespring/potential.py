@@ -103,6 +103,15 @@ class Loading:
     held: Bools
     displacement: Floats
 
+    def __post_init__(self) -> None:
+        for array in (self.external_force, self.held, self.displacement):
+            array.setflags(write=False)
+
+    @property
+    def driven_by_motion(self) -> bool:
+        """Whether nothing but prescribed displacements loads the body."""
+        return not self.external_force.any()
+
 
 class Pattern:
     """The fixed sparsity of a sum of small dense blocks, built once and filled many times."""

@@ -60,8 +60,11 @@ class Problem:
         if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
         loading = self.loading
-        if not loading.external_force.any() and not loading.displacement.any():
-            raise NoLoadError("nothing loads the body: give a load, or a support with a displacement that is not zero")
+        if not loading.external_force[~loading.held].any() and not loading.displacement.any():
+            held = " in a direction that is free" if loading.external_force.any() else ""
+            raise NoLoadError(
+                f"nothing loads the body{held}: give a load, or a support with a displacement that is not zero"
+            )
         self._refuse_rigid_motion()
 
     @cached_property
@@ -88,6 +91,12 @@ class Problem:
                 raise ProblemError(f"fix = {directions}: allowed are the directions {', '.join(axes)}")
             given = [0.0] * self.mesh.dim if support.displacement is None else support.displacement
             motion = _components(given, self.mesh.dim, "displacement", "m")
+            idle = [axis for axis, part in zip(axes, motion, strict=True) if part and axis not in directions]
+            if idle:
+                raise ProblemError(
+                    f"displacement = {list(given)} [m] moves along {', '.join(idle)}, "
+                    f"which fix = {directions} leaves free"
+                )
             nodes = select(self.mesh, support.on)
             for axis in (axes.index(direction) for direction in directions):
                 clash = nodes[held[nodes, axis] & (displacement[nodes, axis] != motion[axis])]

@@ -1,6 +1,7 @@
 """The border of units: "3 kPa" becomes 3000.0; inside everything is SI float64."""
 
 import math
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
@@ -18,6 +19,9 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "force": ("N", '"-0.043 N"'),
     "density": ("kg/m^3", '"1000 kg/m^3"'),
 }
+
+# Far beyond any body, and squares of it still are numbers.
+_SMALLEST, _LARGEST = 1e-30, 1e30
 
 
 @cache
@@ -38,24 +42,40 @@ def to_si(value: object, dimension: Dimension) -> float:
     if isinstance(value, str):
         number = _parse(value, unit, allowed)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
     else:
         raise TruespringError(f"{value!r} is not a {dimension}: {allowed}")
     if not math.isfinite(number):
-        raise TruespringError(f"{value!r} is not finite: {allowed}")
+        raise TruespringError(f"{value!s:.40} is not finite: {allowed}")
+    if number and not _SMALLEST <= abs(number) <= _LARGEST:
+        raise TruespringError(f"{value!r} is out of range: {allowed}, of a size from {_SMALLEST:g} to {_LARGEST:g}")
     return number
+
+
+# A decimal number, then a unit: names with small powers, multiplied or divided. pint alone would take any
+# arithmetic, and read "1,5 N" as 15 N and "1 000 N" as nothing.
+_NAME = r"[^\W\d_]+(?:\s*(?:\^|\*\*)\s*-?\d|[²³])?"
+_QUANTITY = re.compile(
+    rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*({_NAME}(?:\s*[*/·]\s*{_NAME}|\s+{_NAME})*)?\s*"
+)
 
 
 def _parse(text: str, unit: str, allowed: str) -> float:
     import pint
 
+    read = _QUANTITY.fullmatch(text)
+    if read is None:
+        hint = "write a decimal point, not a comma: " if "," in text else ""
+        raise TruespringError(f"'{text}' cannot be read: {hint}{allowed}")
+    number, unit_text = read.groups()
+    if unit_text is None:
+        raise TruespringError(f"'{text}' has no unit: {allowed}")
     try:
-        quantity: pint.Quantity[float] = _registry().Quantity(text)
-        return float(quantity.to(unit).magnitude)
+        return float(_registry().Quantity(float(number), unit_text).to(unit).magnitude)
     except pint.DimensionalityError as error:
-        found = "has no unit" if str(error.units1) == "dimensionless" else f"is in {error.units1}, not in {unit}"
-        raise TruespringError(f"'{text}' {found}: {allowed}") from None
+        raise TruespringError(f"'{text}' is in {error.units1}, not in {unit}: {allowed}") from None
     except pint.UndefinedUnitError:
         raise TruespringError(f"'{text}' has an unknown unit (upper and lower case matter): {allowed}") from None
-    except Exception:  # pint passes on whatever its parser met: tokenize, arithmetic, attribute errors
-        raise TruespringError(f"'{text}' cannot be read: {allowed}") from None

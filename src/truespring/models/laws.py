@@ -115,6 +115,8 @@ def neo_hookean(C: Floats, constants: Constants) -> Response:
     valid = det > 0
     det = np.where(valid, det, 1.0)
     C_33 = _free_thickness(np.log(det), lam / mu) if constants.plane_stress else np.ones_like(det)
+    valid &= np.isfinite(C_33)
+    C_33 = np.where(valid, C_33, 1.0)
     log_J = (np.log(det) + np.log(C_33)) / 2
     inverse = _inverse(np.where(valid, C, _identity(C)))
     stress = mu * (_identity(C) - inverse) + lam * log_J * inverse
@@ -131,7 +133,8 @@ def _free_thickness(log_det: Floats, ratio: float) -> Floats:
     """Solve C_33 - 1 + ratio/2 (log_det + ln C_33) = 0 for C_33 > 0, by Newton in y = ln C_33.
 
     e^y + ratio/2 y is convex and rises where ratio > 0, so that from the second step on Newton
-    descends monotonically; Poisson's ratio below zero (ratio in (-2/3, 0)) starts near the root.
+    descends monotonically. Below zero (ratio in (-2/3, 0)) there is none under strong compression;
+    what is returned there is not a number.
     """
     half = ratio / 2
     y = np.clip(-half * log_det / (1 + half), -50.0, 50.0)
@@ -140,7 +143,8 @@ def _free_thickness(log_det: Floats, ratio: float) -> Floats:
         y = y - np.clip(step, -2.0, 2.0)
         if np.abs(step).max() <= 1e-15 * max(1.0, float(np.abs(y).max())):
             break
-    return np.exp(y)
+    solved = np.abs(np.expm1(y) + half * (log_det + y)) <= 1e-12 * (1 + np.abs(half * log_det))
+    return np.where(solved & (np.exp(y) + half > 0), np.exp(y), np.nan)
 
 
 def hencky(C: Floats, constants: Constants) -> Response:

@@ -167,7 +167,8 @@ class Springs:
         mesh = problem.mesh
         per_element = self.element_stiffness(problem)
         pairs = np.sort(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
-        springs, place = np.unique(pairs, axis=0, return_inverse=True)
+        springs, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        place = inverse.ravel()
         stiffness = np.bincount(place, per_element.ravel()).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)

@@ -309,7 +309,7 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path
         load_factor=surface.load_factor,
         positions=positions,
         displacement=displacement,
-        reaction=np.zeros_like(positions),
+        reaction=np.full_like(positions, math.nan),
         energy=math.nan,
         iterations=0,
         residual=math.nan,

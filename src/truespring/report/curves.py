@@ -3,6 +3,8 @@
 import csv
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from truespring.mesh.selections import AXES
 from truespring.report.result import Result
 
@@ -14,6 +16,14 @@ def write_curves(result: Result, file: FilePath) -> None:
         table = csv.writer(stream)
         table.writerow(["model", "load_factor", *(f"u{axis}" for axis in axes), *(f"f{axis}" for axis in axes)])
         for name, path in result.paths.items():
-            for state in path.states:  # + 0.0 writes no negative zero
+            for state in path.states:  # + 0.0 writes no negative zero; what is not known stays empty
                 moved, force = state.displacement[result.probe], path.applied_force(state)
-                table.writerow([name, *(repr(float(value) + 0.0) for value in (state.load_factor, *moved, *force))])
+                table.writerow(
+                    [
+                        name,
+                        *(
+                            "" if np.isnan(value) else repr(float(value) + 0.0)
+                            for value in (state.load_factor, *moved, *force)
+                        ),
+                    ]
+                )

@@ -34,7 +34,7 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "n_nodes": path.problem.mesh.n_nodes,
         "n_unknowns": int((~path.problem.loading.held).sum()),
         "probe_displacement": last.displacement[probe].tolist() if last else None,
-        "force": path.applied_force(last).tolist() if last else None,
+        "force": [_known(force) for force in path.applied_force(last).tolist()] if last else None,
         "residual": _known(last.residual) if last else None,
         "negative_eigenvalues": last.negative_eigenvalues if last else None,
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),

@@ -117,6 +117,7 @@ class Balance:
         """
         nowhere = np.full_like(positions, np.nan)
         best = Equilibrium(load_factor, positions, nowhere, np.inf, 0, np.inf, converged=False)
+        drowned_before = np.inf
         for iteration in range((undamped_iterations or self.max_iterations) + 1):
             internal = self.potential.gradient(positions)
             force, scale = self._unbalanced(internal, load_factor)
@@ -127,11 +128,14 @@ class Balance:
             if residual < best.residual:
                 best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self._free_block(self.potential.hessian(positions))
-            if size <= max(self.tolerance * scale, self._rounding(tangent, positions)):
-                energy = self.potential.energy(positions)
-                state = Equilibrium(load_factor, positions, internal, energy, iteration, residual, converged=True)
-                return _judged(state, tangent)
-            if undamped_iterations:
+            drowned = size <= self._rounding(tangent, positions)
+            # A force below rounding may still be that of a small load: only where steps no longer help is it noise.
+            if size <= self.tolerance * scale or (drowned and (load_factor == 0 or size > drowned_before / 2)):
+                energy = self.potential.energy(best.positions)
+                state = replace(best, energy=energy, iterations=iteration, converged=True)
+                return _judged(state, self._free_block(self.potential.hessian(best.positions)))
+            drowned_before = size if drowned else np.inf
+            if undamped_iterations or drowned:
                 moved = self._leap(positions, tangent, force)
             else:
                 step = self._step(positions, tangent, force)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from truespring.arrays import Floats
 from truespring.potential import SparseMatrix
@@ -37,14 +37,23 @@ class Factorisation:
         return np.asarray(self._lu.solve(right))
 
     def lowest_mode(self) -> Floats:
-        """Return the eigenvector of the negative eigenvalue nearest to zero, largest component +1, shape (n,)."""
+        """Return the eigenvector of a negative eigenvalue, largest component +1, shape (n,).
+
+        The one nearest to zero; in tiny systems the lowest.
+        """
         n = self.matrix.shape[0]
         if n <= 10:
             vector = np.linalg.eigh(self.matrix.toarray())[1][:, 0]
         else:
             inverse = LinearOperator((n, n), matvec=self._lu.solve, dtype=np.float64)
             start = np.random.default_rng(9).normal(size=n)
-            vector = eigsh(self.matrix, k=1, sigma=0.0, which="SA", OPinv=inverse, v0=start)[1][:, 0]
+            try:
+                vector = eigsh(self.matrix, k=1, sigma=0.0, which="SA", OPinv=inverse, v0=start)[1][:, 0]
+            except ArpackError:  # inverse iteration needs no more than solves
+                vector = start
+                for _ in range(50):
+                    vector = self.solve(vector)
+                    vector = vector / np.linalg.norm(vector)
         return np.asarray(vector / vector[np.abs(vector).argmax()])
 
 

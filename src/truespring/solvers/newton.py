@@ -57,17 +57,19 @@ class Newton:
             return
         previous: Equilibrium | None = None
         step, spent = 1.0 / self.load_steps, 0
-        smallest, strict = step / 2**self.max_cutbacks, admissible(potential.nodes)
+        smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
             reached = _find(balance, self._next_level(last.state.load_factor, step), last, previous)
             spent += reached.state.iterations
-            wanted = reached.state.converged and (not strict or admissible(reached.state.positions))
-            if not wanted and step > smallest:
-                step /= 2
-                continue
-            if not wanted and strict:
-                strict, step = False, 1.0 / self.load_steps
-                continue
+            refused = reached.state.converged and strict and not admissible(reached.state.positions)
+            ever_refused = ever_refused or refused
+            if refused or not reached.state.converged:
+                if step > smallest:
+                    step = (reached.state.load_factor - last.state.load_factor) / 2
+                    continue
+                if ever_refused and strict:
+                    strict, step = False, 1.0 / self.load_steps
+                    continue
             snapped = _snapped(reached.state, last.state, previous)
             state = replace(reached.state, iterations=spent, snapped=snapped)
             previous, last, spent = last.state, reached._replace(state=state), 0

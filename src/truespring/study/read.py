@@ -56,7 +56,7 @@ def read_study(file: str | FilePath) -> Study:
     """Read and check a study file; raise StudyError with file, key, value and what is allowed."""
     place = FilePath(file)
     try:
-        source = place.read_text(encoding="utf-8")
+        source = place.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise StudyError(f"{place}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
@@ -204,7 +204,8 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             return f"{place}: is required and missing"
         case "extra_forbidden":
             allowed = _allowed_keys(error["loc"][:-1])
-            return f"{place}: unknown key{nearest(str(key[-1]), allowed)}; allowed: {', '.join(allowed)}"
+            shown = "" if isinstance(value, dict | list) else f" = {value!r}"
+            return f"{place}{shown}: unknown key{nearest(str(key[-1]), allowed)}; allowed: {', '.join(allowed)}"
         case "value_error":
             return f"{place}: {text.removeprefix('Value error, ')}"
         case "literal_error":
@@ -216,7 +217,7 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             kinds = ("springs", "fem", "stl")
             return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
         case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
-            return f"{place}: a model's name is made of letters, digits, '_', '-' and '.', it names files"
+            return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
         case _:
             shown = "" if isinstance(value, dict | list) and len(str(value)) > 60 else f" = {value!r}"
             return f"{place}{shown}: {text[0].lower()}{text[1:]}"
@@ -264,12 +265,12 @@ def _line_numbers(source: str) -> dict[tuple[str | int, ...], int]:
     count: dict[str, int] = {}
     table: tuple[str | int, ...] = ()
     for number, line in enumerate(source.splitlines(), 1):
-        if found := re.match(r"\s*\[\[([\w.\-]+)\]\]", line):
+        if found := re.match(r"\s*\[\[\s*([\w.\-]+)\s*\]\]", line):
             count[found[1]] = count.get(found[1], -1) + 1
             table = (*found[1].split("."), count[found[1]])
             lines[table] = number
             lines.setdefault(table[:-1], number)
-        elif found := re.match(r"\s*\[([\w.\-]+)\]", line):
+        elif found := re.match(r"\s*\[\s*([\w.\-]+)\s*\]", line):
             table = tuple(found[1].split("."))
             lines[table] = number
         elif found := re.match(r"\s*([\w\-]+)\s*=", line):

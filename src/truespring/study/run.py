@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
@@ -32,7 +33,7 @@ def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
     faults: list[str] = []
     seen: dict[str, str | FilePath] = {}
     for file in files:
-        stem = FilePath(file).stem
+        stem = FilePath(file).stem.casefold()
         if stem in seen:
             faults.append(f"{file} and {seen[stem]} have one stem, '{stem}': their outputs would share a folder")
         seen[stem] = file
@@ -106,16 +107,22 @@ def _clear(folder: FilePath) -> None:
     """Remove what a former run of the study left, so that no model of then stands beside those of now."""
     try:
         former = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["models"]
+        names = [name for name in former if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)]
     except (OSError, ValueError, KeyError, TypeError):
         return
-    for name in former:
-        files = [folder / f"{name}.pvd", folder / f"deformed_{name}.stl", *(folder / name).glob(f"{name}_*.vtu")]
-        for file in [*files, *(folder / "figures").glob("*.png"), *(folder / "figures").glob("*.svg")]:
-            file.unlink(missing_ok=True)
-        for emptied in (folder / name, folder / "figures"):
-            if emptied.is_dir() and not any(emptied.iterdir()):
-                emptied.rmdir()
-    (folder / "report.html").unlink(missing_ok=True)
+    figures = [*_FIGURES, *(f"{model}_over_{reference}" for model in names for reference in names)]
+    left = [folder / "report.html"]
+    left += [folder / "figures" / f"{figure}.{kind}" for figure in figures for kind in ("png", "svg")]
+    for name in names:
+        left += [folder / f"{name}.pvd", folder / f"deformed_{name}.stl", *(folder / name).glob(f"{name}_*.vtu")]
+    for file in left:
+        file.unlink(missing_ok=True)
+    for name in ("figures", *names):
+        if (folder / name).is_dir() and not any((folder / name).iterdir()):
+            (folder / name).rmdir()
+
+
+_FIGURES = ("undeformed", "curves", "error", "moduli")
 
 
 def write_overview(results: Sequence[Result], out: FilePath) -> None:

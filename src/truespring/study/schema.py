@@ -138,7 +138,7 @@ class MeshTable(Table):
 
     shape: Literal["rectangle"]
     size: Annotated[list[Length], Field(min_length=2, max_length=2)]
-    elements: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=2, max_length=2)]
+    elements: Annotated[list[Annotated[int, Field(ge=1, le=10**9)]], Field(min_length=2, max_length=2)]
     element: Literal["quadrilateral"] = "quadrilateral"
 
 
@@ -233,7 +233,7 @@ class CompareTable(Table):
 
 
 ModelTable = Annotated[SpringsTable | FemTable | StlTable, Discriminator("kind")]
-ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 
 class StudyTable(Table):
@@ -248,3 +248,18 @@ class StudyTable(Table):
     solver: SolverTable = SolverTable()
     models: Annotated[dict[ModelName, ModelTable], Field(min_length=1)]
     compare: CompareTable = CompareTable()
+
+    @field_validator("models")
+    @classmethod
+    def _names_of_files(cls, models: dict[str, ModelTable]) -> dict[str, ModelTable]:
+        """Names become files: none may be another's on a system that tells no case, nor one that Windows keeps."""
+        seen: set[str] = set()
+        for name in models:
+            if name.casefold() in seen | _TAKEN_NAMES:
+                raise ValueError(f"'{name}' cannot be told from another file on every system: choose another name")
+            seen.add(name.casefold())
+        return models
+
+
+_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
+_TAKEN_NAMES = {"figures"} | _DEVICES
