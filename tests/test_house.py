@@ -1,6 +1,8 @@
 """The picture of imports: problem x model x solver -> path -> comparison -> report, one way only."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import truespring
@@ -13,7 +15,7 @@ ALLOWED = {
     "cli": {"study", "report"},
     "study": {
         "report",
-        "compare",
+        "comparison",
         "reference",
         "equilibrium",
         "models",
@@ -23,8 +25,8 @@ ALLOWED = {
         "material",
         "units",
     },
-    "report": {"compare", "equilibrium", "models", "potential", "problem", "mesh", "material"},
-    "compare": {"equilibrium", "mesh"},
+    "report": {"comparison", "equilibrium", "models", "potential", "problem", "mesh", "material"},
+    "comparison": {"equilibrium", "mesh"},
     "reference": {"equilibrium", "problem", "mesh", "units"},
     "equilibrium": {"models", "solvers", "potential", "problem", "mesh", "material"},
     "models": {"potential", "problem", "mesh", "material"},
@@ -95,3 +97,19 @@ def test_the_library_neither_prints_nor_exits() -> None:
             named = {call.id for call in calls if isinstance(call, ast.Name)}
             assert room == "cli" or not named & {"print", "exit", "input"}, file
             assert room == "__main__" or "sys.exit" not in file.read_text(encoding="utf-8"), file
+
+
+def test_a_public_name_is_no_module() -> None:
+    """A function named like a module would be hidden by it as soon as that is imported."""
+    modules = {path.stem for path in SOURCE.iterdir()}
+    assert len(truespring.__all__) > 25
+    assert not set(truespring.__all__) & modules
+    for name in truespring.__all__:
+        assert name in ("LAWS", "RULES") or getattr(truespring, name).__name__ == name
+
+
+def test_the_command_line_loads_nothing_heavy_to_answer() -> None:
+    asked = "import sys, truespring.cli; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout.split()
+    assert "truespring.cli" in loaded
+    assert not {name.split(".")[0] for name in loaded} & {*HEAVY, "numpy", "scipy", "skfem", "pydantic"}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as FilePath
 
-from truespring.compare import Comparison, closest
+from truespring.comparison import Comparison, closest
 from truespring.equilibrium import Path, Status
 from truespring.problem import Problem
 

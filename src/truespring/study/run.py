@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.compare import compare, most_moved
+from truespring.comparison import compare, most_moved
 from truespring.equilibrium import Path, model_warnings, solve
 from truespring.errors import StudyError
 from truespring.material import PlaneStress

@@ -1,0 +1,32 @@
+"""The public names, each once; imported when they are used."""
+
+from .comparison import Comparison as Comparison
+from .comparison import compare as compare
+from .equilibrium import Path as Path
+from .equilibrium import State as State
+from .equilibrium import Status as Status
+from .equilibrium import solve as solve
+from .errors import TruespringError as TruespringError
+from .material import Material as Material
+from .material import PlaneStrain as PlaneStrain
+from .material import PlaneStress as PlaneStress
+from .mesh import Box as Box
+from .mesh import Mesh as Mesh
+from .mesh import Near as Near
+from .mesh import Plane as Plane
+from .mesh import named_point as named_point
+from .mesh import nearest_node as nearest_node
+from .mesh import rectangle as rectangle
+from .models import LAWS as LAWS
+from .models import RULES as RULES
+from .models import Fem as Fem
+from .models import Moduli as Moduli
+from .models import SpringNetwork as SpringNetwork
+from .models import Springs as Springs
+from .models import UserStiffness as UserStiffness
+from .models import moduli as moduli
+from .problem import Fixed as Fixed
+from .problem import Force as Force
+from .problem import Problem as Problem
+from .reference import read_stl as read_stl
+from .solvers import Newton as Newton
