@@ -2,7 +2,7 @@
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path as FilePath
@@ -11,15 +11,23 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import truespring as ts
 from truespring.mesh import Surface
-from truespring.report.figures import draw_figures, over_name, save_figures
+from truespring.report.figures import Drawing, draw_figures, over_name, save_figures
 from truespring.report.page import render_page, write_page
-from truespring.report.plots import _apart
-from truespring.report.quantity import given, percent, quantity, significant
+from truespring.report.plots import _apart, _uncrossed
+from truespring.report.quantity import given, percent, quantity, round_factor, significant
 from truespring.report.result import Result
-from truespring.report.verdict import closest_sentence, drive, force_sentence, moduli_sentence, verdict
+from truespring.report.verdict import (
+    closest_sentence,
+    drive,
+    force_sentence,
+    mesh_sentence,
+    moduli_sentence,
+    verdict,
+)
 
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 LABELS = {"linear": "linear FEM", "svk": "St. Venant-Kirchhoff FEM", "hencky": "Hencky FEM"}
@@ -202,7 +210,7 @@ def test_a_single_model_that_is_not_springs_is_spoken_of_in_the_singular() -> No
     )
 
 
-def test_prescribed_motion_speaks_of_motion_and_of_the_force_it_takes() -> None:
+def test_prescribed_motion_speaks_of_motion_and_of_the_force_it_takes(page_of: Callable[[Result], "Page"]) -> None:
     problem = stretched(more=[ts.Fixed(on="right", fix=["x"], displacement=[0.008, 0.0])], loads=())
     springs = ts.solve(problem, ts.Springs("isotropic"))
     linear = ts.solve(problem, ts.Fem("linear"))
@@ -211,8 +219,35 @@ def test_prescribed_motion_speaks_of_motion_and_of_the_force_it_takes() -> None:
     force = [
         quantity(one.states[-1].reaction[problem.mesh.nodes[:, 0] > 0.07, 0].sum(), "N") for one in (springs, linear)
     ]
-    assert force_sentence(found) == f"The force it takes at full motion: springs {force[0]}, linear FEM {force[1]}."
+    apart = found.comparisons["linear"].force_error
+    assert apart is not None and apart > 0.01
+    assert force_sentence(found) == (
+        f"The force it takes at full motion, along x: springs {force[0]}, linear FEM {force[1]} ({percent(apart)} off)."
+    )
     assert drive(found).axis == 0 and drive(found).sign == 1
+    page = page_of(found)
+    assert [text for text in page.said if text in ("largest", "force")] == ["largest", "force"]
+    assert percent(apart) in [text.replace("\N{NO-BREAK SPACE}", " ") for text in page.said]
+    assert "force" not in page_of(result(path(stretched()), {"b": path(stretched())})).said
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_body_that_pushes_does_not_look_like_one_that_pulls(way: int, page_of: Callable[[Result], "Page"]) -> None:
+    problem = stretched(more=[ts.Fixed(on="right", fix=["x"], displacement=[way * 0.008, 0.0])], loads=())
+    linear = ts.solve(problem, ts.Fem("linear"))
+    right = problem.mesh.nodes[:, 0] > 0.07
+    # It goes along with the motion: the one path takes a force along it, the other, turned round, holds it back.
+    against = replace(
+        linear, states=tuple(replace(one, reaction=-one.reaction) for one in linear.states), label="a spring let go"
+    )
+    found = result(linear, {"against": against}, name="linear")
+    size = quantity(abs(float(linear.states[-1].reaction[right, 0].sum())), "N")
+    direction = "x" if way > 0 else "−x"
+    assert force_sentence(found) == (
+        f"The force it takes at full motion, along {direction}: linear FEM {size}, a spring let go −{size} (200 % off)."
+    )
+    data = json.loads(page_of(found).scripts[0])
+    assert data["motion"] and [one["force"][-1] for one in data["paths"]] == [size, f"−{size}"]
 
 
 def test_a_surface_from_a_file_is_measured_by_its_outline() -> None:
@@ -228,13 +263,18 @@ def test_a_surface_from_a_file_is_measured_by_its_outline() -> None:
     assert segments(drawn, "reference") == len(Surface(moved, triangles).outline)
 
 
-def test_closest_is_named_only_where_there_is_a_choice() -> None:
+def test_closest_is_named_only_where_there_is_a_choice(page_of: Callable[[Result], "Page"]) -> None:
     problem = stretched()
     springs = path(problem, kind="springs", label="springs (lloyd)")
     near, far = path(problem, [1 / 1.02] * 5), path(problem, [1 / 1.3] * 5, label="Hencky FEM")
     both = result(springs, {"far": far, "near": near})
     assert closest_sentence(both) == "Nearest at full load is linear FEM, 2.0 % off."
     assert closest_sentence(result(springs, {"near": near})) is None
+    broken = replace(springs, status=ts.Status.UNSTABLE)
+    assert closest_sentence(result(broken, {"far": far, "near": near})) is None
+    told = page_of(result(broken, {"far": far, "near": near})).said
+    assert "nearest" not in told
+    assert "nearest" in page_of(both).said
 
 
 def test_labels_that_two_paths_share_are_told_apart() -> None:
@@ -253,9 +293,46 @@ def test_moduli_are_said_beside_the_material() -> None:
         "8.82 kPa and 0.41 along x, 11.1 kPa and 0.26 at 45 degrees; the material in its section has 10 kPa and 0.33."
         in text
     )
-    assert "Bent 1 element deep, they have 1.875 times the bending stiffness EI." in text
+    # One square under u = -x y stores E/(1 - nu^2) y^2 and G x^2: 9/8 and 3/8 of what the material would.
+    assert (
+        "Bent 1 element deep, they have 1.875 times the material's bending stiffness EI; "
+        "linear four-node FEM on this mesh has 1.500 times." in text
+    )
     isotropic = moduli_sentence(ts.solve(problem, ts.Springs("isotropic")))
     assert isotropic is not None and isotropic.startswith("These springs realise the material, in every direction")
+
+
+@pytest.mark.parametrize(
+    ("elements", "deep", "excess"),
+    # Squares under u = -x y: E/(1 - nu^2) + G a^2 / H^2 over E, less 1; over n rows 1/(2 n^2) at poisson 1/3.
+    [(1, "1 element deep", 0.5), (4, "4 elements deep", 1 / 32)],
+)
+def test_the_mesh_error_of_the_reference_is_said_in_bending(elements: int, deep: str, excess: float) -> None:
+    problem = ts.Problem(
+        mesh=ts.rectangle(size=(0.08, 0.02), elements=(4 * elements, elements)),
+        material=ts.Material(young=10e3, poisson=1 / 3),
+        section=ts.PlaneStress(thickness=0.01),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.0, -1e-3))],
+    )
+    springs, linear = (ts.solve(problem, model) for model in (ts.Springs("lloyd"), ts.Fem("linear")))
+    assert mesh_sentence(result(springs, {"linear": linear})) == (
+        f"The four-node elements themselves are {percent(excess)} too stiff in bending on this mesh ({deep}): "
+        "a refined mesh tells how much of the distance is theirs."
+    )
+    assert mesh_sentence(result(springs, {"springs-too": springs})) is None  # no elements among the references
+    assert mesh_sentence(result(linear, {"other": linear})) is None  # nothing known of the moduli
+
+
+def test_the_mesh_error_is_not_said_of_a_body_that_is_pulled_or_a_fine_one() -> None:
+    pulled = stretched()
+    assert mesh_sentence(result(ts.solve(pulled, ts.Springs("lloyd")), {"linear": path(pulled)})) is None
+    bent = replace(
+        pulled, mesh=ts.rectangle(size=(0.08, 0.02), elements=(32, 8)), loads=[ts.Force(on="right", total=(0.0, -1e-3))]
+    )
+    springs = ts.solve(bent, ts.Springs("lloyd"))
+    assert springs.moduli is not None and 1 < springs.moduli.fem_bending[8] < 1.01
+    assert mesh_sentence(result(springs, {"linear": path(bent)})) is None
 
 
 @pytest.mark.parametrize(
@@ -320,7 +397,7 @@ def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Re
     lines = {line.get_label(): line for line in axes.lines}
     assert set(lines) == {"springs (lloyd)", "linear FEM", "Hencky FEM, a/b"}
     written = {text.get_text() for text in axes.texts}
-    assert {"springs (lloyd)", "linear FEM", "Hencky FEM"} <= written
+    assert {"springs (lloyd)", "linear FEM", "Hencky FEM", "a/b"} <= written
     states = solved.paths["springs"].states
     assert lines["springs (lloyd)"].get_ydata() == pytest.approx(
         [1e3 * state.displacement[solved.probe, 0] for state in states]
@@ -337,6 +414,156 @@ def test_names_at_the_ends_of_curves_keep_their_distance() -> None:
     assert moved[1] < moved[0] < moved[2] < moved[3]
     assert moved[:3].mean() == pytest.approx(places[:3].mean())
     assert moved.min() >= 0 and moved.max() <= 1
+
+
+def test_leaders_do_not_cross() -> None:
+    ends = np.array([[0.9, 0.5], [1.0, 0.48], [1.0, 0.1]])
+    wanted = np.array([0.05, 0.2, 0.6])
+    moved = _uncrossed(ends, 1.1, wanted)
+    assert sorted(moved) == sorted(wanted)
+    assert moved.tolist() == [0.6, 0.2, 0.05]
+
+
+def test_the_right_margin_holds_the_longest_name() -> None:
+    problem = stretched()
+    short = path(problem, kind="springs", label="springs")
+    long = path(problem, [0.7] * 5, label="springs (own stiffness, single) and then some more words")
+    for found in (result(short, {"b": path(problem)}), result(short, {"b": path(problem), "c": long})):
+        figure = draw_figures(found)["curves"]
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        room = figure.bbox
+        names = figure.axes[0].texts
+        boxes = [text.get_window_extent(renderer) for text in names]
+        assert len(boxes) >= 2
+        assert all(room.x0 <= box.x0 and box.x1 <= room.x1 for box in boxes)
+        assert figure.axes[0].get_window_extent(renderer).width >= 3.1 * figure.dpi
+
+
+def moved_by(problem: ts.Problem, distance: float, **more: Any) -> ts.Path:
+    """A path whose right end moves upwards by `distance` [m], every other node in proportion to its x."""
+    whole = path(problem, **more)
+    nodes = problem.mesh.nodes
+    shape = np.column_stack([0 * nodes[:, 0], distance * nodes[:, 0] / nodes[:, 0].max()])
+    states = tuple(
+        replace(one, displacement=one.load_factor * shape, positions=nodes + one.load_factor * shape)
+        for one in whole.states
+    )
+    return replace(whole, states=states)
+
+
+@pytest.mark.parametrize(
+    ("share", "factor"),
+    [(0.0, 1), (0.03, 1), (0.029, 2), (0.025, 2), (0.02, 5), (0.012, 10), (0.0021, 50), (0.00012, 1000), (1e-9, 1e8)],
+)
+def test_tiny_displacements_are_magnified_by_a_round_factor(share: float, factor: float) -> None:
+    assert round_factor(share) == pytest.approx(factor)
+    assert factor == 1 or 0.04 < share * factor <= 0.1201
+
+
+def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page"]) -> None:
+    problem = stretched()  # 80 mm long
+    tiny, larger = moved_by(problem, 8e-5, kind="springs", label="springs"), moved_by(problem, 1e-4)
+    found = result(tiny, {"linear": larger})
+    figure = draw_figures(found)[over_name(found, "linear")]
+    assert "displacements × 50" in [text.get_text() for text in figure.texts]
+    (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
+    assert np.ravel(dot.get_data()) == pytest.approx([80, 50 * 0.08])
+    page = page_of(found)
+    assert "displacements × 50" in page.said
+    assert page.tags.count("canvas") == 1
+    data = json.loads(page.scripts[0])
+    assert data["box"][1] == pytest.approx(20 + 50 * 0.1)
+    plain = result(moved_by(problem, 4e-3, kind="springs", label="springs"), {"linear": moved_by(problem, 1e-4)})
+    texts = [text.get_text() for text in draw_figures(plain)[over_name(plain, "linear")].texts]
+    assert not any("×" in text for text in texts)
+    assert not any("displacements ×" in text for text in page_of(plain).said)
+
+
+def test_a_surface_is_magnified_only_where_its_displacement_is_known(page_of: Callable[[Result], "Page"]) -> None:
+    problem = stretched()
+    tiny = moved_by(problem, 8e-5, kind="springs", label="springs")
+    triangles = problem.mesh.elements[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    surface = Surface(tiny.states[-1].positions, triangles)
+    alone = ts.Path(problem, "deformed.stl", "stl", (), ts.Status.CONVERGED, surface=surface)
+    known = replace(alone, states=tiny.states[-1:])
+    for read, factor in ((alone, 1), (known, 100)):
+        found = result(tiny, {"ansys": read})
+        figure = draw_figures(found)[over_name(found, "ansys")]
+        (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
+        assert np.ravel(dot.get_data()) == pytest.approx([80, factor * 0.08])
+        data = json.loads(page_of(found).scripts[0])
+        assert (data["magnified"] == "") == (factor == 1)
+        assert (data["paths"][1]["surface"] is None) == (factor > 1)
+
+
+def test_the_picture_follows_the_body_and_the_model_not_a_reference_that_goes_far_away(
+    page_of: Callable[[Result], "Page"],
+) -> None:
+    problem = stretched()
+    springs = moved_by(problem, 0.04, kind="springs", label="springs")
+    near, far = moved_by(problem, 0.1), moved_by(problem, 1000.0, label="linear FEM that ran away")
+    found = result(springs, {"near": near, "far": far})
+    figures = draw_figures(found)
+    heights = {}
+    for name, leaves in (("near", False), ("far", True)):
+        figure = figures[over_name(found, name)]
+        low, high = figure.axes[0].get_ylim()
+        heights[name] = high - low
+        said = [text.get_text() for text in figure.texts]
+        assert ("linear FEM that ran away leaves the picture" in said) == leaves
+        (drawn,) = figure.findobj(lambda artist: artist.get_gid() == "reference")
+        assert drawn.get_clip_path() is not None or drawn.get_clip_box() is not None
+    assert heights["near"] > 120 and 60 < heights["far"] < 80  # mm
+    data = json.loads(page_of(found).scripts[0])
+    assert data["box"] == pytest.approx([80, 120])
+    assert [one["beyond"] for one in data["paths"]] == [False, False, True]
+    steps = np.frombuffer(base64.b64decode(data["paths"][2]["positions"][-1]), dtype="<f4").reshape(-1, 2)
+    assert steps * 120 / 65535 == pytest.approx(1e3 * far.states[-1].positions, rel=1e-6, abs=1e-3)
+
+
+def supports(problem: ts.Problem) -> dict[tuple[float, float], list[Any]]:
+    """The marks of supports in the picture of what was asked, by their place in mm."""
+    figure = draw_figures(result(path(problem), {"b": path(problem)}))["undeformed"]
+    found: dict[tuple[float, float], list[Any]] = {}
+    for mark in figure.findobj(lambda artist: artist.get_gid() == "support" and hasattr(artist, "get_marker")):
+        x, y = np.ravel(mark.get_data())
+        found.setdefault((round(float(x), 6), round(float(y), 6)), []).append(mark.get_marker().vertices)
+    return found
+
+
+def held(*fixed: ts.Fixed, elements: tuple[int, int]) -> ts.Problem:
+    return ts.Problem(
+        mesh=ts.rectangle(size=(1.0, 1.0), elements=elements),
+        material=ts.Material(young=10e3, poisson=0.3),
+        section=ts.PlaneStress(thickness=0.01),
+        supports=fixed,
+        loads=[ts.Force(on="top", total=(0.0, 1.0))],
+    )
+
+
+def test_rollers_along_a_side_are_thinned_and_point_outwards() -> None:
+    sides = (ts.Fixed(on="left", fix=["x"]), ts.Fixed(on="bottom", fix=["y"]))
+    found = supports(held(*sides, elements=(40, 40)))
+    left = {place[1]: marks for place, marks in found.items() if place[0] == 0 and place[1] > 0}
+    bottom = {place[0]: marks for place, marks in found.items() if place[1] == 0 and place[0] > 0}
+    assert len(found) == len(left) + len(bottom) + 1 and len(found[0, 0]) == 2  # the corner rolls on neither
+    for marks, axis in ((left, 0), (bottom, 1)):
+        places = sorted(marks)
+        assert 5 < len(places) < 25
+        assert np.diff(places) == pytest.approx(places[1] - places[0])
+        assert all(len(one) == 1 for one in marks.values())
+        assert all(one[0][:, axis].min() < -0.5 and one[0][:, axis].max() <= 0 for one in marks.values())
+    coarse = supports(held(*sides, elements=(4, 4)))
+    assert len([place for place in coarse if place[0] == 0]) == 5
+
+
+def test_rollers_along_their_own_side_stand_outside_and_do_not_flip() -> None:
+    found = supports(held(ts.Fixed(on="bottom"), ts.Fixed(on="right", fix=["y"]), elements=(4, 4)))
+    right = {place: marks for place, marks in found.items() if place[0] == 1}
+    assert sorted(y for _, y in right) == [0.25, 0.5, 0.75, 1.0]  # the corner is clamped and hatched
+    shapes = [marks[0] for marks in right.values()]
+    assert all(one == pytest.approx(shapes[0]) for one in shapes)
+    assert shapes[0][:, 0].min() >= -1e-12 and shapes[0][:, 1].max() <= 1e-12
 
 
 def test_figures_are_written_as_png_and_svg(solved: Result, tmp_path: FilePath) -> None:
@@ -358,6 +585,14 @@ def test_drawing_leaves_the_settings_of_matplotlib_alone(solved: Result) -> None
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.fixture
+def page_of(monkeypatch: pytest.MonkeyPatch) -> Callable[[Result], "Page"]:
+    """Pages without their pictures, which take a second each."""
+    blank = Drawing(b"", b"<svg/>", "", 1.0)
+    monkeypatch.setattr("truespring.report.page.render_figures", lambda _: {"undeformed": blank, "moduli": blank})
+    return lambda found: Page(render_page([found], ""))
+
+
 class Page(HTMLParser):
     """What a page loads, links to and says."""
 
@@ -370,11 +605,14 @@ class Page(HTMLParser):
         self.policy = ""
         self.scripts: list[str] = []
         self.said: list[str] = []
+        self.tagged: set[str] = set()
+        self._in_tag = False
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = {name: value or "" for name, value in attrs}
         self.tags.append(tag)
+        self._in_tag = values.get("class") == "name"
         self.loaded += [values[name] for name in ("src", "srcset", "poster", "data", "action") if name in values]
         self.links += [values["href"]] if "href" in values else []
         self.ids += [values["id"]] if "id" in values else []
@@ -384,6 +622,9 @@ class Page(HTMLParser):
     def handle_data(self, data: str) -> None:
         inside = self.tags[-1] if self.tags else ""
         (self.scripts if inside == "script" else self.said).append(data)
+        if self._in_tag:
+            self.tagged.add(data)
+            self._in_tag = False
 
 
 def test_page_loads_nothing_and_escapes_what_it_was_given(solved: Result, tmp_path: FilePath) -> None:
@@ -408,6 +649,57 @@ def test_page_tells_verdict_law_advice_and_how_to_run_it_again(solved: Result) -
     for words in ("Hencky FEM a/b", "truespring verify soft.toml --out out", "scikit-fem", "1 element deep this mesh"):
         assert words in told
     assert all(warning in told for path in solved.paths.values() for warning in path.warnings)
+
+
+def test_names_are_tags_wherever_the_label_does_not_begin_with_them(page_of: Callable[[Result], "Page"]) -> None:
+    problem = stretched()
+    springs = path(problem, kind="springs", label="springs (lloyd)")
+    other = path(problem, kind="springs", label="springs (isotropic)")
+    page = page_of(result(springs, {"lloyd": other, "linear": path(problem)}))
+    assert page.tagged == {"lloyd"}
+    same = path(problem, kind="springs", label="springs (lloyd)")
+    found = result(springs, {"lloyd": same})
+    (texts,) = [
+        [text.get_text() for text in figure.texts]
+        for name, figure in draw_figures(found).items()
+        if name == over_name(found, "lloyd")
+    ]
+    assert {"springs (lloyd) · springs", "springs (lloyd) · lloyd"} <= set(texts)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.25])
+def test_plane_strain_explains_the_moduli_that_it_wants(poisson: float, page_of: Callable[[Result], "Page"]) -> None:
+    problem = ts.Problem(
+        mesh=ts.rectangle(size=(0.08, 0.02), elements=(4, 1)),
+        material=ts.Material(young=10e3, poisson=poisson),
+        section=ts.PlaneStrain(thickness=0.01),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.4, 0.0))],
+    )
+    springs = ts.solve(problem, ts.Springs("isotropic"))
+    told = "".join(page_of(result(springs, {"b": springs})).said).replace("\N{NO-BREAK SPACE}", " ")
+    young, ratio = {0.3: ("11.0 kPa", "0.429"), 0.25: ("10.7 kPa", "0.333")}[poisson]
+    assert (
+        f"In plane strain a test within the plane finds E/(1 − ν²) = {young} and ν/(1 − ν) = {ratio}: "
+        f"the material’s own are E = 10 kPa and ν = {poisson}." in told
+    )
+    thin = replace(problem, section=ts.PlaneStress(thickness=0.01))
+    plain = ts.solve(thin, ts.Springs("isotropic"))
+    told = "".join(page_of(result(plain, {"b": plain})).said)
+    assert "plane stress" in told and "plane strain" not in told
+
+
+def test_the_bending_table_holds_springs_and_elements_side_by_side(solved: Result) -> None:
+    page = Page(render_page([solved], ""))
+    start = page.said.index("four-node FEM")
+    cells = [text.strip() for text in page.said[start:] if text.strip()]
+    assert cells[1:5] == ["1 element deep", "this mesh", "1.875", "1.500"]
+    assert cells[5:8] == ["2 elements deep", "1.131", "1.125"]
+
+
+def test_the_viewer_is_shown_before_it_is_drawn(solved: Result) -> None:
+    script = "".join(Page(render_page([solved], "")).scripts)
+    assert 0 < script.index("host.hidden = false") < script.index("start(host")
 
 
 def test_a_model_that_failed_shows_its_advice(solved: Result) -> None:

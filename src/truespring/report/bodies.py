@@ -1,20 +1,21 @@
 """Pictures of bodies: as asked for, and a model over a reference."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
-from truespring.compare import Comparison
+from truespring.arrays import Bools, Floats, Ints
+from truespring.comparison import Comparison
 from truespring.equilibrium import Path
+from truespring.mesh import Mesh
 from truespring.mesh.selections import select
 from truespring.models import SpringNetwork
-from truespring.report.quantity import Scale, given, natural_scale, percent, quantity
+from truespring.report.quantity import Scale, given, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, POINT, RED, full_name
-from truespring.report.verdict import level_name
+from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, POINT, RED, full_name, text_width
+from truespring.report.verdict import display_name, level_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +29,38 @@ def path_lines(path: Path) -> Ints:
     return path.problem.mesh.edges
 
 
+def magnification(result: Result) -> float:
+    """Return the round factor by which displacements are drawn: 1, or where they are tiny so much that they show."""
+    mesh = result.problem.mesh
+    moved = [
+        float(np.linalg.norm(state.displacement, axis=1).max())
+        for path in result.paths.values()
+        for state in path.states
+    ]
+    return round_factor(max(moved, default=0.0) / float((mesh.upper - mesh.lower).max()))
+
+
+def picture_box(points: Floats, others: Sequence[Floats]) -> tuple[Floats, Floats, list[bool]]:
+    """Return the box of `points` [m], shape (n, dim), widened by all `others` that leave it less than three times wide.
+
+    Besides, for each of `others`, whether it leaves the picture.
+    """
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    widest = _WIDEST * float((upper - lower).max())
+    low, high = lower, upper
+    leaves = []
+    for other in others:
+        wide_low, wide_high = np.minimum(lower, other.min(axis=0)), np.maximum(upper, other.max(axis=0))
+        leaves.append(not float((wide_high - wide_low).max()) <= widest)
+        if not leaves[-1]:
+            low, high = np.minimum(low, wide_low), np.maximum(high, wide_high)
+    return low, high, leaves
+
+
+# A reference that would make the picture wider than this, in widths of the body and its model, leaves it.
+_WIDEST = 3.0
+
+
 @dataclass(frozen=True, slots=True)
 class _Entry:
     """A line of a legend: what it stands for, its colour and its mark."""
@@ -38,47 +71,82 @@ class _Entry:
     linestyle: Any = "-"
 
 
-def _body_figure(title: str, lower: Floats, upper: Floats, legend: Sequence[_Entry]) -> "tuple[Figure, Axes, Scale]":
-    """A figure whose one pair of axes shows the box from `lower` to `upper` [m] at equal scales, legend on top."""
+def _body_figure(
+    title: str, lower: Floats, upper: Floats, legend: Sequence[_Entry], remark: str = ""
+) -> "tuple[Figure, Axes, Scale]":
+    """A figure whose one pair of axes shows the box from `lower` to `upper` [m] at equal scales, words on top."""
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
-    rows = 1 if sum(len(one.text) * 4.7 + 32 for one in legend) * POINT < 4.7 else 2
-    left, right, bottom, top = 0.62, 0.12, 0.48, 0.44 + 0.18 * rows
+    columns, words = _legend_columns(legend, 4.7)
+    rows = len(columns[0])
+    words = max(words, text_width(title, 9, bold=True), text_width(remark, 8))
+    left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + 0.18 * rows + 0.18 * bool(remark)
     width = min(5.4 - left - right, 4.4 * extent[0] / extent[1])
     height = width * extent[1] / extent[0]
     # A narrow body leaves room for the legend: the box grows sideways, the scales stay equal.
-    broad = max(width, 3.3)
+    broad = max(width, 3.3, words + 0.05)
     margin = (broad / width - 1) / 2 * extent[0]
-    figure = Figure(figsize=(left + broad + right, bottom + height + top), label=title)
+    told = f"{title}; {remark}" if remark else title
+    figure = Figure(figsize=(left + broad + right, bottom + height + top), label=told)
     total = figure.get_size_inches()
     axes = figure.add_axes((left / total[0], bottom / total[1], broad / total[0], height / total[1]))
     axes.set_xlim((lower[0] - margin) / scale.size, (upper[0] + margin) / scale.size)
     axes.set_ylim(lower[1] / scale.size, upper[1] / scale.size)
     axes.set_aspect("equal", adjustable="box")
-    axes.locator_params(nbins=7)
+    axes.locator_params(nbins=6)
     axes.set_xlabel(f"x [{scale.unit}]")
     axes.set_ylabel(f"y [{scale.unit}]")
-    handles = [
-        Line2D([], [], color=one.color, marker=one.marker, linestyle=one.linestyle, markersize=5, lw=1.4)
-        for one in legend
-    ]
     figure.text(left / total[0], 1 - 0.17 / total[1], title, weight="bold", size=9, va="center")
-    figure.legend(
-        handles,
-        [one.text for one in legend],
-        loc="upper left",
-        bbox_to_anchor=(left / total[0], 1 - 0.32 / total[1]),
-        ncols=-(-len(legend) // rows),
-        borderpad=0,
-        borderaxespad=0,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        fontsize=8,
-    )
+    if remark:
+        figure.text(left / total[0], 1 - 0.37 / total[1], remark, color=LOAD, size=8, va="center")
+    _legend(figure, columns, left, float(total[1]) - top + 0.14 + 0.18 * rows)
     return figure, axes, scale
+
+
+# Widths in a legend [inch]: the sample of a line, the gap to its text, the gap to the next column.
+_SAMPLE, _GAP, _COLUMNS_APART = 0.18, 0.06, 0.13
+
+
+def _legend_columns(entries: Sequence[_Entry], room: float) -> tuple[list[Sequence[_Entry]], float]:
+    """Return a legend in columns, of the fewest rows that `room` [inch] allows, and how wide it is [inch]."""
+    columns: list[Sequence[_Entry]] = []
+    width = 0.0
+    for rows in range(1, len(entries) + 1):
+        columns = [entries[start : start + rows] for start in range(0, len(entries), rows)]
+        width = sum(_column_width(column) for column in columns) - _COLUMNS_APART
+        if width <= room:
+            break
+    return columns, width
+
+
+def _column_width(column: Sequence[_Entry]) -> float:
+    return _SAMPLE + _GAP + max(text_width(one.text, 8) for one in column) + _COLUMNS_APART
+
+
+def _legend(figure: "Figure", columns: Sequence[Sequence[_Entry]], left: float, top: float) -> None:
+    """Draw a legend whose upper left corner is at (left, top) [inch]: many times faster than matplotlib's."""
+    from matplotlib.lines import Line2D
+
+    for column in columns:
+        for row, one in enumerate(column):
+            y = top - 0.18 * (row + 0.5)
+            sample = Line2D(
+                [left, left + _SAMPLE / 2, left + _SAMPLE],
+                [y, y, y],
+                color=one.color,
+                ls=one.linestyle,
+                lw=1.4,
+                marker=one.marker,
+                ms=5,
+                markevery=[1],
+                transform=figure.dpi_scale_trans,
+            )
+            figure.add_artist(sample)
+            at = left + _SAMPLE + _GAP
+            figure.text(at, y, one.text, size=8, va="center_baseline", transform=figure.dpi_scale_trans)
+        left += _column_width(column)
 
 
 def _lines(axes: "Axes", points: Floats, lines: Ints, color: str, width: float, name: str, **more: Any) -> None:
@@ -100,8 +168,10 @@ def _dot(axes: "Axes", point: Floats) -> None:
 def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | None":
     """The model in blue over a reference in black, at the last load level that both have."""
     model, reference = comparison.model, comparison.reference
+    rest = model.problem.mesh.nodes
+    factor = magnification(result) if reference.states else 1.0  # of a surface alone no displacement is known
     inside = None
-    if reference.surface is not None:
+    if reference.surface is not None and factor == 1:
         level = reference.surface.load_factor
         points, lines = reference.surface.points, reference.surface.outline
         triangles = reference.surface.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -111,28 +181,31 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | 
         theirs = reference.at(level)
         if theirs is None or not level:
             return None
-        points, lines = theirs.positions, path_lines(reference)
+        points, lines = rest + factor * theirs.displacement, path_lines(reference)
     mine = model.at(level)
     if mine is None:
         return None
     mesh = model.problem.mesh
-    rest = mesh.nodes
-    everything = np.concatenate([rest, points, mine.positions])
-    lower, upper = _box(everything)
+    positions = rest + factor * mine.displacement
+    lower, upper, (leaves,) = picture_box(np.concatenate([rest, positions]), [points])
+    margin = 0.04 * float((upper - lower).max())
+    remarks = [f"displacements {times(factor)}"] if factor != 1 else []
+    remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
     legend = [
         _Entry(full_name(result, result.model or ""), BLUE),
         _Entry(full_name(result, name), INK),
         _Entry("at rest", FAINT, linestyle=(0, (3, 2))),
         _Entry("probe", RED, "o", ""),
     ]
-    figure, axes, scale = _body_figure(_over_title(result, level, comparison), lower, upper, legend)
+    title = _over_title(result, level, comparison)
+    figure, axes, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
     outline = mesh.boundary if mesh.element != "line" else path_lines(model)
     _lines(axes, rest / scale.size, outline, FAINT, 0.8, "rest", linestyle=(0, (3, 2)), zorder=1)
     if inside is not None:
         _lines(axes, points / scale.size, inside, "#8b9299", 0.4, "triangles", zorder=2)
     _lines(axes, points / scale.size, lines, INK, 1.3, "reference", zorder=3)
-    _lines(axes, mine.positions / scale.size, path_lines(model), BLUE, 0.75, "model", zorder=4)
-    _dot(axes, mine.positions[comparison.probe] / scale.size)
+    _lines(axes, positions / scale.size, path_lines(model), BLUE, 0.75, "model", zorder=4)
+    _dot(axes, positions[comparison.probe] / scale.size)
     return figure
 
 
@@ -143,12 +216,6 @@ def _over_title(result: Result, level: float, comparison: Comparison) -> str:
     if comparison.surface is not None:
         return f"{at}: outlines {quantity(comparison.surface.outline_rms, 'm', 2)} apart (root mean square)"
     return at
-
-
-def _box(points: Floats) -> tuple[Floats, Floats]:
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    margin = 0.04 * float((upper - lower).max())
-    return lower - margin, upper + margin
 
 
 def undeformed_figure(result: Result) -> "Figure":
@@ -234,7 +301,7 @@ def _arrow(axes: "Axes", arrow: _Arrow, scale: Scale) -> None:
     axes.annotate(
         arrow.text,
         (min(x, to_x) if arrow.side > 0 else max(x, to_x), (y + to_y) / 2),
-        xytext=(7 * arrow.side if upright else 0, 0 if upright else 7),
+        xytext=(7 * arrow.side, 0 if upright else 7),
         textcoords="offset points",
         ha="left" if arrow.side > 0 else "right",
         va="center" if upright else "bottom",
@@ -245,7 +312,7 @@ def _arrow(axes: "Axes", arrow: _Arrow, scale: Scale) -> None:
 
 
 def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
-    """Clamped edges hatched, single held nodes on a pin, directions held alone on a roller; the usual symbols."""
+    """Clamped edges hatched, edges held in one direction on rollers, single nodes on a pin or roller."""
     mesh, loading = result.problem.mesh, result.problem.loading
     still = loading.held & (loading.displacement == 0)
     clamped = loading.held.all(axis=1) & still.all(axis=1)
@@ -254,15 +321,75 @@ def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
         edges = mesh.boundary[clamped[mesh.boundary].all(axis=1)]
         hatched[edges] = True
         _hatch(axes, mesh.nodes[edges] / scale.size, size / scale.size)
+    single = still & ~hatched[:, None]
+    for run in _rolling_runs(mesh, still):
+        single[run.nodes, run.axis] = False
+        for node in run.thinned(mesh.nodes, 1.5 * _ROLLER * _inch(axes) * scale.size):
+            if not hatched[node]:
+                _pin(axes, mesh.nodes[node] / scale.size, run.away, run.beside)
     centre = (mesh.lower + mesh.upper) / 2
-    for node in np.flatnonzero(still.any(axis=1) & ~hatched):
+    for node in np.flatnonzero(single.any(axis=1)):
         at = mesh.nodes[node]
-        if clamped[node]:
+        if single[node].all():
             _pin(axes, at / scale.size, np.array([0.0, -1.0]), roller=False)
             continue
-        for axis in np.flatnonzero(still[node]):
-            away = np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0)
-            _pin(axes, at / scale.size, away, roller=True)
+        for axis in np.flatnonzero(single[node]):
+            _pin(axes, at / scale.size, np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0))
+
+
+# A unit of a symbol is half of 11 points; the line under a roller is its widest part [inch].
+_SYMBOL = 11.0
+_ROLLER = 1.4 * _SYMBOL / 2 * POINT
+
+
+def _inch(axes: "Axes") -> float:
+    """The length of an inch on paper, in units of the axes."""
+    figure = axes.get_figure()
+    assert figure is not None
+    low, high = axes.get_xlim()
+    return (high - low) / float(axes.get_position().width * figure.get_figwidth())  # type: ignore[union-attr]
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Nodes on edges of the boundary that face one way and are held along `axis`, in order.
+
+    `away` is where their rollers point; where that is along the edge, `beside` is out of the body.
+    """
+
+    nodes: Ints
+    axis: int
+    away: Floats
+    beside: Floats
+
+    def thinned(self, nodes: Floats, spacing: float) -> Ints:
+        """Return every n-th node, so that neighbours are about `spacing` [m] apart or more."""
+        length = float(np.linalg.norm(np.diff(nodes[self.nodes], axis=0), axis=1).sum())
+        n_gaps = len(self.nodes) - 1
+        every = max(1, -int(-spacing * n_gaps // length)) if n_gaps else 1
+        return self.nodes[n_gaps % every // 2 :: every]
+
+
+def _rolling_runs(mesh: Mesh, still: Bools) -> Iterator[_Run]:
+    """Runs of boundary edges whose two nodes are held in one direction, but not both clamped."""
+    if mesh.boundary.shape[1] != 2:
+        return
+    along = np.diff(mesh.nodes[mesh.boundary], axis=1)[:, 0]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+    clamped = still[mesh.boundary].all(axis=(1, 2))
+    for axis in (0, 1):
+        held = still[mesh.boundary, axis].all(axis=1) & ~clamped
+        facing = np.abs(outward[:, axis]) > 0.5
+        unit, other = np.eye(2)[axis], np.eye(2)[1 - axis]
+        for sign in (-1.0, 1.0):
+            for chosen, order, away, beside in (
+                (facing & (sign * outward[:, axis] > 0), 1 - axis, sign * unit, 0 * other),
+                (~facing & (sign * outward[:, 1 - axis] > 0), axis, -unit, sign * other),
+            ):
+                nodes = np.unique(mesh.boundary[held & chosen])
+                if nodes.size:
+                    nodes = nodes[np.argsort(mesh.nodes[nodes, order], kind="stable")]
+                    yield _Run(nodes, axis, away, beside)
 
 
 def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
@@ -286,8 +413,11 @@ def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
     _lines(axes, edges.reshape(-1, 2), sides, "#3d4248", 2.2, "clamped", zorder=5)
 
 
-def _pin(axes: "Axes", point: Floats, away: Floats, roller: bool) -> None:
-    """A triangle whose tip touches the node; under a roller a line, set off. Sized in points, as text is."""
+def _pin(axes: "Axes", point: Floats, away: Floats, beside: Floats | None = None, roller: bool = True) -> None:
+    """A triangle whose tip touches the node; under a roller a line, set off. Sized in points, as text is.
+
+    With `beside` it stands off the node on an arm, so that it does not cover the edge that it runs along.
+    """
     from matplotlib.path import Path as Outline
 
     across = np.array([-away[1], away[0]])
@@ -296,6 +426,9 @@ def _pin(axes: "Axes", point: Floats, away: Floats, roller: bool) -> None:
     if roller:
         corners += [1.35 * away + 0.7 * across, 1.35 * away - 0.7 * across]
         codes += [Outline.MOVETO, Outline.LINETO]
+    if beside is not None and beside.any():
+        corners = [np.zeros(2)] + [corner + beside for corner in corners]
+        codes = [Outline.MOVETO, Outline.LINETO, *codes[1:]]
     symbol = Outline(np.array(corners), codes)
-    size = 11 * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
+    size = _SYMBOL * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
     axes.plot(*point, marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=6, ls="", gid="support")

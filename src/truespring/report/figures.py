@@ -18,7 +18,7 @@ from truespring.report.style import figure_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DPI = 150
+_DPI = 130
 
 # A Result does not change, and its files and its pages show the same pictures: they are drawn once.
 _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()

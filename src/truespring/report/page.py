@@ -14,20 +14,25 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.equilibrium import Path, Status
-from truespring.material import PlaneStress
+from truespring.material import PlaneStrain, PlaneStress
 from truespring.models import Moduli
 from truespring.problem import Problem
-from truespring.report.bodies import path_lines
+from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.figures import Drawing, over_name, render_figures
-from truespring.report.quantity import given, natural_scale, percent, quantity, significant, tolerance_percent
+from truespring.report.quantity import given, natural_scale, percent, quantity, significant, times, tolerance_percent
 from truespring.report.result import Result
+from truespring.report.style import full_name
 from truespring.report.verdict import (
     closest_sentence,
+    deep,
     display_name,
     drive,
     force_sentence,
     level_name,
+    material_name,
+    mesh_sentence,
     moduli_sentence,
+    nearest_reference,
     reach,
     verdict_sentences,
 )
@@ -78,14 +83,14 @@ def _versions() -> list[tuple[str, str]]:
 
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     drawings = render_figures(result)
-    sentences = verdict_sentences(result)
+    nearest = result.closest if len(result.comparisons) == 1 else nearest_reference(result)
     return {
         "id": f"study-{place}",
         "title": result.title,
-        "verdict": sentences,
-        "more": [text for text in (closest_sentence(result), force_sentence(result)) if text],
+        "verdict": verdict_sentences(result),
+        "more": [text for say in (closest_sentence, force_sentence, mesh_sentence) if (text := say(result))],
         "converged": result.converged,
-        "closest": display_name(result, result.closest) if result.closest else None,
+        "closest": display_name(result, nearest) if nearest else None,
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
         "facts": _facts(result),
         "short": _in_short(result),
@@ -101,9 +106,11 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "model": result.model,
         "full": level_name(result, 1.0),
         "tolerance": tolerance_percent(result.tolerance),
+        "measures": _measures(result),
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
         "models": [_model_row(name, path) for name, path in result.paths.items()],
-        "moduli": [_moduli(name, path, path.moduli) for name, path in result.paths.items() if path.moduli],
+        "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],
+        "moduli_note": _section_note(result.problem),
         "source": result.source,
     }
 
@@ -166,18 +173,25 @@ def _in_short(result: Result) -> str:
     return " · ".join([*parts, f"{len(problem.mesh.elements)} elements"])
 
 
+def _measures(result: Result) -> list[str]:
+    """The errors of the comparison table, in the order of _comparison_row; the force where a motion drives."""
+    forced = any(one.force_error is not None for one in result.comparisons.values())
+    return ["root mean square", "at the probe", "largest", *(["force"] if forced else [])]
+
+
 def _comparison_row(result: Result, name: str) -> dict[str, Any]:
     one = result.comparisons[name]
+    errors = [one.rms_error, one.probe_error, one.max_error, one.force_error]
     return {
         "name": name,
         "label": one.reference.label,
-        "errors": [_share(one.rms_error), _share(one.probe_error), _share(one.max_error)],
+        "errors": [_share(error) for error, _ in zip(errors, _measures(result), strict=False)],
         "reach": reach(result, one) if one.load_factors.size else "–",
         "outline": None
         if one.surface is None
         else f"outlines {quantity(one.surface.outline_rms, 'm', 2)} apart, {quantity(one.surface.outline_max, 'm', 2)} "
         f"at most; nodes {quantity(one.surface.nodes_rms, 'm', 2)} from the nearest of the file",
-        "closest": name == result.closest and len(result.comparisons) > 1,
+        "closest": name == nearest_reference(result),
     }
 
 
@@ -219,12 +233,14 @@ def _stability(path: Path) -> str:
     return "stable, after buckling" if any(state.branched for state in path.states) else "stable"
 
 
-def _moduli(name: str, path: Path, moduli: Moduli) -> dict[str, Any]:
-    young, poisson = given(moduli.young_wanted, "Pa"), f"{moduli.poisson_wanted:.3f}"
+def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
+    young, poisson = quantity(moduli.young_wanted, "Pa"), f"{moduli.poisson_wanted:.3f}"
+    path = result.paths[name]
     return {
         "name": name,
         "label": path.label,
         "sentence": moduli_sentence(path),
+        "wanted": material_name(result),
         "rows": [
             ("Young’s modulus along x", quantity(moduli.young(), "Pa"), young),
             ("Young’s modulus at 45°", quantity(moduli.young(45), "Pa"), young),
@@ -233,9 +249,21 @@ def _moduli(name: str, path: Path, moduli: Moduli) -> dict[str, Any]:
             ("Zener ratio (1 is isotropic)", f"{moduli.zener:.3f}", "1"),
         ],
         "bending": [
-            (depth, significant(factor, 4), depth == moduli.depth) for depth, factor in sorted(moduli.bending.items())
+            (deep(depth), significant(factor, 4), significant(moduli.fem_bending[depth], 4), depth == moduli.depth)
+            for depth, factor in sorted(moduli.bending.items())
         ],
     }
+
+
+def _section_note(problem: Problem) -> str | None:
+    """In plane strain, where the wanted moduli come from."""
+    if problem.material is None or not isinstance(problem.section, PlaneStrain):
+        return None
+    young, poisson = problem.section.plane_moduli(problem.material)
+    seen = f"E/(1 − ν²) = {quantity(young, 'Pa')} and ν/(1 − ν) = {poisson:.3f}"
+    own = f"E = {given(problem.material.young, 'Pa')} and ν = {problem.material.poisson:.4g}"
+    unbroken = re.sub(r" (?=[−=])|(?<=[−=]) ", "\N{NO-BREAK SPACE}", f"{seen}: the material’s own are {own}")
+    return f"In plane strain a test within the plane finds {unbroken}."
 
 
 # --- the viewer -----------------------------------------------------------------------------------
@@ -253,14 +281,16 @@ def _viewer(result: Result, budget: int) -> dict[str, Any] | None:
     levels = _levels(result.paths[names[0]], budget // (2 * mesh.n_nodes * len(shown)))
     if len(levels) < 2:
         return None
-    clouds = [mesh.nodes] + [state.positions for name in shown for state in result.paths[name].states]
-    clouds += [surface.points for name in shown if (surface := result.paths[name].surface) is not None]
-    everything = np.concatenate([cloud[:, :2] for cloud in clouds])
-    lower, extent = everything.min(axis=0), np.ptp(everything, axis=0)
-    pack = _Packing(lower, float(extent.max()))
+    factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
+    first, *others = (_cloud(result.paths[name], factor) for name in shown)
+    lower, upper, leaves = picture_box(np.concatenate([mesh.nodes, first]), others)
+    extent = (upper - lower)[:2]
+    pack = _Packing(lower[:2], float(extent.max()))
     scale = natural_scale(float(extent.max()), "m")
     closest = shown.index(result.closest) - 1 if result.closest in shown else 0
     return {
+        "magnified": f"displacements {times(factor)}" if factor != 1 else "",
+        "motion": not result.problem.loads,
         "unit": scale.unit,
         "box": [float(value) for value in extent / scale.size],
         "n_nodes": mesh.n_nodes,
@@ -268,8 +298,22 @@ def _viewer(result: Result, budget: int) -> dict[str, Any] | None:
         "chosen": closest,
         "rest": pack.places(mesh.nodes),
         "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
-        "paths": [_viewer_path(result, name, levels, pack) for name in shown],
+        "paths": [
+            _viewer_path(result, name, levels, pack, factor, beyond)
+            for name, beyond in zip(shown, [False, *leaves], strict=True)
+        ],
     }
+
+
+def _only_surface(path: Path) -> bool:
+    """Whether a path was read from a file that does not tell where each node went."""
+    return path.surface is not None and not path.states
+
+
+def _cloud(path: Path, factor: float) -> Floats:
+    """Every place [m] that the viewer draws of a path, shape (n, dim)."""
+    clouds = [path.problem.mesh.nodes + factor * state.displacement for state in path.states]
+    return np.concatenate(clouds + ([path.surface.points] if path.surface is not None and factor == 1 else []))
 
 
 def _levels(path: Path, budget: int) -> list[float]:
@@ -279,44 +323,53 @@ def _levels(path: Path, budget: int) -> list[float]:
     return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
 
 
-def _viewer_path(result: Result, name: str, levels: Sequence[float], pack: "_Packing") -> Mapping[str, Any]:
+def _viewer_path(
+    result: Result, name: str, levels: Sequence[float], pack: "_Packing", factor: float, beyond: bool
+) -> Mapping[str, Any]:
+    """What is drawn and told of a path; `beyond` tells that it leaves the picture, `factor` magnifies."""
     path = result.paths[name]
-    axis = drive(result).axis
+    to = drive(result)
+    rest = path.problem.mesh.nodes
     states = [state for level in levels if (state := path.at(level)) is not None]
     one = result.comparisons.get(name)
     known = dict(zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True)) if one else {}
     errors = [next((error for at, error in known.items() if abs(at - s.load_factor) < 1e-9), None) for s in states]
     values: dict[str, Any] = {
         "name": name,
-        "label": path.label,
+        "label": full_name(result, name),
         "kind": path.kind,
+        "beyond": beyond,
         "levels": [state.load_factor for state in states],
-        "positions": [pack.places(state.positions) for state in states],
+        "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
         "lines": pack.pairs(path_lines(path)),
-        "force": [quantity(abs(float(path.applied_force(state)[axis])), "N") for state in states],
+        "force": [quantity(to.along(path.applied_force(state)), "N") for state in states],
         "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
         "errors": [None if error is None else percent(error) for error in errors],
         "surface": None,
     }
-    if path.surface is not None:
+    if path.surface is not None and factor == 1:
         surface = path.surface
         values["surface"] = {
             "level": surface.load_factor,
-            "points": pack.places(surface.points),
+            "points": pack.places(surface.points, beyond),
             "lines": pack.pairs(surface.outline),
         }
     return values
 
 
 class _Packing:
-    """Numbers as base64: places in 65536 steps of the box, far below a pixel, and pairs of node numbers."""
+    """Numbers as base64: places in 65536 steps of the box, far below a pixel, and pairs of node numbers.
+
+    Places beyond the box are written as single precision numbers of the same steps.
+    """
 
     def __init__(self, lower: Floats, extent: float) -> None:
         self.lower, self.extent = lower, extent or 1.0
 
-    def places(self, points: Floats) -> str:
-        share = (points[:, :2] - self.lower) / self.extent
-        return base64.b64encode(np.rint(share * 65535).astype("<u2").tobytes()).decode()
+    def places(self, points: Floats, beyond: bool = False) -> str:
+        steps = 65535 * (points[:, :2] - self.lower) / self.extent
+        packed = steps.astype("<f4") if beyond else np.rint(steps).astype("<u2")
+        return base64.b64encode(packed.tobytes()).decode()
 
     def pairs(self, lines: Ints) -> str:
         return base64.b64encode(lines.astype("<u4").tobytes()).decode()

@@ -1,5 +1,6 @@
 """Plots: displacement against force, errors by load level, Young's modulus by direction."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -7,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.mesh.selections import AXES
-from truespring.report.quantity import given, natural_scale, quantity, tolerance_percent
+from truespring.report.quantity import natural_scale, quantity, tolerance_percent
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK, POINT, is_strong, label_and_name, path_styles
-from truespring.report.verdict import display_name, drive
+from truespring.report.style import BLUE, FAINT, INK, POINT, is_strong, label_and_name, path_styles, text_width
+from truespring.report.verdict import display_name, drive, material_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,10 +50,9 @@ def curves_figure(result: Result) -> "Figure":
         )
         for name in forces
     ]
-    direction = f"{'−' if to.sign < 0 else ''}{AXES[to.axis]}"
     figure, axes = _plot("Displacement of the probe against force", curves)
-    axes.set_xlabel(f"total force along {direction} [{x_scale.unit}]")
-    axes.set_ylabel(f"displacement along {direction} [{y_scale.unit}]")
+    axes.set_xlabel(f"total force along {to.name} [{x_scale.unit}]")
+    axes.set_ylabel(f"displacement along {to.name} [{y_scale.unit}]")
     return figure
 
 
@@ -75,10 +74,8 @@ def error_figure(result: Result) -> "Figure":
     within = f"within {tolerance_percent(result.tolerance)}"
     curves.append(_Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    figure, axes = _plot(f"Error of {who} against each reference", curves)
+    figure, axes = _plot(f"Error of {who} against each reference", curves, to_right=1.02)
     axes.axhspan(0, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5)
-    axes.set_xlim(0, 1.02)
-    axes.set_ylim(bottom=0)
     axes.set_xlabel("load factor")
     axes.set_ylabel("rms error [%]")
     return figure
@@ -88,69 +85,103 @@ def _two_lines(result: Result, name: str) -> str:
     return "\n".join(label_and_name(result, name))
 
 
-def _plot(title: str, curves: Sequence[_Curve]) -> "tuple[Figure, Axes]":
-    """Curves with their names at their ends, moved apart where they would meet."""
+# Sizes in the margin that holds the names of curves [inch]: leader, sample of the line, text, and what is left free.
+_LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
+
+
+def _plot(title: str, curves: Sequence[_Curve], to_right: float | None = None) -> "tuple[Figure, Axes]":
+    """Curves with their names at their ends, moved apart where they would meet.
+
+    The axes end at 0 or below and, with `to_right`, span 0 to that.
+    """
     from matplotlib.figure import Figure
 
-    left, right, bottom, top = 0.62, 1.95, 0.5, 0.38
+    names = [(curve.label.partition("\n"), curve.strong) for curve in curves]
+    longest = max(max(text_width(one, 8, strong), text_width(two, 7)) for (one, _, two), strong in names)
+    left, bottom, top = 0.62, 0.5, 0.38
+    right = _LEADER + _SAMPLE + _GAP + longest + _FREE
     height = max(3.0, 0.34 * len(curves))
-    figure = Figure(figsize=(5.9, bottom + height + top), label=title)
+    figure = Figure(figsize=(max(5.9, left + 3.2 + right), bottom + height + top), label=title)
     total = figure.get_size_inches()
     box = (left / total[0], bottom / total[1], 1 - (left + right) / total[0], height / total[1])
     axes = figure.add_axes(box)
     figure.text(box[0], 1 - 0.19 / total[1], title, weight="bold", size=9, va="center")
     for curve in curves:
-        axes.plot(
-            curve.x,
-            curve.y,
-            color=curve.color,
-            ls=curve.dashes,
-            lw=2.2 if curve.strong else 1.3 if curve.marker else 1,
-            marker=curve.marker,
-            ms=4.2 if curve.strong else 3.6,
-            mfc=curve.color if curve.strong else "white",
-            mew=0.9,
-            zorder=4 if curve.strong else 3,
-            label=curve.label.replace("\n", ", "),
-        )
-    _name_ends(axes, curves, height)
+        axes.plot(curve.x, curve.y, label=curve.label.replace("\n", ", "), **_look(curve))
+    if to_right is not None:
+        axes.set_xlim(0, to_right)
+    axes.locator_params(nbins=6)
+    low, high = axes.get_ylim()
+    axes.set_ylim(0.0 if to_right is not None else min(low, 0.0), high)
+    _name_ends(figure, axes, curves, (box[2] * float(total[0]), height))
     return figure, axes
 
 
-def _name_ends(axes: "Axes", curves: Sequence[_Curve], height: float) -> None:
-    """Write each curve's name right of the axes, level with its end or as near as the others allow."""
-    axes.set_ylim(auto=True)
-    axes.autoscale_view()
-    bottom, top = axes.get_ylim()
-    bottom = min(bottom, 0.0) if bottom > 0 else bottom
-    axes.set_ylim(bottom, top)
-    ends = np.array([(curve.y[-1] - bottom) / (top - bottom) for curve in curves])
-    gap = (27 if any("\n" in curve.label for curve in curves) else 17) * POINT / height
-    for curve, place in zip(curves, _apart(ends, gap, np.array([curve.x[-1] for curve in curves])), strict=True):
+def _look(curve: _Curve) -> dict[str, Any]:
+    return {
+        "color": curve.color,
+        "ls": curve.dashes,
+        "lw": 2.2 if curve.strong else 1.3 if curve.marker else 1,
+        "marker": curve.marker,
+        "ms": 4.2 if curve.strong else 3.6,
+        "mfc": curve.color if curve.strong else "white",
+        "mew": 0.9,
+        "zorder": 4 if curve.strong else 3,
+    }
+
+
+def _name_ends(figure: "Figure", axes: "Axes", curves: Sequence[_Curve], size: tuple[float, float]) -> None:
+    """Write each curve's name right of the axes of `size` [inch], by height of their ends, with a sample of its line.
+
+    A leader joins the two where the curve ends near the right edge.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.transforms import Affine2D
+
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    ends = np.array([((one.x[-1] - left) / (right - left), (one.y[-1] - bottom) / (top - bottom)) for one in curves])
+    ends = ends.clip(0, 1) * size
+    gap = (27 if any("\n" in curve.label for curve in curves) else 17) * POINT
+    places = size[1] * _apart(ends[:, 1] / size[1], gap / size[1], ends[:, 0])
+    led = np.flatnonzero(ends[:, 0] > 0.9 * size[0])
+    places[led] = _uncrossed(ends[led], size[0] + _LEADER, places[led])
+    inches = Affine2D().scale(1 / size[0], 1 / size[1]) + axes.transAxes
+    for index, (curve, (x, y), place) in enumerate(zip(curves, ends, places, strict=True)):
         first, _, second = curve.label.partition("\n")
-        at = (1.0, float(place))
-        axes.annotate(
-            "",
-            (curve.x[-1], curve.y[-1]),
-            xytext=(1.035, float(place)),
-            textcoords="axes fraction",
-            arrowprops={"arrowstyle": "-", "color": FAINT, "lw": 0.7, "shrinkA": 0, "shrinkB": 4},
-            annotation_clip=False,
-        )
+        at = size[0] + _LEADER
+        if index in led:
+            leader = Line2D([x, at], [y, place], color=FAINT, lw=0.7, transform=inches, zorder=2, clip_on=False)
+            figure.add_artist(leader)
+        sample = Line2D([at, at + _SAMPLE / 2, at + _SAMPLE], [place] * 3, markevery=[1], **_look(curve))
+        sample.set(transform=inches, clip_on=False)
+        figure.add_artist(sample)
+        at += _SAMPLE + _GAP
         weight = "bold" if curve.strong else "normal"
-        for text, offset, color, size in ((first, 0.5 if second else 0, curve.color, 8), (second, -0.5, "#5b6168", 7)):
-            axes.annotate(
-                text,
-                at,
-                xycoords="axes fraction",
-                xytext=(10, 10 * offset),
-                textcoords="offset points",
-                color=color,
-                size=size,
-                weight=weight if text == first else "normal",
-                va="center",
-                annotation_clip=False,
-            )
+        up = 5 * POINT if second else 0.0
+        axes.text(at, place + up, first, color=curve.color, size=8, weight=weight, va="center", transform=inches)
+        if second:
+            axes.text(at, place - up, second, color="#5b6168", size=7, va="center", transform=inches)
+
+
+def _uncrossed(ends: Floats, to_right: float, places: Floats) -> Floats:
+    """Exchange `places`, shape (n,), until no two lines from `ends`, shape (n, 2), to (to_right, place) cross.
+
+    To exchange two that cross makes both together shorter, so it comes to an end.
+    """
+    places = places.copy()
+
+    def crossing() -> tuple[int, int] | None:
+        for i, j in itertools.combinations(range(len(places)), 2):
+            start = max(ends[i, 0], ends[j, 0])
+            share = (start - ends[[i, j], 0]) / (to_right - ends[[i, j], 0])
+            above = ends[[i, j], 1] + share * (places[[i, j]] - ends[[i, j], 1])
+            if (above[0] - above[1]) * (places[i] - places[j]) < -1e-12:
+                return i, j
+        return None
+
+    while (pair := crossing()) is not None:
+        places[list(pair)] = places[list(pair[::-1])]
+    return places
 
 
 def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
@@ -193,7 +224,10 @@ def moduli_figure(result: Result) -> "Figure":
     foot = (0.65 + 0.18 * len(known)) / total[1]
     axes = figure.add_axes((0.12, foot, 0.76, 0.76 * total[0] / total[1]), projection="polar")
     axes.plot(np.radians(angles), np.full(angles.shape, wanted / scale.size), color=INK, lw=1.3, ls=(0, (5, 2)))
-    handles, labels = [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))], [f"material: {given(wanted, 'Pa')}"]
+    handles, labels = (
+        [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))],
+        [f"{material_name(result)}: {quantity(wanted, 'Pa')}"],
+    )
     styles = path_styles(result)
     for name, values in young.items():
         color, dashes, _ = styles[name]

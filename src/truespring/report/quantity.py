@@ -31,7 +31,7 @@ def natural_scale(largest: float, unit: str) -> Scale:
 def quantity(value: float, unit: str, digits: int = 3) -> str:
     """Return a value in SI as a text in its natural unit: 8823.5 Pa is "8.82 kPa"."""
     scale = natural_scale(value, unit)
-    return f"{significant(value / scale.size, digits)} {scale.unit}"
+    return f"{significant(value / scale.size, digits)} {scale.unit}".replace("-", "\N{MINUS SIGN}")
 
 
 def given(value: float, unit: str) -> str:
@@ -49,6 +49,19 @@ def significant(value: float, digits: int) -> str:
     # Rounding may carry over: 9.96 is 10, not 10.0.
     decimals = digits - 1 - math.floor(math.log10(abs(rounded)))
     return f"{rounded:.{max(decimals, 0)}f}"
+
+
+def round_factor(share: float, least: float = 0.03, aim: float = 0.12) -> float:
+    """Return the factor 1, 2, 5, 10, 20, ... that brings a share under `least` to `aim` or a little below; else 1."""
+    if not 0 < share < least:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(aim / share))
+    return max(digit * power for digit in (1, 2, 5) if digit * power * share <= aim * (1 + 1e-9))
+
+
+def times(factor: float) -> str:
+    """Return a factor as people write it: 20000 is "× 20 000"."""
+    return f"× {factor:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
 
 
 def percent(share: float) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 from truespring.report.result import Result
@@ -72,12 +73,23 @@ def is_strong(result: Result, name: str) -> bool:
     return name == result.model or result.paths[name].kind == "springs"
 
 
+@cache
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """Return the width of a text in figures [inch]; `size` in points."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(family="DejaVu Sans", size=size, weight="bold" if bold else "normal")
+    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) * POINT
+
+
 def full_name(result: Result, name: str) -> str:
-    """The label of a path, and its name in the study where the label does not hold it."""
+    """The label of a path, and its name in the study where that is needed to know it by."""
     return " · ".join(label_and_name(result, name))
 
 
 def label_and_name(result: Result, name: str) -> tuple[str, ...]:
-    """Return the label of a path and, where it does not hold it, its name in the study."""
+    """Return the label of a path and its name in the study, where the label does not hold it or is not its own."""
     label = result.paths[name].label
-    return (label,) if name.casefold() in label.casefold() else (label, name)
+    alone = sum(path.label == label for path in result.paths.values()) == 1
+    return (label,) if alone and name.casefold() in label.casefold() else (label, name)

@@ -4,7 +4,7 @@ import math
 from importlib.metadata import version
 from typing import Any
 
-from truespring.compare import Comparison
+from truespring.comparison import Comparison
 from truespring.equilibrium import Path
 from truespring.models import Moduli
 from truespring.report.result import Result

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truespring.compare import Comparison
+from truespring.arrays import Floats
+from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State, Status
+from truespring.material import PlaneStrain
+from truespring.mesh.selections import AXES
 from truespring.models import Moduli
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
@@ -23,13 +26,20 @@ def verdict_sentences(result: Result) -> tuple[str, ...]:
 
 
 def closest_sentence(result: Result) -> str | None:
-    """Return which reference is nearest at full load; None where there is not one to choose from."""
-    name = result.closest
-    if name is None or len(result.comparisons) < 2:
+    """Return which reference is nearest at full load; None where none is to be named."""
+    name = nearest_reference(result)
+    if name is None:
         return None
     error = result.comparisons[name].rms_error
     assert error is not None  # what Result.closest chooses by
     return f"Nearest at {_full(result)} is {display_name(result, name)}, {percent(error)} off."
+
+
+def nearest_reference(result: Result) -> str | None:
+    """Return the name of the nearest reference; None without a choice, or where the model itself is in trouble."""
+    if result.model is None or len(result.comparisons) < 2 or path_trouble(result, result.model):
+        return None
+    return result.closest
 
 
 def reach(result: Result, one: Comparison) -> str:
@@ -48,24 +58,55 @@ def reach(result: Result, one: Comparison) -> str:
 
 
 def force_sentence(result: Result) -> str | None:
-    """Return the forces that a prescribed motion needs in each model; None where loads are given."""
+    """Return the forces that a prescribed motion needs in each model; None where loads are given.
+
+    A force is positive along the motion, and negative where the body has to be held back.
+    """
     if not _driven_by_motion(result) or result.model is None:
         return None
     model = result.paths[result.model]
     level = model.load_factor
-    needs = {}
-    for name in (result.model, *result.comparisons):
-        path = result.paths[name]
-        state = path.at(level)
-        if state is not None and path.potential is not None:
-            axis = drive(result).axis
-            needs[name] = abs(float(path.applied_force(state)[axis]))
-    if result.model not in needs or not level:
+    if model.potential is None or not level:
         return None
-    own = needs.pop(result.model)
-    others = [f"{display_name(result, name)} {quantity(force, 'N')}" for name, force in needs.items()]
-    text = f"The force it takes at {level_name(result, level)}: {_subject(result)[0]} {quantity(own, 'N')}"
-    return ", ".join([text, *others]) + "."
+    to = drive(result)
+    own = quantity(to.along(model.applied_force(model.states[-1])), "N")
+    parts = [f"The force it takes at {level_name(result, level)}, along {to.name}: {_subject(result)[0]} {own}"]
+    for name, one in result.comparisons.items():
+        state = one.reference.at(level)
+        if state is None or one.reference.potential is None:
+            continue
+        force = quantity(to.along(one.reference.applied_force(state)), "N")
+        apart = "" if one.force_error is None else f" ({percent(one.force_error)} off)"
+        parts.append(f"{display_name(result, name)} {force}{apart}")
+    return ", ".join(parts) + "."
+
+
+def mesh_sentence(result: Result) -> str | None:
+    """Return how far off the reference's own elements are in bending; None where that is little or not known.
+
+    The springs' moduli hold it, for bending along x, so it is said of bodies that are driven across x.
+    """
+    known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
+    finite = any(one.reference.kind == "fem" for one in result.comparisons.values())
+    if known is None or known.depth is None or not finite or drive(result).axis != 1:
+        return None
+    excess = known.fem_bending[known.depth] - 1
+    if abs(excess) <= 0.01:
+        return None
+    return (
+        f"The four-node elements themselves are {percent(abs(excess))} too {'stiff' if excess > 0 else 'soft'} in "
+        f"bending on this mesh ({deep(known.depth)}): a refined mesh tells how much of the distance is theirs."
+    )
+
+
+def material_name(result: Result) -> str:
+    """Return what the moduli that are wanted are called: in plane strain they are not the material's own."""
+    return "material in plane strain" if isinstance(result.problem.section, PlaneStrain) else "material"
+
+
+def deep(depth: int) -> str:
+    """Return a number of elements through the depth in words."""
+    return f"{depth} element{'' if depth == 1 else 's'} deep"
 
 
 def moduli_sentence(path: Path) -> str | None:
@@ -74,15 +115,17 @@ def moduli_sentence(path: Path) -> str | None:
     if moduli is None:
         return None
     bending = ""
-    if moduli.depth is not None and moduli.depth in moduli.bending:
-        elements = "element" if moduli.depth == 1 else "elements"
-        factor = significant(moduli.bending[moduli.depth], 4)
-        bending = f" Bent {moduli.depth} {elements} deep, they have {factor} times the bending stiffness EI."
+    if moduli.depth is not None:
+        factor, other = (significant(known[moduli.depth], 4) for known in (moduli.bending, moduli.fem_bending))
+        bending = (
+            f" Bent {deep(moduli.depth)}, they have {factor} times the material's bending stiffness EI; "
+            f"linear four-node FEM on this mesh has {other} times."
+        )
     return f"{_stiffness_sentence(moduli)}{bending}"
 
 
 def _stiffness_sentence(moduli: Moduli) -> str:
-    wanted = f"{given(moduli.young_wanted, 'Pa')} and {moduli.poisson_wanted:.2f}"
+    wanted = f"{given(float(f'{moduli.young_wanted:.4g}'), 'Pa')} and {moduli.poisson_wanted:.2f}"
     found = [(moduli.young(angle) / moduli.young_wanted, moduli.poisson(angle)) for angle in (0.0, 45.0)]
     if np.allclose(found, (1.0, moduli.poisson_wanted), rtol=0, atol=1e-3):  # two directions fix all four constants
         return f"These springs realise the material, in every direction: E and Poisson's ratio are {wanted}."
@@ -134,6 +177,15 @@ class Drive:
 
     axis: int
     sign: float
+
+    def along(self, vector: Floats) -> float:
+        """Return the component of a vector, positive along the drive."""
+        return self.sign * float(vector[self.axis])
+
+    @property
+    def name(self) -> str:
+        """The direction as people write it: x, −y."""
+        return f"{'−' if self.sign < 0 else ''}{AXES[self.axis]}"
 
 
 def drive(result: Result) -> Drive:

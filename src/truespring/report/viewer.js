@@ -4,21 +4,24 @@
   const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GRID = "#e9ecef";
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-  const places = (text) => new Uint16Array(bytes(text)); // x, y, x, y, ... in 0 ... 65535 of the box
+  // x, y, x, y, ... in 0 ... 65535 of the box, or beyond it
+  const places = (text, beyond) => new (beyond ? Float32Array : Uint16Array)(bytes(text));
   const pairs = (text) => new Uint32Array(bytes(text)); // from, to, from, to, ...
 
   for (const host of document.querySelectorAll("[data-viewer]")) {
     const data = JSON.parse(document.getElementById(host.dataset.viewer).textContent);
+    host.hidden = false; // first: hidden it has no width to draw in
     start(host, unpack(data));
-    host.hidden = false;
   }
 
   function unpack(data) {
     const paths = data.paths.map((path) => ({
       ...path,
       lines: pairs(path.lines),
-      positions: path.positions.map(places),
-      surface: path.surface && { ...path.surface, points: places(path.surface.points), lines: pairs(path.surface.lines) },
+      positions: path.positions.map((text) => places(text, path.beyond)),
+      surface: path.surface && {
+        ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
+      },
     }));
     return { ...data, paths, rest: places(data.rest), outline: pairs(data.outline) };
   }
@@ -123,6 +126,10 @@
       };
 
       bar(scale, height - 8, pad);
+      context.save();
+      context.beginPath();
+      context.rect(0, 0, width, scale * high + 2 * pad);
+      context.clip(); // of paths that leave the picture
       context.setLineDash([4, 3]);
       stroke(data.rest, data.outline, FAINT, 1);
       context.setLineDash([]);
@@ -146,7 +153,13 @@
       context.setLineDash([]);
       if (theirs) dot(theirs, data.probe, 4.5, "#fff", INK);
       dot(mine, data.probe, 4.5, RED, "#fff");
-      say(level);
+      context.restore();
+      say(level, reference && reference.beyond && leaves(outline ? outline.points : theirs));
+    }
+
+    function leaves(points) {
+      const longest = Math.max(...data.box), ends = data.box.map((one) => 65535 * one / longest);
+      return points && points.some((value, i) => value < -1 || value > ends[i % 2] + 1);
     }
 
     // A bar of a round length, so that the picture has a size.
@@ -165,12 +178,17 @@
       context.fillText(`${+length.toPrecision(3)} ${data.unit}`, left + length * scale + 7, bottom + 1);
     }
 
-    function say(level) {
-      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`, `force <b>${model.force[level]}</b>`];
-      parts.push(`<i class="blue"></i>probe moved <b>${model.moved[level]}</b>`);
+    function say(level, gone) {
+      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
+      const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
+      // Under loads the force is the same for all; a motion takes another of each.
+      const told = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
+      if (!data.motion) parts.push(force(model, level));
+      parts.push(`<i class="blue"></i>${told(model, level)}`);
       if (reference) {
         const other = index(reference, level);
-        if (other >= 0) parts.push(`<i class="black"></i>probe moved <b>${reference.moved[other]}</b>`);
+        if (other >= 0) parts.push(`<i class="black"></i>${told(reference, other)}`);
+        if (gone) parts.push("it leaves the picture");
         if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
         if (other < 0 && level) parts.push(surface(level) ? "an outline only" : "the reference is not known at this level");
       }
