@@ -236,8 +236,10 @@ def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]
         abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01
         for young, poisson in found.values()
     ):
-        shown = {f"{young:.6g} Pa and {poisson:.4g}": angle for angle, (young, poisson) in reversed(found.items())}
-        said = ", ".join(f"{moduli} at {angle} degrees" for moduli, angle in reversed(shown.items()))
+        shown: dict[str, int] = {}  # each pair once, at its first angle
+        for angle, (young, poisson) in found.items():
+            shown.setdefault(f"{young:.6g} Pa and {poisson:.4g}", angle)
+        said = ", ".join(f"{pair} at {angle} degrees" for pair, angle in shown.items())
         explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
         warnings.append(
             f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
