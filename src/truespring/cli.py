@@ -28,10 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return code
     except TruespringError as error:
         for line in str(error).splitlines():
-            print(f"truespring: {line}", file=sys.stderr)  # noqa: T201  # the one place that prints
+            print(f"truespring: {line}", file=sys.stderr)
         return WRONG_INPUT
     except MemoryError:
-        print("truespring: out of memory: take fewer elements", file=sys.stderr)  # noqa: T201
+        print("truespring: out of memory: take fewer elements", file=sys.stderr)
         return NOT_CONVERGED
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -138,7 +138,7 @@ def _say_failures(result: "Result", out: Path, shown: bool) -> None:
     """Name on standard error what did not converge and, unless `shown` already, why and what to try."""
     for name, path in result.paths.items():
         if str(path.status) != "converged":
-            print(  # noqa: T201
+            print(
                 f"truespring: {result.stem}: model '{name}' is {path.status}; "
                 f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
                 *(f"truespring:   {warning}" for warning in path.warnings if not shown),
@@ -171,7 +171,7 @@ def _schema(options: argparse.Namespace) -> int:
 
 
 def _print_json(value: Any) -> None:
-    print(json.dumps(value, indent=2, allow_nan=False))  # noqa: T201
+    print(json.dumps(value, indent=2, allow_nan=False))
 
 
 def _console(options: argparse.Namespace) -> "Console":

@@ -37,7 +37,8 @@ class Status(StrEnum):
 _ADVICE = {
     Status.CONVERGED: "every load level ended at a stable equilibrium",
     Status.UNSTABLE: "a real body would leave such a state; load less, or add a small side force to choose a branch",
-    Status.INVERTED: "an element is turned inside out; load less or refine the mesh",
+    Status.INVERTED: "an element is turned inside out; load less or take more load_steps: springs and "
+    "St. Venant-Kirchhoff have nothing that resists it",
     Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; load less, take more load_steps, "
     "or another law: each bears a largest load",
 }
