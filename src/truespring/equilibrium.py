@@ -143,14 +143,15 @@ class Path:
     def applied_force(self, state: State) -> Floats:
         """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion.
 
-        The reaction of all nodes that move with the largest motion, not against it: of two sides pulled
-        apart, one. Not a number where it is not known.
+        The reaction of all nodes that move, but for those that move against the largest motion: of two
+        sides pulled apart, one. Not a number where it is not known.
         """
         loading = self.problem.loading
         if not loading.driven_by_motion:
             return np.asarray(state.load_factor * loading.external_force.sum(axis=0))
         largest = loading.displacement[np.linalg.norm(loading.displacement, axis=1).argmax()]
-        return np.asarray(state.reaction[loading.displacement @ largest > 0].sum(axis=0))
+        moved = loading.displacement.any(axis=1) & (loading.displacement @ largest >= 0)
+        return np.asarray(state.reaction[moved].sum(axis=0))
 
 
 def solve(

@@ -164,24 +164,26 @@ class FemPotential:
         return self.mesh.kind.vtk, self.mesh.elements
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """True stress [Pa], padded to 3 by 3 and flattened, and strain energy [J] of each element."""
-        stress = np.zeros((len(self.mesh.elements), 3, 3))
-        stress[:, : self.mesh.dim, : self.mesh.dim] = self.cauchy_stress(positions)
+        """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""
+        stress = self.cauchy_stress(positions)
         energy = (self._respond(positions)[1].energy * self._volumes).sum(axis=1)
         return {"stress": stress.reshape(-1, 9), "strain_energy": energy}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
-        """True stress averaged over the points of each element [Pa], shape (n_elements, dim, dim).
+        """True stress averaged over the points of each element [Pa], shape (n_elements, 3, 3).
 
         F S F^T over the volume ratio, the change of thickness included; of the linear law, its stress.
         """
         F, response = self._respond(positions)
-        true = response.stress
+        dim = self.mesh.dim
+        stress = np.zeros((3, 3, *F.shape[2:]))
+        stress[2, 2] = response.across
+        stress[:dim, :dim] = response.stress
         if self.law.finite:
+            stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, response.stress, F)
             volume = _determinant(F) * response.thickness_stretch
-            pushed = np.einsum("ik...,kl...,jl...->ij...", F, true, F)
-            true = np.divide(pushed, volume, out=np.full_like(pushed, np.nan), where=volume != 0)
-        return np.moveaxis(true.mean(axis=-1), -1, 0)
+            stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
+        return np.moveaxis(stress.mean(axis=-1), -1, 0)
 
 
 def _determinant(F: Floats) -> Floats:

@@ -48,12 +48,14 @@ class Response:
         stress: second Piola-Kirchhoff stress [Pa], axes (i, j, ...); of the linear law, the stress.
         elasticity: its derivative by the Green strain [Pa], axes (i, j, k, l, ...).
         thickness_stretch: length of the third direction over its rest length; 1 where it is held or in 3D.
+        across: Kirchhoff stress of the third direction [Pa], zero in plane stress; of the linear law, the stress.
     """
 
     energy: Floats
     stress: Floats
     elasticity: Floats
     thickness_stretch: Floats
+    across: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,8 @@ def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Respo
     swap = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
     elasticity = lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * swap
     energy = lam / 2 * trace**2 + mu * np.einsum("ij...,ij...->...", strain, strain)
-    return Response(energy, stress, _everywhere(elasticity, strain), thickness)
+    across = np.zeros_like(trace) if constants.plane_stress else lam * trace
+    return Response(energy, stress, _everywhere(elasticity, strain), thickness, across)
 
 
 def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
@@ -126,7 +129,7 @@ def neo_hookean(C: Floats, constants: Constants) -> Response:
     elasticity = lam_eliminated * outer + (mu - lam * log_J) * swap
     trace = np.einsum("ii...->...", C) - len(C) + (C_33 - 1)
     energy = np.where(valid, mu / 2 * trace - mu * log_J + lam / 2 * log_J**2, np.inf)
-    return Response(energy, stress, elasticity, np.sqrt(C_33))
+    return Response(energy, stress, elasticity, np.sqrt(C_33), mu * (C_33 - 1) + lam * log_J)
 
 
 def _free_thickness(log_det: Floats, ratio: float) -> Floats:
@@ -178,7 +181,8 @@ def hencky(C: Floats, constants: Constants) -> Response:
     stress = np.einsum("i...,ai...,bi...->ab...", tau / c, N, N)
     energy = np.where(valid, mu * (strain**2).sum(axis=0) + lam / 2 * trace**2, np.inf)
     free = -constants.lam / (constants.lam + 2 * constants.mu) * trace if constants.plane_stress else 0.0 * trace
-    return Response(energy, stress, elasticity, np.exp(free))
+    across = np.zeros_like(trace) if constants.plane_stress else lam * trace
+    return Response(energy, stress, elasticity, np.exp(free), across)
 
 
 def _log_difference(a: Floats, b: Floats) -> Floats:
