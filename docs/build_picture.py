@@ -55,7 +55,7 @@ def picture() -> Figure:
 
 
 def draw(ax: object, points: Floats, lines: Ints, color: str, width: float) -> None:
-    ax.add_collection(LineCollection(points[lines], colors=color, linewidths=width))  # type: ignore[attr-defined]
+    ax.add_collection(LineCollection(points[lines], colors=color, linewidths=width))
 
 
 if __name__ == "__main__":

@@ -84,11 +84,11 @@ def check(
 @settings(max_examples=15, deadline=None, derandomize=True)
 @asked
 def test_states_are_what_they_are_said_to_be(**asked_for: object) -> None:
-    check(**asked_for)  # type: ignore[arg-type]
+    check(**asked_for)
 
 
 @pytest.mark.verification
 @settings(max_examples=400, deadline=None)
 @asked
 def test_states_are_what_they_are_said_to_be_at_length(**asked_for: object) -> None:
-    check(**asked_for)  # type: ignore[arg-type]
+    check(**asked_for)

@@ -326,7 +326,7 @@ def test_one_iteration_is_not_enough_and_says_so() -> None:
 )
 def test_settings_without_sense_are_refused(settings_of_newton: dict[str, float]) -> None:
     with pytest.raises(ts.TruespringError):
-        ts.Newton(**settings_of_newton)  # type: ignore[arg-type]
+        ts.Newton(**settings_of_newton)
 
 
 # --- Rigid motion ----------------------------------------------------------------------------------------------------

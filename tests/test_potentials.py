@@ -258,7 +258,7 @@ def test_the_projected_hessian_is_semidefinite(name: str, seed: int, squeeze: fl
 def test_the_projection_acts_in_compression(name: str) -> None:
     potential = CASES[name].potential()
     squeezed = potential.nodes * 0.6
-    hessian, projected = potential.hessian(squeezed).toarray(), potential.projected_hessian(squeezed).toarray()  # type: ignore[attr-defined]
+    hessian, projected = potential.hessian(squeezed).toarray(), potential.projected_hessian(squeezed).toarray()
     assert np.linalg.eigvalsh(hessian)[0] < -1e-3 * np.abs(hessian).max()
     assert np.abs(projected - hessian).max() > 1e-2 * np.abs(hessian).max()
 

@@ -55,11 +55,6 @@ class Section(ABC):
     def plane_moduli(self, material: Material) -> tuple[float, float]:
         """Return Young's modulus [Pa] and Poisson's ratio [-] as seen by a test within the plane."""
 
-    def plane_lame(self, material: Material) -> Lame:
-        """Lamé constants of the linear law within the plane [Pa]."""
-        young, poisson = self.plane_moduli(material)
-        return Lame(young * poisson / (1 - poisson**2), material.lame.mu)
-
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Section):

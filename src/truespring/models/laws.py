@@ -71,7 +71,6 @@ class Law:
     finite: bool
     barrier: bool
     label: str
-    formula: str
 
 
 def linear(strain: Floats, constants: Constants) -> Response:
@@ -214,11 +213,11 @@ def _inverse(tensor: Floats) -> Floats:
 
 LAWS: MappingProxyType[str, Law] = MappingProxyType(
     {
-        "linear": Law(linear, False, False, "linear FEM", "lam/2 (tr e)^2 + mu e:e"),
+        "linear": Law(linear, finite=False, barrier=False, label="linear FEM"),
         "saint-venant-kirchhoff": Law(
-            saint_venant_kirchhoff, True, False, "St. Venant-Kirchhoff FEM", "lam/2 (tr E)^2 + mu E:E"
+            saint_venant_kirchhoff, finite=True, barrier=False, label="St. Venant-Kirchhoff FEM"
         ),
-        "neo-hookean": Law(neo_hookean, True, True, "neo-Hookean FEM", "mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2"),
-        "hencky": Law(hencky, True, True, "Hencky FEM", "mu |ln U|^2 + lam/2 (tr ln U)^2"),
+        "neo-hookean": Law(neo_hookean, finite=True, barrier=True, label="neo-Hookean FEM"),
+        "hencky": Law(hencky, finite=True, barrier=True, label="Hencky FEM"),
     }
 )
