@@ -1,7 +1,7 @@
 """Geometry that knows no physics: nodes, elements, named sides, selections."""
 
-from truespring.mesh.mesh import ELEMENT_KINDS as ELEMENT_KINDS
-from truespring.mesh.mesh import ElementKind as ElementKind
+from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
+from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.mesh import Mesh as Mesh
 from truespring.mesh.selections import Box as Box
 from truespring.mesh.selections import Near as Near

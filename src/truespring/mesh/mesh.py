@@ -1,61 +1,22 @@
 """The mesh: nodes, elements of one kind, and what follows from them alone."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
-from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
+from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind
 
-
-@dataclass(frozen=True)
-class ElementKind:
-    """The table entry of an element: local node numbers only, no coordinates.
-
-    `edges` and `diagonals` are the pairs that may carry a spring; `sharing` tells for each pair
-    (edges first) how many elements of an unbounded regular mesh share it. `facets` bound the
-    element, and `corners` lists for each node the neighbours that span its corner Jacobian,
-    in right-handed order.
-    """
-
-    dim: int
-    edges: tuple[tuple[int, int], ...]
-    diagonals: tuple[tuple[int, int], ...]
-    sharing: tuple[int, ...]
-    facets: tuple[tuple[int, ...], ...]
-    corners: tuple[tuple[int, ...], ...]
-    vtk: str
-
-    @property
-    def links(self) -> tuple[tuple[int, int], ...]:
-        """All pairs that may carry a spring: edges, then diagonals."""
-        return self.edges + self.diagonals
-
-
-ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
-    {
-        "line": ElementKind(
-            dim=1,
-            edges=((0, 1),),
-            diagonals=(),
-            sharing=(1,),
-            facets=((0,), (1,)),
-            corners=(),
-            vtk="line",
-        ),
-        "quadrilateral": ElementKind(
-            dim=2,
-            edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-            diagonals=((0, 2), (1, 3)),
-            sharing=(2, 2, 2, 2, 1, 1),
-            facets=((0, 1), (1, 2), (2, 3), (3, 0)),
-            corners=((1, 3), (2, 0), (3, 1), (0, 2)),
-            vtk="quad",
-        ),
-    }
-)
+# An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
+# dimension: elements a thousand times longer than wide, as shapes allow, are well above.
+_DEGENERATE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,13 +27,20 @@ class Mesh:
         nodes: reference positions [m], shape (n_nodes, dim).
         elements: node numbers, shape (n_elements, nodes of the kind).
         element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses).
+        node_groups: node numbers by name, ascending; names for supports, loads and probes.
+        element_groups: element numbers by name, ascending; names for regions of another material.
+        notes: what should be known of a mesh that was read, in words.
 
-    Raises MeshError where numbers do not fit each other or an element is inverted or degenerate.
+    Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
+    twice, or a node belongs to no element.
     """
 
     nodes: Floats
     elements: Ints
     element: str = "quadrilateral"
+    node_groups: Mapping[str, Ints] = field(default_factory=dict)
+    element_groups: Mapping[str, Ints] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.element not in ELEMENT_KINDS:
@@ -80,12 +48,13 @@ class Mesh:
             raise MeshError(
                 f"element = '{self.element}' is unknown{nearest(self.element, ELEMENT_KINDS)}; allowed: {allowed}"
             )
-        n_corners = 1 + max(max(link) for link in self.kind.links)
         try:
             object.__setattr__(self, "nodes", frozen_floats(self.nodes, (None, None), "nodes"))
-            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, n_corners), "elements"))
+            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, self.kind.n_nodes), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
+        object.__setattr__(self, "node_groups", _groups(self.node_groups, self.n_nodes, "node"))
+        object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
         self._check()
 
     def __repr__(self) -> str:
@@ -101,12 +70,34 @@ class Mesh:
                 f"elements name nodes {self.elements.min()} to {self.elements.max()}, "
                 f"there are 0 to {len(self.nodes) - 1}"
             )
-        bad = np.flatnonzero(self.corner_jacobians(self.nodes).min(axis=1) <= 0)
-        if bad.size:
-            place = self.nodes[self.elements[bad[0]]].mean(axis=0)
+        used = np.zeros(self.n_nodes, dtype=bool)
+        used[self.elements] = True
+        self._refuse(~used, "nodes", "unreferenced: no element has them", self.nodes)
+        centres = self.nodes[self.elements].mean(axis=1)
+        smallest = self._rest_jacobians.min(axis=1)
+        self._refuse(smallest <= -self._degenerate, "elements", "inverted: their corner Jacobian is negative", centres)
+        self._refuse(smallest <= self._degenerate, "elements", "degenerate: flat or with nodes that coincide", centres)
+        if self.element != "line":  # springs may be parallel
+            _, first = np.unique(np.sort(self.elements, axis=1), axis=0, return_index=True)
+            twice = np.ones(len(self.elements), dtype=bool)
+            twice[first] = False
+            self._refuse(twice, "elements", "duplicate: others have the same nodes", centres)
+
+    @property
+    def _degenerate(self) -> Floats:
+        """The corner Jacobian below which an element is degenerate [m^dim], shape (n_elements,)."""
+        edges = np.array(self.kind.edges)
+        at = self.nodes[self.elements]
+        longest = np.linalg.norm(at[:, edges[:, 1]] - at[:, edges[:, 0]], axis=2).max(axis=1)
+        return np.asarray(_DEGENERATE * longest**self.kind.dim if self.element != "line" else 0.0 * longest)
+
+    def _refuse(self, bad: Bools, what: str, why: str, places: Floats) -> None:
+        """Name, count and locate what is wrong."""
+        if bad.any():
+            first = int(bad.argmax())
+            place = ", ".join(f"{coordinate:.6g}" for coordinate in places[first])
             raise MeshError(
-                f"{bad.size} of {len(self.elements)} elements are inverted or degenerate, "
-                f"the first is element {bad[0]} at {np.array2string(place, precision=6)} m"
+                f"{int(bad.sum())} of {len(bad)} {what} are {why}; the first is {what[:-1]} {first} at ({place}) m"
             )
 
     @property
@@ -175,8 +166,7 @@ class Mesh:
         at = positions[self.elements]
         if self.element == "line":
             return np.asarray(np.linalg.norm(at[:, 1] - at[:, 0], axis=1)[:, None])
-        spans = [at[:, list(ends)] - at[:, [corner]] for corner, ends in enumerate(self.kind.corners)]
-        return np.stack([np.linalg.det(span) for span in spans], axis=1)
+        return _determinants(at, self.kind.corners)
 
     def smallest_area_ratio(self, positions: Floats) -> float:
         """Return the smallest corner Jacobian over its rest value: not positive where an element is inverted."""
@@ -188,8 +178,38 @@ class Mesh:
 
     @cached_property
     def measures(self) -> Floats:
-        """Length, area or volume of each element at rest [m^k], shape (n_elements,).
+        """Length, area or volume of each element at rest [m^dim of the kind], shape (n_elements,)."""
+        if self.element == "line":
+            return np.asarray(self._rest_jacobians[:, 0])
+        return self.measures_at(self.nodes)
 
-        The mean of the corner Jacobians, exact for parallelograms and for plane quadrilaterals.
-        """
-        return np.asarray(self._rest_jacobians.mean(axis=1))
+    def measures_at(self, positions: Floats) -> Floats:
+        """Signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact for each kind."""
+        determinants = _determinants(positions[self.elements], self.kind.simplices)
+        return np.asarray(determinants.sum(axis=1) * self.kind.simplex_weight / math.factorial(self.kind.dim))
+
+    @cached_property
+    def parts(self) -> Ints:
+        """The connected part of the mesh that each node belongs to, numbered from 0, shape (n_nodes,)."""
+        first, others = self.elements[:, :1], self.elements[:, 1:]
+        pairs = np.stack(np.broadcast_arrays(first, others), axis=-1).reshape(-1, 2)
+        graph = sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(self.n_nodes, self.n_nodes))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _determinants(at: Floats, simplices: Sequence[tuple[int, ...]]) -> Floats:
+    """Determinant spanned at the first of each simplex' nodes by the others, shape (n_elements, simplices)."""
+    local = np.array(simplices)
+    return np.asarray(np.linalg.det(at[:, local[:, 1:]] - at[:, local[:, :1]]))
+
+
+def _groups(groups: Mapping[str, Ints], n_there: int, what: str) -> Mapping[str, Ints]:
+    """Freeze groups: numbers ascending and each once; raise MeshError for one that is empty or does not exist."""
+    frozen = {}
+    for name, numbers in groups.items():
+        members = np.unique(np.asarray(numbers, dtype=np.int64))
+        if not members.size or members[0] < 0 or members[-1] >= n_there:
+            raise MeshError(f"{what} group '{name}' is empty or names a {what} that does not exist")
+        members.setflags(write=False)
+        frozen[name] = members
+    return MappingProxyType(frozen)
