@@ -9,10 +9,9 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
-from truespring.material import PlaneStrain
 from truespring.mesh import Surface
-from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, moduli
-from truespring.potential import Potential, Stretched
+from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli
+from truespring.potential import Loading, Potential, Refined, Stretched
 from truespring.problem import Problem
 from truespring.solvers import Equilibrium, Newton, Reporter
 
@@ -51,6 +50,7 @@ class State:
     Attributes:
         load_factor: share of the full load [-].
         positions, displacement: [m], shape (n_nodes, dim).
+        all_positions: of every node of the potential, the mesh's first: quadratic elements have more [m].
         reaction: force of the supports [N], shape (n_nodes, dim), zero where nothing is held.
         energy: stored elastic energy [J].
         iterations: Newton iterations.
@@ -64,6 +64,7 @@ class State:
 
     load_factor: float
     positions: Floats
+    all_positions: Floats
     displacement: Floats
     reaction: Floats
     energy: float
@@ -95,7 +96,8 @@ class Path:
         seconds: wall time from the built mesh to the last equilibrium.
         surface: what was read from a file that holds no more than a deformed surface.
         potential: what was solved, None for a path from elsewhere.
-        moduli: what the springs realise, None for other models and irregular networks.
+        moduli: what the springs realise on the problem's own material, None for other models and networks.
+        n_unknowns: the directions of nodes that were free, 0 where nothing was solved.
     """
 
     problem: Problem
@@ -109,6 +111,7 @@ class Path:
     surface: Surface | None = None
     potential: Potential | None = None
     moduli: Moduli | None = None
+    n_unknowns: int = 0
 
     def __repr__(self) -> str:
         return f"Path({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
@@ -170,42 +173,52 @@ def solve(
         raise ModelError(f"{model!r} is no model: give Springs(rule=...), Fem(law=...) or a SpringNetwork")
     started = time.perf_counter()
     potential = model if isinstance(model, Potential) else model.potential(problem)
-    if potential.nodes.shape != problem.mesh.nodes.shape:
+    if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
     linear = isinstance(model, Fem) and not LAWS[model.law].finite
+    loading = potential.loading if isinstance(potential, Refined) else problem.loading
 
     def upright(positions: Floats) -> bool:
         return linear or problem.mesh.smallest_area_ratio(positions) > 0
 
-    found = list((solver or Newton()).follow(potential, problem.loading, report, upright))
+    found = list((solver or Newton()).follow(potential, loading, report, upright))
     seconds = time.perf_counter() - started
     realised = moduli(problem, model) if isinstance(model, Springs) else None
-    states = tuple(_state(problem, potential, one) for one in found if one.converged)
-    best = None if found[-1].converged else _state(problem, potential, found[-1])
+    states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
+    best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
+    known = () if isinstance(model, Potential) else model_warnings(problem, model)
     return Path(
         problem=problem,
         label="springs" if isinstance(model, SpringNetwork) else getattr(model, "label", type(model).__name__),
         kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
         states=states,
         status=_status(states, best, linear),
-        warnings=(*model_warnings(problem, realised), *_path_warnings(states, best, linear)),
+        warnings=(*known, *_path_warnings(states, best, linear)),
         seconds=seconds,
         best=best,
         potential=potential,
         moduli=realised,
+        n_unknowns=int((~loading.held).sum()),
     )
 
 
-def _state(problem: Problem, potential: Potential, found: Equilibrium) -> State:
-    loading = problem.loading
+def _state(problem: Problem, potential: Potential, loading: Loading, found: Equilibrium) -> State:
     reaction = np.where(loading.held, found.internal_force - found.load_factor * loading.external_force, 0.0)
     stretch = potential.stretch(found.positions) if isinstance(potential, Stretched) else None
+    n_nodes = problem.mesh.n_nodes
+    positions = found.positions[:n_nodes]
+    if isinstance(potential, Refined):  # what acts between two nodes of the mesh acts on both by half
+        further = reaction[n_nodes:]
+        reaction = reaction[:n_nodes].copy()
+        for end in (0, 1):
+            np.add.at(reaction, potential.parents[:, end], further / 2)
     return State(
         load_factor=found.load_factor,
-        positions=found.positions,
-        displacement=found.positions - problem.mesh.nodes,
+        positions=positions,
+        all_positions=found.positions,
+        displacement=positions - problem.mesh.nodes,
         reaction=reaction,
         energy=found.energy,
         iterations=found.iterations,
@@ -213,7 +226,7 @@ def _state(problem: Problem, potential: Potential, found: Equilibrium) -> State:
         negative_eigenvalues=found.negative_eigenvalues,
         branched=found.branched,
         snapped=found.snapped,
-        area_ratio=problem.mesh.smallest_area_ratio(found.positions),
+        area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
 
@@ -226,34 +239,6 @@ def _status(states: tuple[State, ...], best: State | None, linear: bool) -> Stat
     if any(state.negative_eigenvalues for state in states):
         return Status.UNSTABLE
     return Status.CONVERGED
-
-
-def model_warnings(problem: Problem, realised: Moduli | None) -> tuple[str, ...]:
-    """Return what should be known of springs before they are solved: moduli other than the material's."""
-    if realised is None:
-        return ()
-    warnings = []
-    found = {angle: (realised.young(angle), realised.poisson(angle)) for angle in (0, 45, 90)}
-    if any(
-        abs(young / realised.young_wanted - 1) > 0.01 or abs(poisson - realised.poisson_wanted) > 0.01
-        for young, poisson in found.values()
-    ):
-        shown: dict[str, int] = {}  # each pair once, at its first angle
-        for angle, (young, poisson) in found.items():
-            shown.setdefault(f"{young:.6g} Pa and {poisson:.4g}", angle)
-        said = ", ".join(f"{pair} at {angle} degrees" for pair, angle in shown.items())
-        explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
-        warnings.append(
-            f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
-            f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
-        )
-    factor = realised.bending[realised.depth] if realised.depth else 1.0
-    if abs(factor - 1) > 0.05:
-        warnings.append(
-            f"bent along x, {realised.depth} elements deep, these springs have {factor:.4g} times the bending "
-            "stiffness EI of the material"
-        )
-    return tuple(warnings)
 
 
 def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ class Material:
 
 @dataclass(frozen=True, slots=True)
 class Section(ABC):
-    """How a plane body carries its third direction; `thickness` [m]."""
+    """How a body carries the direction that its mesh does not have; `thickness` [m], 1 for a solid."""
 
     thickness: float
 
@@ -52,23 +52,43 @@ class Section(ABC):
             raise ProblemError(f"thickness = {self.thickness!r} m: a thickness must be positive and finite")
 
     @abstractmethod
-    def plane_moduli(self, material: Material) -> tuple[float, float]:
-        """Return Young's modulus [Pa] and Poisson's ratio [-] as seen by a test within the plane."""
+    def apparent_moduli(self, material: Material) -> tuple[float, float]:
+        """Return Young's modulus [Pa] and Poisson's ratio [-] as seen by a test within the mesh's directions."""
+
+    def lame_within(self, material: Material) -> Lame:
+        """Return the Lamé constants of Hooke's law within the mesh's directions [Pa]."""
+        return material.lame
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Section):
     """A thin body, free to change its thickness."""
 
-    def plane_moduli(self, material: Material) -> tuple[float, float]:
+    def apparent_moduli(self, material: Material) -> tuple[float, float]:
         """Those of the material itself."""
         return material.young, material.poisson
+
+    def lame_within(self, material: Material) -> Lame:
+        """2 lam mu / (lam + 2 mu) and mu."""
+        lam, mu = material.lame
+        return Lame(2 * lam * mu / (lam + 2 * mu), mu)
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneStrain(Section):
     """A slice of a long body, held at its thickness."""
 
-    def plane_moduli(self, material: Material) -> tuple[float, float]:
+    def apparent_moduli(self, material: Material) -> tuple[float, float]:
         """E / (1 - nu^2) and nu / (1 - nu)."""
         return material.young / (1 - material.poisson**2), material.poisson / (1 - material.poisson)
+
+
+@dataclass(frozen=True, slots=True)
+class Solid(Section):
+    """A body in three dimensions, which needs no section: what a Problem in 3D has by itself."""
+
+    thickness: float = 1.0
+
+    def apparent_moduli(self, material: Material) -> tuple[float, float]:
+        """Those of the material itself."""
+        return material.young, material.poisson

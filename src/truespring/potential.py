@@ -113,6 +113,21 @@ class Loading:
         return not self.external_force.any()
 
 
+@runtime_checkable
+class Refined(Potential, Protocol):
+    """A potential with more nodes than the problem's mesh, whose nodes come first."""
+
+    @property
+    def parents(self) -> Ints:
+        """The two nodes of the mesh midway between which each further node stands, shape (n_further, 2)."""
+        ...
+
+    @property
+    def loading(self) -> Loading:
+        """The problem's loading on all its nodes."""
+        ...
+
+
 class Pattern:
     """The fixed sparsity of a sum of small dense blocks, built once and filled many times."""
 

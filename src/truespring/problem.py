@@ -1,16 +1,16 @@
 """The problem: what is asked, stated once and frozen. Mesh, material, section, supports, loads."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import NoLoadError, ProblemError
-from truespring.material import Material, Section
-from truespring.mesh import Mesh, Selection, select, shares
+from truespring.material import Material, Section, Solid
+from truespring.mesh import Mesh, Selection, select, select_elements, shares
 from truespring.mesh.selections import AXES
 from truespring.potential import Loading
 
@@ -19,7 +19,8 @@ from truespring.potential import Loading
 class Fixed:
     """A support: the directions `fix` of the nodes `on` are held (all of them by default).
 
-    `on` is a side ("left", "right", "bottom", "top"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
+    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
+    ("right-middle"), a Plane, a Box, a Near or node numbers.
     `displacement` [m], one value a direction, moves them instead; it scales with the load factor.
     """
 
@@ -32,20 +33,33 @@ class Fixed:
 class Force:
     """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`.
 
-    `on` is a side ("left", "right", "bottom", "top"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
+    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
+    ("right-middle"), a Plane, a Box, a Near or node numbers.
     """
 
     on: Selection
     total: Sequence[float]
 
 
+@dataclass(frozen=True)
+class Region:
+    """A part of the body of another `material`.
+
+    `on` is an element group of the mesh, a Box that holds the centres of its elements, or element numbers.
+    """
+
+    on: Selection
+    material: Material
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A body, how it is held and what pulls at it.
 
-    `material` and `section` may be absent where the model brings its own stiffness (a SpringNetwork).
+    `material` and `section` may be absent where the model brings its own stiffness (a SpringNetwork);
+    a body in three dimensions has the section Solid by itself. Where `regions` overlap the last one counts.
     Raises ProblemError or MeshError where the parts do not fit, nothing loads the body, or the
-    supports leave it free to move as a rigid body.
+    supports leave it, or a part of it that nothing joins to the rest, free to move as a rigid body.
     """
 
     mesh: Mesh
@@ -53,12 +67,20 @@ class Problem:
     section: Section | None = None
     supports: Sequence[Fixed] = field(default=())
     loads: Sequence[Force] = field(default=())
+    regions: Sequence[Region] = field(default=())
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "regions", _several(self.regions, Region, "regions"))
         object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports"))
         object.__setattr__(self, "loads", _several(self.loads, Force, "loads"))
         if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
+        if self.mesh.kind.dim == 3 and self.section is None:
+            object.__setattr__(self, "section", Solid())
+        if isinstance(self.section, Solid) != (self.mesh.kind.dim == 3) and self.section is not None:
+            raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.element} elements")
+        if self.regions and self.material is None:
+            raise ProblemError("regions of another material need a material for the rest")
         loading = self.loading
         if not loading.external_force[~loading.held].any() and not loading.displacement.any():
             held = " in a direction that is free" if loading.external_force.any() else ""
@@ -66,6 +88,32 @@ class Problem:
                 f"nothing loads the body{held}: give a load, or a support with a displacement that is not zero"
             )
         self._refuse_rigid_motion()
+
+    @cached_property
+    def materials(self) -> tuple[Material, ...]:
+        """Each material once: that of the body, then those of the regions; empty without a material."""
+        if self.material is None:
+            return ()
+        return tuple(dict.fromkeys([self.material, *(region.material for region in self.regions)]))
+
+    @cached_property
+    def material_numbers(self) -> Ints:
+        """The place in `materials` of each element's own, shape (n_elements,)."""
+        numbers = np.zeros(len(self.mesh.elements), dtype=np.int64)
+        for region in self.regions:
+            numbers[select_elements(self.mesh, region.on)] = self.materials.index(region.material)
+        return numbers
+
+    @cached_property
+    def homogeneous(self) -> "tuple[Problem, ...]":
+        """The problem once for each of `materials`, its body all of that one; itself where there is but one."""
+        if not self.regions:
+            return (self,)
+        return tuple(replace(self, material=material, regions=()) for material in self.materials)
+
+    def of_elements(self, value: Callable[[Material], float]) -> Floats:
+        """Return a value of each element's own material, shape (n_elements,)."""
+        return np.array([value(material) for material in self.materials])[self.material_numbers]
 
     @cached_property
     def loading(self) -> Loading:
@@ -112,15 +160,32 @@ class Problem:
 
     def _refuse_rigid_motion(self) -> None:
         """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
-        modes = rigid_body_modes(self.mesh.nodes)
-        hindered = modes[self.loading.held.ravel()]
+        parts = self.mesh.parts
+        n_parts = int(parts.max()) + 1
+        for part in range(n_parts):
+            nodes = np.flatnonzero(parts == part)
+            free = self._rigid_freedom(nodes)
+            if free is None:
+                continue
+            body = "the body"
+            if n_parts > 1:
+                place = ", ".join(f"{coordinate:.6g}" for coordinate in self.mesh.nodes[nodes].mean(axis=0))
+                body = (
+                    f"one of {n_parts} parts that nothing joins, disconnected without support enough "
+                    f"({len(nodes)} nodes about ({place}) m),"
+                )
+            raise ProblemError(
+                f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
+            )
+
+    def _rigid_freedom(self, nodes: Ints) -> str | None:
+        """How `nodes` may move as a rigid body in spite of their supports, None where they can't."""
+        modes = rigid_body_modes(self.mesh.nodes[nodes])
+        hindered = modes[self.loading.held[nodes].ravel()]
         if hindered.size and np.linalg.matrix_rank(hindered, tol=1e-9 * np.sqrt(len(modes))) == modes.shape[1]:
-            return
+            return None
         free = [axis for axis, mode in zip(AXES[: self.mesh.dim], hindered.T, strict=False) if not mode.any()]
-        raise ProblemError(
-            f"the supports leave the body free to move {'along ' + ', '.join(free) if free else 'by turning'} "
-            "as a rigid body: hold more directions or more nodes"
-        )
+        return f"along {', '.join(free)}" if free else "by turning"
 
 
 def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:

@@ -58,7 +58,7 @@ class Mesh:
         self._check()
 
     def __repr__(self) -> str:
-        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} {self.element}s)"
+        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

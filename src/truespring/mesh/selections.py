@@ -48,23 +48,47 @@ class Near:
     point: tuple[float, ...]
 
 
-#: A side or named point ("left", "right-middle"), one of the classes above, or node numbers.
+#: A group of the mesh, a side or named point ("left", "right-middle"), one of the classes above, or node numbers.
 Selection = str | Plane | Box | Near | Sequence[int]
 
 
 def select(mesh: Mesh, on: Selection) -> Ints:
     """Return the numbers of the nodes selected, ascending; raise MeshError where there is none."""
     match on:
+        case str() if on in mesh.node_groups:
+            return mesh.node_groups[on]
         case str():
             return _side(mesh, on) if on in SIDES else np.array([named_point(mesh, on)])
         case Plane(axis, value):
             return _plane(mesh, axis, value)
         case Box(lower, upper):
-            return _box(mesh, lower, upper)
+            return _in_box(mesh, lower, upper, mesh.nodes, "node")
         case Near(point):
             return np.array([nearest_node(mesh, point)])
         case _:
-            return _numbers(mesh, on)
+            return _numbers(on, mesh.n_nodes, "node")
+
+
+def select_elements(mesh: Mesh, on: Selection) -> Ints:
+    """Return the numbers of the elements selected, ascending; raise MeshError where there is none.
+
+    `on` is an element group of the mesh, a Box that holds their centres, or element numbers.
+    """
+    match on:
+        case str() if on in mesh.element_groups:
+            return mesh.element_groups[on]
+        case str():
+            groups = ", ".join(mesh.element_groups) or "this mesh has none"
+            raise MeshError(
+                f"'{on}' is no group of elements{nearest(on, mesh.element_groups)}; groups: {groups}; "
+                "a box takes the elements whose centres it holds"
+            )
+        case Box(lower, upper):
+            return _in_box(mesh, lower, upper, mesh.nodes[mesh.elements].mean(axis=1), "element with its centre")
+        case Plane() | Near():
+            raise MeshError(f"{on!r} selects nodes; elements are selected by a group, a box or numbers")
+        case _:
+            return _numbers(on, len(mesh.elements), "element")
 
 
 def _side(mesh: Mesh, name: str) -> Ints:
@@ -88,31 +112,32 @@ def _plane(mesh: Mesh, axis: str, value: float) -> Ints:
     return found
 
 
-def _box(mesh: Mesh, lower: tuple[float, ...], upper: tuple[float, ...]) -> Ints:
+def _in_box(mesh: Mesh, lower: tuple[float, ...], upper: tuple[float, ...], places: Floats, what: str) -> Ints:
     if len(lower) != mesh.dim or len(upper) != mesh.dim:
-        raise MeshError(f"a box takes two corners of {mesh.dim} coordinates each: [[xmin, ymin], [xmax, ymax]]")
+        low, high = (", ".join(f"{axis}{end}" for axis in AXES[: mesh.dim]) for end in ("min", "max"))
+        raise MeshError(f"a box takes two corners of {mesh.dim} coordinates each: [[{low}], [{high}]]")
     if any(low > high for low, high in zip(lower, upper, strict=True)):
         raise MeshError(f"box from {list(lower)} to {list(upper)} m: the first corner must be the lower one")
     slack = _TOLERANCE * mesh.diameter
-    inside = (mesh.nodes >= np.array(lower) - slack) & (mesh.nodes <= np.array(upper) + slack)
+    inside = (places >= np.array(lower) - slack) & (places <= np.array(upper) + slack)
     found = np.flatnonzero(inside.all(axis=1))
     if not found.size:
         raise MeshError(
-            f"no node in the box from {list(lower)} to {list(upper)} m; "
+            f"no {what} in the box from {list(lower)} to {list(upper)} m; "
             f"the mesh lies between {mesh.lower.tolist()} and {mesh.upper.tolist()} m"
         )
     return found
 
 
-def _numbers(mesh: Mesh, numbers: Sequence[int]) -> Ints:
+def _numbers(numbers: Sequence[int], n_there: int, what: str) -> Ints:
     found = np.unique(np.asarray(numbers)) if isinstance(numbers, Sequence | np.ndarray) else np.zeros(0)
     if not found.size or not np.issubdtype(found.dtype, np.integer):
         raise MeshError(
-            f"{numbers!r} selects no node: give a side such as 'left', a point such as 'right-middle', "
-            "Plane('x', 0.0), Box((0.0, 0.0), (1.0, 1.0)), Near((0.0, 0.0)) or node numbers"
+            f"{numbers!r} selects no {what}: give a side such as 'left', a point such as 'right-middle', "
+            "Plane('x', 0.0), Box((0.0, 0.0), (1.0, 1.0)), Near((0.0, 0.0)) or numbers"
         )
-    if found[0] < 0 or found[-1] >= mesh.n_nodes:
-        raise MeshError(f"node {found[0] if found[0] < 0 else found[-1]} does not exist: 0 to {mesh.n_nodes - 1}")
+    if found[0] < 0 or found[-1] >= n_there:
+        raise MeshError(f"{what} {found[0] if found[0] < 0 else found[-1]} does not exist: 0 to {n_there - 1}")
     return found
 
 
@@ -126,15 +151,22 @@ def nearest_node(mesh: Mesh, point: Sequence[float]) -> int:
 
 
 def named_point(mesh: Mesh, name: str) -> int:
-    """Return the node nearest to a point named by sides joined: "right-middle", "left-top", "middle"."""
+    """Return the node nearest to a point named by sides joined: "right-middle", "left-top", "middle".
+
+    Of a group of the mesh, the node nearest to the group's centre.
+    """
+    if name in mesh.node_groups:
+        group = mesh.node_groups[name]
+        centre = mesh.nodes[group].mean(axis=0)
+        return int(group[np.linalg.norm(mesh.nodes[group] - centre, axis=1).argmin()])
     words = name.split("-")
-    allowed = [side for side, (axis, _) in SIDES.items() if axis < mesh.dim]
+    allowed = [*mesh.node_groups, *(side for side, (axis, _) in SIDES.items() if axis < mesh.dim)]
     point = (mesh.lower + mesh.upper) / 2
     taken: set[int] = set()
     for word in words:
         if word == "middle":
             continue
-        if word not in allowed or SIDES[word][0] in taken:
+        if word not in SIDES or SIDES[word][0] >= mesh.dim or SIDES[word][0] in taken:
             raise MeshError(
                 f"'{name}' is no side or point of this body{nearest(name, [*allowed, 'middle', 'right-middle'])}; "
                 f"allowed: {', '.join(allowed)}, or sides joined such as right-middle, left-top"
@@ -149,23 +181,43 @@ def shares(mesh: Mesh, nodes: Ints) -> Floats:
     """Return the share of a uniform total that each of `nodes` takes, shape (n,), sum 1.
 
     Consistent with linear elements: elements that lie wholly in the selection share by their
-    measure, else facets that do; nodes that neither covers share equally.
+    measure, else facets that do, else edges; nodes that none covers share equally.
     """
-    if mesh.element != "line":
-        inside = np.zeros(mesh.n_nodes, dtype=bool)
-        inside[nodes] = True
-        covering = mesh.elements[inside[mesh.elements].all(axis=1)]
-        measures = mesh.measures[inside[mesh.elements].all(axis=1)]
-        if not len(covering):
-            covering = mesh.facets[inside[mesh.facets].all(axis=1)]
-            measures = _facet_measures(mesh.nodes[covering])
-        weight = np.zeros(mesh.n_nodes)
-        np.add.at(weight, covering, measures[:, None])
-        if len(covering) and weight[nodes].all():
-            return np.asarray(weight[nodes] / weight[nodes].sum())
-    return np.full(len(nodes), 1 / len(nodes))
+    covered = covering(mesh, nodes)
+    if covered is None:
+        return np.full(len(nodes), 1 / len(nodes))
+    cells, measures = covered
+    weight = np.zeros(mesh.n_nodes)
+    np.add.at(weight, cells, measures[:, None])
+    return np.asarray(weight[nodes] / weight[nodes].sum())
 
 
-def _facet_measures(corners: Floats) -> Floats:
-    """Length of each edge [m]; corners of shape (n_facets, 2, dim)."""
-    return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
+def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
+    """Return the cells that carry a load on `nodes`, and their measures [m^k]; None where nodes stand alone.
+
+    These are the elements that lie wholly in the selection, where there are none the facets, else the
+    edges; all nodes must belong to one.
+    """
+    if mesh.element == "line":
+        return None
+    inside = np.zeros(mesh.n_nodes, dtype=bool)
+    inside[nodes] = True
+    for cells in (mesh.elements, mesh.facets, mesh.edges):
+        within = inside[cells].all(axis=1)
+        if within.any():
+            found = cells[within]
+            if len(np.unique(found)) < len(nodes):
+                return None
+            return found, mesh.measures[within] if cells is mesh.elements else facet_measures(mesh.nodes[found])
+    return None
+
+
+def facet_measures(corners: Floats) -> Floats:
+    """Length [m] of edges or area [m^2] of triangles and quadrilaterals; corners of shape (n, 2 to 4, dim)."""
+    if corners.shape[1] == 2:
+        return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
+    if corners.shape[1] == 3:
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    else:
+        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    return np.asarray(np.linalg.norm(normal, axis=1) / 2)

@@ -6,45 +6,120 @@ from collections.abc import Sequence
 import numpy as np
 import psutil
 
-from truespring.errors import MeshError
+from truespring.arrays import Floats, Ints
+from truespring.errors import MeshError, nearest
 from truespring.mesh.mesh import Mesh
 
-# What a solve takes at its peak, by the direct factorisation of a plane lattice: its fill grows
-# with n log n (physics: 25 million entries at 1e5 nodes, 433 million at 1e6).
-_BYTES_PER_NODE_AND_DOUBLING = 450.0
+#: What a rectangle and a box may be made of: two triangles a rectangle; six tetrahedra a box, or the
+#: body-centred-cubic lattice, whose `elements` count its cubic cells.
+PLANE_ELEMENTS = ("quadrilateral", "triangle")
+SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron")
+
+#: Diagonals of a rectangle of triangles: from the lower left corner to the upper right one, the
+#: other one, or each in turn, so that no direction is preferred.
+DIAGONALS = ("right", "left", "alternating")
+
+# What a solve takes at its peak, by the direct factorisation of a lattice: its fill grows with n log n in the
+# plane (25 million entries at 1e5 nodes, 433 million at 1e6), with n^(4/3) in space (119 million at 3.2e4).
+_BYTES_PLANE, _BYTES_SPACE = 450.0, 2500.0
+
+_FLATTEST = 1e3
 
 
-def rectangle(size: Sequence[float], elements: Sequence[int]) -> Mesh:
-    """Return a rectangle of quadrilaterals with its lower left corner in the origin.
+def rectangle(
+    size: Sequence[float], elements: Sequence[int], element: str = "quadrilateral", diagonal: str = "right"
+) -> Mesh:
+    """Return a rectangle with its lower left corner in the origin.
 
     Args:
         size: length along x and y [m].
-        elements: number of elements along x and y.
+        elements: number of rectangles along x and y.
+        element: "quadrilateral", or "triangle": two a rectangle.
+        diagonal: how triangles halve it, one of DIAGONALS.
 
     Raises MeshError for sizes that are not positive, counts below one, elements flatter than
     1000:1 and a mesh that cannot fit in memory.
     """
-    lengths = _pair(size, "size")
-    counts = _pair(elements, "elements")
-    if not all(math.isfinite(length) and length > 0 for length in lengths):
-        raise MeshError(f"size = {list(size)}: lengths must be positive and finite")
-    if not all(float(count).is_integer() and count >= 1 for count in counts):
-        raise MeshError(f"elements = {list(elements)}: counts must be whole numbers of at least 1")
-    n_x, n_y = int(counts[0]), int(counts[1])
-    flatness = (lengths[0] / n_x) / (lengths[1] / n_y)
-    if not 1e-3 <= flatness <= 1e3:
-        raise MeshError(f"elements of {lengths[0] / n_x:g} m by {lengths[1] / n_y:g} m are flatter than 1000:1")
-    refuse_too_large((n_x + 1) * (n_y + 1))
-    x, y = np.meshgrid(np.linspace(0, lengths[0], n_x + 1), np.linspace(0, lengths[1], n_y + 1))
-    column, row = np.meshgrid(np.arange(n_x), np.arange(n_y))
-    first = (row * (n_x + 1) + column).ravel()
-    quadrilaterals = np.stack([first, first + 1, first + n_x + 2, first + n_x + 1], axis=1)
-    return Mesh(np.stack([x.ravel(), y.ravel()], axis=1), quadrilaterals, "quadrilateral")
+    _known(element, PLANE_ELEMENTS, "element")
+    _known(diagonal, DIAGONALS, "diagonal")
+    lengths, counts = _checked(size, elements, "rectangle", "xy")
+    nodes, cells = _grid(lengths, counts)
+    if element == "quadrilateral":
+        return Mesh(nodes, cells, element)
+    column, row = np.meshgrid(np.arange(counts[0]), np.arange(counts[1]))
+    to_right = {"right": 0, "left": 1, "alternating": (column + row).ravel() % 2}[diagonal] == np.zeros(len(cells))
+    halves = np.where(to_right[:, None], cells[:, [0, 1, 2, 0, 2, 3]], cells[:, [0, 1, 3, 1, 2, 3]])
+    return Mesh(nodes, halves.reshape(-1, 3), element)
 
 
-def refuse_too_large(n_nodes: int) -> None:
-    """Raise MeshError where a plane mesh of `n_nodes` cannot be solved in the memory of this machine."""
-    needed = _BYTES_PER_NODE_AND_DOUBLING * n_nodes * max(1.0, math.log2(n_nodes))
+def box(size: Sequence[float], elements: Sequence[int], element: str = "hexahedron") -> Mesh:
+    """Return a box with its left, bottom, back corner in the origin.
+
+    Args:
+        size: length along x, y and z [m].
+        elements: number of cells along x, y and z.
+        element: "hexahedron"; "tetrahedron", six a cell, all about the same body diagonal; or
+            "bcc-tetrahedron", the body-centred-cubic lattice with a node in the middle of each cell and
+            of each face of the outside.
+
+    Raises MeshError as `rectangle` does.
+    """
+    _known(element, SOLID_ELEMENTS, "element")
+    lengths, counts = _checked(size, elements, "box", "xyz", 2 if element == "bcc-tetrahedron" else 1)
+    nodes, cells = _grid(lengths, counts)
+    if element == "hexahedron":
+        return Mesh(nodes, cells, element)
+    if element == "tetrahedron":
+        return Mesh(nodes, cells[:, np.array(_SIX)].reshape(-1, 4), "tetrahedron")
+    return _body_centred(nodes, cells)
+
+
+# The six tetrahedra about the diagonal from node 0 to node 6 of a hexahedron (Kuhn).
+_SIX = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+
+
+def _grid(lengths: Sequence[float], counts: Sequence[int]) -> tuple[Floats, Ints]:
+    """Nodes [m] of a grid, x running fastest, and its rectangles or boxes."""
+    axes = [np.linspace(0, length, count + 1) for length, count in zip(lengths, counts, strict=True)]
+    nodes = np.stack([axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij")][::-1], axis=1)
+    strides = np.cumprod([1, *(count + 1 for count in counts)])[:-1]
+    places = np.meshgrid(*(np.arange(count) for count in counts[::-1]), indexing="ij")
+    first = sum(stride * place.ravel() for stride, place in zip(strides, places[::-1], strict=True))
+    base = np.array([0, strides[0], strides[0] + strides[1], strides[1]])
+    local = base if len(counts) == 2 else np.concatenate([base, base + strides[2]])
+    return nodes, np.asarray(first)[:, None] + local
+
+
+def _body_centred(corners: Floats, cells: Ints) -> Mesh:
+    """The body-centred-cubic tetrahedra: four about the line between the middles of two cells that share a face.
+
+    At a face of the outside its middle takes the place of the other cell's: the same tetrahedra, halved.
+    """
+    hexahedra = Mesh(corners, cells, "hexahedron")
+    n_corners, n_cells, n_faces = len(corners), len(cells), len(hexahedra.kind.facets)
+    faces = cells[:, np.array(hexahedra.kind.facets)].reshape(-1, 4)
+    owner = n_corners + np.repeat(np.arange(n_cells), n_faces)
+    _, first, face_of, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    # The middles on both sides: of two cells, or of a cell and of its face on the outside.
+    other_side = np.zeros(len(first), dtype=np.int64)
+    later = np.flatnonzero(first[face_of.ravel()] != np.arange(len(faces)))
+    other_side[face_of.ravel()[later]] = owner[later]
+    outside = np.flatnonzero(count == 1)
+    other_side[outside] = n_corners + n_cells + np.arange(len(outside))
+    near, far, ring = owner[first], other_side, faces[first]
+    tetrahedra = np.stack(
+        [np.stack([near, ring[:, side], ring[:, (side + 1) % 4], far], axis=1) for side in range(4)], axis=1
+    )
+    middles = [corners[cells].mean(axis=1), corners[faces[first[outside]]].mean(axis=1)]
+    return Mesh(np.concatenate([corners, *middles]), tetrahedra.reshape(-1, 4), "tetrahedron")
+
+
+def refuse_too_large(n_nodes: int, dim: int) -> None:
+    """Raise MeshError where a mesh of `n_nodes` cannot be solved in the memory of this machine."""
+    plane = _BYTES_PLANE * n_nodes * max(1.0, math.log2(max(n_nodes, 1)))
+    needed = plane if dim == 2 else _BYTES_SPACE * float(n_nodes) ** (4 / 3)
     there = psutil.virtual_memory().total
     if needed > there:
         raise MeshError(
@@ -53,10 +128,34 @@ def refuse_too_large(n_nodes: int) -> None:
         )
 
 
-def _pair(values: Sequence[float], name: str) -> tuple[float, float]:
-    if len(values) != 2:
-        raise MeshError(f"{name} = {list(values)}: a rectangle takes two values, along x and y")
+def _known(value: str, allowed: Sequence[str], name: str) -> None:
+    if value not in allowed:
+        raise MeshError(f"{name} = '{value}' is unknown{nearest(value, allowed)}; allowed: {', '.join(allowed)}")
+
+
+def _checked(
+    size: Sequence[float], elements: Sequence[int], shape: str, axes: str, nodes_a_cell: int = 1
+) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Lengths [m] and counts of cells along the axes."""
+    lengths = _values(size, "size", shape, axes)
+    counts = _values(elements, "elements", shape, axes)
+    if not all(math.isfinite(length) and length > 0 for length in lengths):
+        raise MeshError(f"size = {list(size)}: lengths must be positive and finite")
+    if not all(float(count).is_integer() and count >= 1 for count in counts):
+        raise MeshError(f"elements = {list(elements)}: counts must be whole numbers of at least 1")
+    whole = tuple(int(count) for count in counts)
+    cell = [length / count for length, count in zip(lengths, whole, strict=True)]
+    if max(cell) > _FLATTEST * min(cell):
+        raise MeshError(f"elements of {' by '.join(f'{extent:g} m' for extent in cell)} are flatter than 1000:1")
+    refuse_too_large(nodes_a_cell * math.prod(count + 1 for count in whole), len(axes))
+    return lengths, whole
+
+
+def _values(values: Sequence[float], name: str, shape: str, axes: str) -> tuple[float, ...]:
+    if len(values) != len(axes):
+        along = f"{', '.join(axes[:-1])} and {axes[-1]}"
+        raise MeshError(f"{name} = {list(values)}: a {shape} takes {len(axes)} values, along {along}")
     try:
-        return float(values[0]), float(values[1])
+        return tuple(float(value) for value in values)
     except (TypeError, ValueError):
         raise MeshError(f"{name} = {list(values)}: numbers are wanted, lengths in metres") from None

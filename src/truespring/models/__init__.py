@@ -2,14 +2,18 @@
 
 from typing import Protocol
 
+from truespring.models.advice import model_warnings as model_warnings
+from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprings
+from truespring.models.fem import ELEMENTS as ELEMENTS
 from truespring.models.fem import Fem as Fem
 from truespring.models.laws import LAWS as LAWS
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli
+from truespring.models.network import SpringNetwork as SpringNetwork
 from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness
-from truespring.models.springs import SpringNetwork as SpringNetwork
 from truespring.models.springs import Springs as Springs
+from truespring.models.volume import VolumeSprings as VolumeSprings
 from truespring.potential import Potential
 from truespring.problem import Problem
 

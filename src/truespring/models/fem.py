@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from skfem import Basis, ElementQuad1, MeshQuad
+import skfem
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
@@ -15,39 +15,107 @@ from truespring.models.laws import LAWS, Constants, Law, Response
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
-# scikit-fem's mesh and element of each kind, and the order of its quadrature: 2 x 2 Gauss points
-# integrate polynomials of third order in each direction.
-_SKFEM = {"quadrilateral": (MeshQuad, ElementQuad1, 3)}
+#: Above this Poisson's ratio elements of first order lock; others are then the default.
+LOCKING_POISSON = 0.4
+
+#: Interpolations of `Fem.element`. Mean dilatation is for quadrilaterals and hexahedra, quadratic for
+#: triangles and tetrahedra.
+ELEMENTS = ("linear", "mean-dilatation", "quadratic")
+
+# scikit-fem's mesh and element of each kind, and its quadrature: the order, or for the constant strain of a
+# triangle its one point. 2 Gauss points a direction integrate polynomials of third order.
+_SKFEM: dict[str, tuple[Any, Any, dict[str, Any]]] = {
+    "triangle": (skfem.MeshTri, skfem.ElementTriP1, {"quadrature": (np.full((2, 1), 1 / 3), np.array([0.5]))}),
+    "quadrilateral": (skfem.MeshQuad, skfem.ElementQuad1, {"intorder": 3}),
+    "tetrahedron": (skfem.MeshTet, skfem.ElementTetP1, {"intorder": 1}),
+    "hexahedron": (skfem.MeshHex, skfem.ElementHex1, {"intorder": 3}),
+}
+
+# scikit-fem counts the corners of a hexahedron in another order than VTK: its places of ours.
+_ORDER = {"hexahedron": np.array([7, 4, 1, 5, 6, 2, 0, 3])}
 
 
 @dataclass(frozen=True)
 class Fem:
-    """The finite element model with the constitutive `law`: linear, saint-venant-kirchhoff, neo-hookean or hencky."""
+    """The finite element model.
+
+    Attributes:
+        law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
+        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals
+            and hexahedra), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with
+            nodes in the middle of the edges. None takes linear ones in the plane; in 3D, where these
+            would lock, at a Poisson's ratio above 0.4, the other that the mesh allows.
+    """
 
     law: str
+    element: str | None = None
 
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise ModelError(f"law = '{self.law}' is unknown{nearest(self.law, LAWS)}; allowed: {', '.join(LAWS)}")
+        if self.element is not None and self.element not in ELEMENTS:
+            close = nearest(self.element, ELEMENTS)
+            raise ModelError(f"element = '{self.element}' is unknown{close}; allowed: {', '.join(ELEMENTS)}")
 
     kind = "fem"
 
     @property
     def label(self) -> str:
         """How curves and tables call the model: the law is always named."""
-        return LAWS[self.law].label
+        asked = "" if self.element is None else f" ({self.element.replace('-', ' ')})"
+        return f"{LAWS[self.law].label}{asked}"
+
+    def chosen_element(self, problem: Problem) -> str:
+        """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
+        finer = _finer(problem)
+        if self.element is None:
+            return finer if problem.mesh.dim == 3 and _locks(problem) else "linear"
+        if self.element not in ("linear", finer):
+            raise ModelError(
+                f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements; "
+                f"allowed here: linear, {finer}"
+            )
+        return self.element
+
+    def warnings(self, problem: Problem) -> tuple[str, ...]:
+        """Return what should be known before the model is solved: elements that lock."""
+        if self.chosen_element(problem) != "linear" or not _locks(problem):
+            return ()
+        largest = max(material.poisson for material in problem.materials)
+        return (
+            f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff in bending; "
+            f'element = "{_finer(problem)}" is not',
+        )
 
     def potential(self, problem: Problem) -> "FemPotential":
-        """Return the potential of four-node quadrilaterals with 2 x 2 Gauss points."""
-        return fem_potential(problem, self.law)
+        """Return the potential on the problem's mesh."""
+        from truespring.models.mean_dilatation import MeanDilatationPotential
+        from truespring.models.quadratic import QuadraticPotential
+
+        kinds = {"linear": FemPotential, "mean-dilatation": MeanDilatationPotential, "quadratic": QuadraticPotential}
+        return fem_potential(problem, self.law, kinds[self.chosen_element(problem)])
 
 
-def fem_potential(problem: Problem, law: str) -> "FemPotential":
+def _finer(problem: Problem) -> str:
+    """The interpolation beside the linear one that the mesh allows."""
+    return "quadratic" if problem.mesh.element in ("triangle", "tetrahedron") else "mean-dilatation"
+
+
+def _locks(problem: Problem) -> bool:
+    """Whether linear elements are known to lock: nearly incompressible, and not free to change thickness."""
+    incompressible = any(material.poisson > LOCKING_POISSON for material in problem.materials)
+    return incompressible and not isinstance(problem.section, PlaneStress)
+
+
+def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" = None) -> "FemPotential":
     """Set up quadrature and constants of `law` on the problem's mesh."""
     if problem.material is None or problem.section is None or problem.mesh.element not in _SKFEM:
         raise ModelError(f"finite elements need a material, a section and elements of a kind among {', '.join(_SKFEM)}")
-    constants = Constants.of(problem.material.lame, isinstance(problem.section, PlaneStress))
-    return FemPotential(problem.mesh, LAWS[law], constants, problem.section.thickness)
+    lam, mu = (problem.of_elements(lambda material, i=i: material.lame[i])[:, None] for i in (0, 1))
+    if len(problem.materials) == 1:
+        lam, mu = lam[0, 0], mu[0, 0]
+    constants = Constants(lam, mu, isinstance(problem.section, PlaneStress))
+    return (kind or FemPotential)(problem, LAWS[law], constants)
 
 
 def element_matrices(problem: Problem) -> Floats:
@@ -65,42 +133,50 @@ class FemPotential:
     same fixed pattern as springs are.
     """
 
-    mesh: Mesh
+    problem: Problem
     law: Law
     constants: Constants
-    thickness: float
     _last: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def mesh(self) -> Mesh:
+        """The problem's mesh."""
+        return self.problem.mesh
 
     @property
     def nodes(self) -> Floats:
         """Reference positions [m], shape (n_nodes, dim)."""
         return self.mesh.nodes
 
+    @property
+    def elements(self) -> Ints:
+        """Node numbers of each element, in the order of its shape functions, shape (n_elements, k)."""
+        return self.mesh.elements
+
     @cached_property
     def _basis(self) -> Any:
-        mesh_class, element_class, order = _SKFEM[self.mesh.element]
-        grid = mesh_class(
-            np.ascontiguousarray(self.mesh.nodes.T), np.ascontiguousarray(self.mesh.elements.T), validate=False
-        )
-        return Basis(grid, element_class(), intorder=order)
+        return skfem_basis(self.mesh)
 
     @cached_property
-    def _shape_gradients(self) -> Floats:
+    def shape_gradients(self) -> Floats:
         """Gradients of the shape functions [1/m], axes (node of the element, direction, element, point)."""
-        return np.stack([function.grad for (function,) in self._basis.basis])
+        order = _ORDER.get(self.mesh.element, slice(None))
+        return np.stack([function.grad for (function,) in self._basis.basis])[order]
 
     @cached_property
-    def _volumes(self) -> Floats:
+    def volumes(self) -> Floats:
         """Reference volume of each Gauss point [m^3], axes (element, point)."""
-        return np.asarray(self.thickness * self._basis.dx)
+        section = self.problem.section
+        assert section is not None  # fem_potential refuses bodies without one
+        return np.asarray(section.thickness * self._basis.dx)
 
     @cached_property
     def _pattern(self) -> Pattern:
-        return Pattern(self.mesh.elements, *self.nodes.shape)
+        return Pattern(self.elements, *self.nodes.shape)
 
     def _deformation(self, positions: Floats) -> Floats:
         """Deformation gradient at the Gauss points, axes (i, j, element, point)."""
-        return np.asarray(np.einsum("eai,ajeq->ijeq", positions[self.mesh.elements], self._shape_gradients))
+        return np.asarray(np.einsum("eai,ajeq->ijeq", positions[self.elements], self.shape_gradients))
 
     def _respond(self, positions: Floats) -> tuple[Floats, Response]:
         """Deformation gradient and the law's response; the last ones are kept, for energy, gradient and Hessian."""
@@ -119,9 +195,9 @@ class FemPotential:
         with np.errstate(over="ignore", invalid="ignore"):
             F, response = self._respond(positions)
         density = response.energy
-        if not np.isfinite(density).all() or (self.law.barrier and (_determinant(F) <= 0).any()):
+        if not np.isfinite(density).all() or (self.law.barrier and (determinant(F) <= 0).any()):
             return float("inf")
-        return float((density * self._volumes).sum())
+        return float((density * self.volumes).sum())
 
     def stress(self, positions: Floats) -> Floats:
         """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (i, j, element, point)."""
@@ -131,8 +207,12 @@ class FemPotential:
         """Internal force [N], shape (n_nodes, dim)."""
         F, response = self._respond(positions)
         first = np.einsum("ik...,kj...->ij...", F, response.stress) if self.law.finite else response.stress
-        forces = np.einsum("ijeq,ajeq->eai", first * self._volumes, self._shape_gradients)
-        return self._pattern.vector(forces).reshape(positions.shape)
+        return self._summed(first)
+
+    def _summed(self, first: Floats) -> Floats:
+        """Nodal forces [N] of a first Piola-Kirchhoff stress, axes (i, j, element, point)."""
+        forces = np.einsum("ijeq,ajeq->eai", first * self.volumes, self.shape_gradients)
+        return self._pattern.vector(forces).reshape(self.nodes.shape)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [Pa] makes the geometric part, by default that of the positions."""
@@ -147,14 +227,18 @@ class FemPotential:
     def element_hessians(self, positions: Floats, stress: Floats | None = None) -> Floats:
         """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
         F, response = self._respond(positions)
+        S = response.stress if stress is None else stress
+        return self._tangent(F, S, response.elasticity)
+
+    def _tangent(self, F: Floats, S: Floats, elasticity: Floats) -> Floats:
+        """Element matrices [N/m] of a stress and an elasticity by the Green strain, at the deformation gradient F."""
         if self.law.finite:
-            S = response.stress if stress is None else stress
-            tangent = np.einsum("ai...,ijkl...,bk...->ajbl...", F, response.elasticity, F, optimize=True)
+            tangent = np.einsum("ai...,ijkl...,bk...->ajbl...", F, elasticity, F, optimize=True)
             tangent += np.einsum("ab,jl...->ajbl...", np.eye(len(F)), S)
         else:
-            tangent = response.elasticity
-        half = np.einsum("ijkleq,bleq->ijkbeq", tangent * self._volumes, self._shape_gradients)
-        blocks = np.einsum("ajeq,ijkbeq->eaibk", self._shape_gradients, half)
+            tangent = elasticity
+        half = np.einsum("ijkleq,bleq->ijkbeq", tangent * self.volumes, self.shape_gradients)
+        blocks = np.einsum("ajeq,ijkbeq->eaibk", self.shape_gradients, half)
         size = self._pattern.dofs.shape[1]
         return np.asarray(blocks.reshape(-1, size, size))
 
@@ -166,7 +250,7 @@ class FemPotential:
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""
         stress = self.cauchy_stress(positions)
-        energy = (self._respond(positions)[1].energy * self._volumes).sum(axis=1)
+        energy = (self._respond(positions)[1].energy * self.volumes).sum(axis=1)
         return {"stress": stress.reshape(-1, 9), "strain_energy": energy}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
@@ -175,16 +259,36 @@ class FemPotential:
         F S F^T over the volume ratio, the change of thickness included; of the linear law, its stress.
         """
         F, response = self._respond(positions)
-        dim = self.mesh.dim
-        stress = np.zeros((3, 3, *F.shape[2:]))
-        stress[2, 2] = response.across
-        stress[:dim, :dim] = response.stress
-        if self.law.finite:
-            stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, response.stress, F)
-            volume = _determinant(F) * response.thickness_stretch
-            stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
-        return np.moveaxis(stress.mean(axis=-1), -1, 0)
+        return true_stress(F, response, self.law.finite)
 
 
-def _determinant(F: Floats) -> Floats:
+def true_stress(F: Floats, response: Response, finite: bool) -> Floats:
+    """Return the true stress of a law's response at F, averaged over the points [Pa], shape (n_elements, 3, 3)."""
+    dim = len(F)
+    stress = np.zeros((3, 3, *F.shape[2:]))
+    stress[2, 2] = response.across
+    stress[:dim, :dim] = response.stress
+    if finite:
+        stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, response.stress, F)
+        volume = determinant(F) * response.thickness_stretch
+        stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
+    return np.moveaxis(stress.mean(axis=-1), -1, 0)
+
+
+def skfem_basis(mesh: Mesh, element: Any = None, **quadrature: Any) -> Any:
+    """Return scikit-fem's basis on a mesh: of its own kind of first order, or of the `element` given."""
+    mesh_class, element_class, own_quadrature = _SKFEM[mesh.element]
+    # scikit-fem's corner i is ours of number argsort(order)[i].
+    order = np.argsort(_ORDER.get(mesh.element, np.arange(mesh.kind.n_nodes)))
+    grid = mesh_class(
+        np.ascontiguousarray(mesh.nodes.T),
+        np.ascontiguousarray(mesh.elements[:, order].T),
+        validate=False,
+        sort_t=False,
+    )
+    return skfem.Basis(grid, element or element_class(), **(quadrature or own_quadrature))
+
+
+def determinant(F: Floats) -> Floats:
+    """Return the determinant of tensors whose axes come first."""
     return np.asarray(np.linalg.det(np.moveaxis(F, (0, 1), (-2, -1))))

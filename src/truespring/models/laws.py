@@ -13,30 +13,25 @@ from types import MappingProxyType
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.material import Lame
 
 
 @dataclass(frozen=True, slots=True)
 class Constants:
     """What a law needs: the Lamé constants [Pa] and how the third direction behaves.
 
+    The constants are numbers, or arrays of shape (n_elements, 1) where materials differ.
     `lam_plane` is 2 lam mu / (lam + 2 mu) in plane stress, lam otherwise: the constant with which a
     quadratic law within the plane accounts for the third direction.
     """
 
-    lam: float
-    mu: float
+    lam: float | Floats
+    mu: float | Floats
     plane_stress: bool
 
     @property
-    def lam_plane(self) -> float:
+    def lam_plane(self) -> float | Floats:
         """The first Lamé constant within the plane [Pa]."""
         return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
-
-    @classmethod
-    def of(cls, lame: Lame, plane_stress: bool) -> "Constants":
-        """Take the constants of the three-dimensional material."""
-        return cls(lame.lam, lame.mu, plane_stress)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +88,15 @@ def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Respo
     identity = _identity(strain)
     stress = lam * trace * identity + 2 * mu * strain
     swap = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
-    elasticity = lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * swap
+    elasticity = _times(lam, np.einsum("ij,kl->ijkl", eye, eye)) + _times(mu, swap)
     energy = lam / 2 * trace**2 + mu * np.einsum("ij...,ij...->...", strain, strain)
     across = np.zeros_like(trace) if constants.plane_stress else lam * trace
-    return Response(energy, stress, _everywhere(elasticity, strain), thickness, across)
+    return Response(energy, stress, _everywhere(elasticity, strain.shape[2:]), thickness, across)
+
+
+def _times(factor: float | Floats, tensor: Floats) -> Floats:
+    """A tensor times a number, or at each element times its own: the axes of `factor` come last."""
+    return tensor.reshape(tensor.shape + (1,) * np.ndim(factor)) * factor
 
 
 def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
@@ -131,7 +131,7 @@ def neo_hookean(C: Floats, constants: Constants) -> Response:
     return Response(energy, stress, elasticity, np.sqrt(C_33), mu * (C_33 - 1) + lam * log_J)
 
 
-def _free_thickness(log_det: Floats, ratio: float) -> Floats:
+def _free_thickness(log_det: Floats, ratio: float | Floats) -> Floats:
     """Solve C_33 - 1 + ratio/2 (log_det + ln C_33) = 0 for C_33 > 0, by Newton in y = ln C_33.
 
     e^y + ratio/2 y is convex and rises where ratio > 0, so that from the second step on Newton
@@ -193,13 +193,15 @@ def _log_difference(a: Floats, b: Floats) -> Floats:
 
 
 def _identity(tensor: Floats) -> Floats:
-    return _everywhere(np.eye(len(tensor)), tensor)
+    return _everywhere(np.eye(len(tensor)), tensor.shape[2:])
 
 
-def _everywhere(constant: Floats, like: Floats) -> Floats:
-    """Repeat a constant tensor over the axes of `like` after its first two, without a copy."""
-    points = like.shape[2:]
-    return np.broadcast_to(constant.reshape(constant.shape + (1,) * len(points)), constant.shape + points)
+def _everywhere(constant: Floats, points: tuple[int, ...]) -> Floats:
+    """Repeat a tensor, given once or once an element, over the axes `points`, without a copy."""
+    order = constant.ndim // 2 * 2 if constant.ndim <= 4 else 4
+    missing = order + len(points) - constant.ndim
+    axes = constant.shape[:order]
+    return np.broadcast_to(constant.reshape(axes + (1,) * missing + constant.shape[order:]), axes + points)
 
 
 def _determinant(tensor: Floats) -> Floats:

@@ -15,36 +15,53 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError
 from truespring.material import Material, Section
 from truespring.models.fem import element_matrices
+from truespring.models.links import CORNERS, link_coupling, link_vectors
 from truespring.problem import Problem
+
+#: Share of E h that `isotropic` gives to each body diagonal of a cube unless told otherwise: the member
+#: of its family whose matrix is nearest to that of the hexahedron.
+K_BODY = 1 / 12
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A table entry: the recipe, what it is good for and where it comes from."""
+    """A table entry.
 
-    stiffness: Callable[[Problem], Floats]
-    summary: str
+    Attributes:
+        stiffness: the recipe; takes the problem, and by name those of `parameters` that are given.
+        elements: the kinds of element that it is made for.
+        realises: what its springs realise, in a line.
+        source: where it comes from.
+        parameters: keys of Springs that it takes.
+        coupled: whether springs answer to each other's length too: `stiffness` is then that of a
+            spring whose neighbours keep their length.
+    """
+
+    stiffness: Callable[..., Floats]
+    elements: tuple[str, ...]
+    realises: str
     source: str
+    parameters: tuple[str, ...] = ()
+    coupled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class UserStiffness:
-    """Stiffness of the user's own: of edges and diagonals, in units of thickness times Young's modulus."""
+    """Stiffness of the user's own: of edges, diagonals of faces and diagonals through the body.
+
+    In units of thickness times Young's modulus; in three dimensions of Young's modulus times the
+    edge of a cube of the element's volume.
+    """
 
     edge: float
-    diagonal: float
+    diagonal: float = 0.0
+    body: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.edge) and np.isfinite(self.diagonal)):
-            raise ModelError(f"stiffness = {{ edge = {self.edge}, diagonal = {self.diagonal} }}: must be finite")
-
-
-def element_stiffness(problem: Problem, rule: str | None, user: UserStiffness | None = None) -> Floats:
-    """Return the stiffness of each element's springs [N/m], shape (n_elements, links)."""
-    require_body(problem)
-    if user is not None:
-        return _edges_and_diagonals(problem, user.edge, user.diagonal)
-    return RULES[str(rule)].stiffness(problem)
+        if not np.isfinite([self.edge, self.diagonal, self.body]).all():
+            raise ModelError(
+                f"stiffness = {{ edge = {self.edge}, diagonal = {self.diagonal}, body = {self.body} }}: must be finite"
+            )
 
 
 def require_body(problem: Problem) -> tuple[Material, Section]:
@@ -54,67 +71,122 @@ def require_body(problem: Problem) -> tuple[Material, Section]:
     return problem.material, problem.section
 
 
-def _edges_and_diagonals(problem: Problem, edge: float, diagonal: float) -> Floats:
-    """Coefficients times thickness times Young's modulus, the same in every element."""
-    material, section = require_body(problem)
+def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
+    """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links)."""
+    require_body(problem)
+    entry = RULES[rule]
+    if problem.mesh.element not in entry.elements:
+        allowed = [name for name, other in RULES.items() if problem.mesh.element in other.elements]
+        raise ModelError(
+            f"rule = '{rule}' is for {', '.join(entry.elements)}; for this mesh of {problem.mesh.element} elements "
+            f"there are {', '.join(allowed)}"
+        )
+    idle = sorted(parameters.keys() - set(entry.parameters))
+    if idle:
+        owners = [name for name, other in RULES.items() if set(idle) & set(other.parameters)]
+        raise ModelError(f"rule = '{rule}' takes no {', '.join(idle)}; that is for {', '.join(owners)}")
+    return entry.stiffness(problem, **parameters)
+
+
+def user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
+    """Return stiffness of the user's own for each element's springs [N/m], shape (n_elements, links)."""
+    require_body(problem)
     kind = problem.mesh.kind
-    coefficients = np.array([edge] * len(kind.edges) + [diagonal] * len(kind.diagonals))
-    return np.tile(coefficients * section.thickness * material.young, (len(problem.mesh.elements), 1))
+    values = [own.edge] * len(kind.edges) + [own.diagonal] * len(kind.diagonals) + [own.body] * len(kind.body_diagonals)
+    return _scale(problem)[:, None] * np.array(values)
 
 
-def _sides(problem: Problem, rule: str) -> tuple[Floats, Floats]:
-    """Return the two side lengths of each element [m]; raise ModelError where one is no rectangle."""
+def _scale(problem: Problem) -> Floats:
+    """The unit of stiffness [N/m], shape (n_elements,): E t in the plane, E h in 3D, h^3 the element's volume."""
+    _, section = require_body(problem)
+    size = problem.mesh.measures ** (1 / 3) if problem.mesh.dim == 3 else section.thickness
+    return np.asarray(problem.of_elements(lambda material: material.young) * size)
+
+
+def _classes(problem: Problem, edge: float, diagonal: float = 0.0, body: float = 0.0) -> Floats:
+    return user_stiffness(problem, UserStiffness(edge, diagonal, body))
+
+
+def _bricks(problem: Problem, rule: str) -> Floats:
+    """Side lengths of each rectangle or brick [m], shape (n_elements, dim); raise ModelError where one is none."""
     mesh = problem.mesh
     at = mesh.nodes[mesh.elements]
-    first, second = at[:, 1] - at[:, 0], at[:, 3] - at[:, 0]
-    l_first, l_second = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
-    skew = np.abs((first * second).sum(axis=1)) / (l_first * l_second)
-    open_by = np.linalg.norm(at[:, 2] - at[:, 0] - first - second, axis=1) / np.maximum(l_first, l_second)
+    sides = at[:, [1, 3, 4][: mesh.dim]] - at[:, :1]
+    lengths = np.linalg.norm(sides, axis=2)
+    directions = sides / lengths[:, :, None]
+    skew = np.abs(np.einsum("eai,ebi->eab", directions, directions) - np.eye(mesh.dim)).max(axis=(1, 2))
+    closed = at[:, :1] + np.einsum("ca,eai->eci", CORNERS[: mesh.kind.n_nodes, : mesh.dim], sides)
+    open_by = np.linalg.norm(at - closed, axis=2).max(axis=1) / lengths.max(axis=1)
     wrong = np.flatnonzero(np.maximum(skew, open_by) > 1e-6)
     if wrong.size:
         raise ModelError(
-            f"rule = '{rule}' is made for rectangles, {wrong.size} elements are none, "
-            f"the first is element {wrong[0]}; allowed here: projected, least-squares"
+            f"rule = '{rule}' is made for {'rectangles' if mesh.dim == 2 else 'bricks'}, {wrong.size} elements are "
+            f"none, the first is element {wrong[0]}; allowed here: projected, least-squares, biquadratic"
         )
-    return np.asarray(l_first), np.asarray(l_second)
+    return np.asarray(lengths)
 
 
 def lloyd(problem: Problem) -> Floats:
-    """Edges 5/16, diagonals 7/16 of thickness times E, on squares.
+    """Squares: edges 5/16, diagonals 7/16 of t E. Triangles: sqrt(3)/4 t E. Tetrahedra: 2 sqrt(2)/25 E l.
 
-    Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders (2007).
+    l = (12 V / sqrt(2))^(1/3) is the edge of a regular tetrahedron of the element's volume V. Squares:
+    Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders (2007). Tetrahedra: the
+    same paper as the bond style tetmsm of LAMMPS gives it, exact fit of a regular one at Poisson's
+    ratio 1/4. Triangles: the exact stiffness of an equilateral one at 1/3.
     """
-    l_first, l_second = _sides(problem, "lloyd")
-    unequal = np.abs(l_first / l_second - 1)
+    element = problem.mesh.element
+    if element == "triangle":
+        return _classes(problem, np.sqrt(3) / 4)
+    if element == "tetrahedron":
+        return _classes(problem, 2 * np.sqrt(2) / 25 * (12 / np.sqrt(2)) ** (1 / 3))
+    sides = _bricks(problem, "lloyd")
+    unequal = np.abs(sides[:, 0] / sides[:, 1] - 1)
     if unequal.max() > 1e-6:
-        worst = int(unequal.argmax())
+        worst = sides[int(unequal.argmax())]
         raise ModelError(
-            f"rule = 'lloyd' is made for squares, the elements measure {l_first[worst]:g} m by {l_second[worst]:g} m: "
+            f"rule = 'lloyd' is made for squares, the elements measure {worst[0]:g} m by {worst[1]:g} m: "
             "choose size and elements so that they are squares, or the rule isotropic, projected or least-squares"
         )
-    return _edges_and_diagonals(problem, 5 / 16, 7 / 16)
+    return _classes(problem, 5 / 16, 7 / 16)
 
 
-def isotropic(problem: Problem) -> Floats:
-    """Springs whose lattice is isotropic with the material's E in plane stress and Poisson's ratio 1/3.
+def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
+    """Springs whose lattice is isotropic with the material's E; Poisson's ratio 1/3 in plane stress, 1/4 in 3D.
 
     Squares: 3/8 on edges and diagonals (Brisard, "What is homogenization?", part 4; the only such pair).
-    Rectangles a by b, per t E: k_a = 3 (3 b^2 - a^2) / (16 a b), k_d = 3 (a^2 + b^2) / (16 a b), the member
-    for Poisson's ratio 1/3 of Baudet et al. (2009); an edge turns negative beyond an aspect of sqrt(3).
+    Cubes, per E h: edges 1/10 + k_body/3, diagonals of faces 1/5 - 2 k_body/3, through the body k_body,
+    which is free (the family of Golec et al. 2020). Rectangles and bricks: likewise what makes
+    C_iijj = sum k (d_i d_j)^2 / L^2 / V isotropic, d the vector along a spring of length L: first the
+    diagonals of each face, from C_iijj, then the edges, from C_iiii. On rectangles it is the member for
+    Poisson's ratio 1/3 of Baudet et al. (2009); an edge turns negative beyond an aspect of sqrt(3).
     """
-    material, section = require_body(problem)
-    first, second = _sides(problem, "isotropic")
-    scale = 3 * section.thickness * material.young / (16 * first * second)
-    k_first, k_second = scale * (3 * second**2 - first**2), scale * (3 * first**2 - second**2)
-    k_diagonal = scale * (first**2 + second**2)
-    return np.stack([k_first, k_second, k_first, k_second, k_diagonal, k_diagonal], axis=1)
+    kind, dim = problem.mesh.kind, problem.mesh.dim
+    sides = _bricks(problem, "isotropic")
+    links = np.array(kind.links)
+    along = np.abs(CORNERS[links[:, 1], :dim] - CORNERS[links[:, 0], :dim])
+    squares = along * sides[:, None] ** 2
+    young, size = problem.of_elements(lambda material: material.young), np.prod(sides, axis=1)
+    modulus = young * size * require_body(problem)[1].thickness
+    normal, mixed = (9 / 8, 3 / 8) if dim == 2 else (6 / 5, 2 / 5)
+    stiffness = np.where(along.sum(axis=1) == 3, k_body * (young * size ** (1 / 3))[:, None], 0.0)
+
+    def share(i: int, j: int) -> Floats:
+        """What a unit of stiffness of each link adds to C_iijj V."""
+        return np.asarray(squares[:, :, i] * squares[:, :, j] / squares.sum(axis=2))
+
+    pairs = [(i, j) for i in range(dim) for j in range(i)] + [(i, i) for i in range(dim)]
+    for i, j in pairs:
+        own = (along == np.eye(dim)[i] + (i != j) * np.eye(dim)[j]).all(axis=1)
+        missing = (normal if i == j else mixed) * modulus - (stiffness * share(i, j)).sum(axis=1)
+        stiffness[:, own] = (missing / share(i, j)[:, own].sum(axis=1))[:, None]
+    return stiffness
 
 
 def projected(problem: Problem) -> Floats:
     """k = -n . K_ij n with the blocks K_ij of the element's own linear FEM matrix.
 
     The least-squares fit of the off-diagonal blocks alone. On squares in plane stress at Poisson's
-    ratio 1/3 it gives Lloyd's 5/16 and 7/16.
+    ratio 1/3 it gives Lloyd's 5/16 and 7/16; on triangles at 1/3 Van Gelder's (1998) longer formula.
     """
     links, direction = _link_directions(problem)
     blocks = _blocks(problem)
@@ -127,7 +199,8 @@ def least_squares(problem: Problem) -> Floats:
 
     A spring's matrix is b b^T with b = (-n, n) on its ends; the normal equations are
     sum_t (b_s . b_t)^2 k_t = b_s . K b_s. Squares in plane stress, Poisson's ratio nu:
-    (6 - nu) / (21 (1 - nu^2)) on edges, (15 + nu) / (42 (1 - nu^2)) on diagonals.
+    (6 - nu) / (21 (1 - nu^2)) on edges, (15 + nu) / (42 (1 - nu^2)) on diagonals; cubes at 1/4, per E h:
+    29/350, 188/1575 and 41/525.
     """
     links, direction = _link_directions(problem)
     blocks = _blocks(problem)
@@ -135,18 +208,36 @@ def least_squares(problem: Problem) -> Floats:
     stencil = np.zeros((n_elements, len(links), n_nodes, dim))
     every = np.arange(len(links))
     stencil[:, every, links[:, 0]], stencil[:, every, links[:, 1]] = -direction, direction
-    gram = np.einsum("esai,etai->est", stencil, stencil) ** 2
-    target = np.einsum("esai,eaibj,esbj->es", stencil, blocks, stencil)
+    gram = np.einsum("esai,etai->est", stencil, stencil, optimize=True) ** 2
+    target = np.einsum("esai,eaibj,esbj->es", stencil, blocks, stencil, optimize=True)
     return np.asarray(np.linalg.solve(gram, target[:, :, None])[:, :, 0])
+
+
+def van_gelder(problem: Problem) -> Floats:
+    """Triangles: k = E t A / L^2, tetrahedra: k = E V / L^2, with the element's area A or volume V.
+
+    Van Gelder, Journal of Graphics Tools 3 (1998), the simple formula. Exact on equilateral triangles.
+    """
+    _, section = require_body(problem)
+    young = problem.of_elements(lambda material: material.young)
+    size = young * section.thickness * problem.mesh.measures
+    return np.asarray(size[:, None] / (link_vectors(problem.mesh) ** 2).sum(axis=2))
+
+
+def biquadratic(problem: Problem) -> Floats:
+    """k = 8 L^2 M_ss of the coupled springs W = q . M q, q = l^2 - L^2, which are exact St. Venant-Kirchhoff FEM.
+
+    Delingette (2008) on triangles, Goulette and Chen (2015) on tetrahedra; on squares and hexahedra the
+    same between all pairs of nodes. See `link_coupling`.
+    """
+    length_squared = (link_vectors(problem.mesh) ** 2).sum(axis=2)
+    return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(problem)))
 
 
 def _link_directions(problem: Problem) -> tuple[Floats, Floats]:
     """Local node pairs, shape (links, 2), and unit vectors, shape (n_elements, links, dim)."""
-    mesh = problem.mesh
-    links = np.array(mesh.kind.links)
-    at = mesh.nodes[mesh.elements]
-    across = at[:, links[:, 1]] - at[:, links[:, 0]]
-    return links, across / np.linalg.norm(across, axis=2, keepdims=True)
+    across = link_vectors(problem.mesh)
+    return np.array(problem.mesh.kind.links), across / np.linalg.norm(across, axis=2, keepdims=True)
 
 
 def _blocks(problem: Problem) -> Floats:
@@ -156,27 +247,49 @@ def _blocks(problem: Problem) -> Floats:
     return element_matrices(problem).reshape(-1, n_nodes, mesh.dim, n_nodes, mesh.dim)
 
 
+_ALL = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
+
 RULES: MappingProxyType[str, Rule] = MappingProxyType(
     {
         "lloyd": Rule(
             lloyd,
-            "5/16 and 7/16 on squares; soft along the edges, stiff along the diagonals",
-            "Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd et al. 2007",
+            ("triangle", "quadrilateral", "tetrahedron"),
+            "squares: 0.882 E along the edges, 1.105 E at 45 degrees; equilateral triangles: E, Poisson's ratio 1/3; "
+            "body-centred-cubic tetrahedra: 1.008 E and 1/4 in every direction; other meshes: see moduli",
+            "Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders 2007",
         ),
         "isotropic": Rule(
             isotropic,
-            "3/8 and 3/8 on squares; exact modulus in every direction, Poisson's ratio 1/3",
-            "Brisard, What is homogenization? part 4; rectangles: Baudet et al. 2009",
+            ("quadrilateral", "hexahedron"),
+            "rectangles: E in every direction, Poisson's ratio 1/3 in plane stress; bricks: E and 1/4",
+            "Brisard, What is homogenization? part 4; Baudet et al. 2009; Golec et al. 2020",
+            parameters=("k_body",),
         ),
         "least-squares": Rule(
             least_squares,
-            "nearest to the element's FEM matrix, all entries",
-            "the norm of Lloyd et al. 2007 for tetrahedra, applied to the quadrilateral",
+            _ALL,
+            "the springs nearest to the element's FEM matrix, all entries",
+            "the norm of Lloyd et al. 2007 for tetrahedra, applied to every element",
         ),
         "projected": Rule(
             projected,
-            "nearest to the off-diagonal blocks of the element's FEM matrix",
-            "after Lloyd et al. 2007; equals Van Gelder 1998 on triangles",
+            _ALL,
+            "the springs nearest to the off-diagonal blocks of the element's FEM matrix",
+            "after Lloyd et al. 2007; the longer formula of Van Gelder 1998 on triangles",
+        ),
+        "van-gelder": Rule(
+            van_gelder,
+            ("triangle", "tetrahedron"),
+            "equilateral triangles: E, Poisson's ratio 1/3; body-centred-cubic tetrahedra: 0.857 to 1.091 E",
+            "Van Gelder 1998, E area / length^2 and E volume / length^2",
+        ),
+        "biquadratic": Rule(
+            biquadratic,
+            _ALL,
+            "the material itself, any Poisson's ratio, any mesh: springs in squared lengths, coupled within an "
+            "element, that are St. Venant-Kirchhoff FEM",
+            "Delingette 2008 (triangles), Goulette and Chen 2015 (tetrahedra)",
+            coupled=True,
         ),
     }
 )

@@ -1,144 +1,44 @@
-"""Springs: a body idealised as nodes joined by linear springs, and the potential of any such network."""
+"""Springs: a body idealised as nodes joined by springs."""
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
+from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
-from truespring.mesh import Mesh
-from truespring.models.rules import RULES, UserStiffness, element_stiffness
-from truespring.potential import Pattern, SparseMatrix
+from truespring.material import Material
+from truespring.models.biquadratic import BiquadraticSprings
+from truespring.models.elasticity import affine_energies, lattice_classes, lattice_elasticity
+from truespring.models.network import SpringNetwork
+from truespring.models.rules import RULES, UserStiffness, require_body, rule_stiffness, user_stiffness
+from truespring.models.volume import VolumeSprings, VolumeTerm
 from truespring.problem import Problem
 
-
-@dataclass(frozen=True, eq=False)
-class SpringNetwork:
-    """Nodes joined by linear springs: the spring force of Lembryk and Ciszkiewicz, equation 3.
-
-    Attributes:
-        nodes: reference positions [m], shape (n_nodes, dim).
-        springs: node numbers, shape (n_springs, 2).
-        stiffness: [N/m], shape (n_springs,).
-        rest_length: [m], shape (n_springs,); empty, the default, takes the distances in the reference positions.
-
-    With length l, rest length L, unit vector n from the first node to the second:
-    energy 1/2 k (l - L)^2, tension k (l - L), Hessian block k [(1 - L/l) (I - n n^T) + n n^T].
-    """
-
-    nodes: Floats
-    springs: Ints
-    stiffness: Floats
-    rest_length: Floats = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        try:
-            set_field = object.__setattr__
-            set_field(self, "nodes", frozen_floats(self.nodes, (None, None), "nodes"))
-            set_field(self, "springs", frozen_ints(self.springs, (None, 2), "springs"))
-            self._check_springs()
-            n_springs = len(self.springs)
-            set_field(self, "stiffness", frozen_floats(self.stiffness, (n_springs,), "stiffness"))
-            given = np.asarray(self.rest_length)
-            rest = given if given.size else self._lengths(self.nodes)[1]
-            set_field(self, "rest_length", frozen_floats(rest, (n_springs,), "rest_length"))
-        except ValueError as error:
-            raise ModelError(str(error)) from None
-        if not (self.rest_length > 0).all():
-            raise ModelError(f"rest_length of spring {int((self.rest_length <= 0).argmax())} is not positive")
-
-    def _check_springs(self) -> None:
-        if not len(self.springs):
-            raise ModelError("a network without springs carries nothing")
-        if self.springs.min() < 0 or self.springs.max() >= len(self.nodes):
-            raise ModelError(
-                f"springs name nodes {self.springs.min()} to {self.springs.max()}, there are 0 to {len(self.nodes) - 1}"
-            )
-        loops = self.springs[:, 0] == self.springs[:, 1]
-        if loops.any():
-            raise ModelError(f"spring {int(loops.argmax())} joins node {self.springs[loops][0, 0]} to itself")
-
-    @cached_property
-    def mesh(self) -> Mesh:
-        """The network as a mesh of lines: what a Problem of a plain network takes."""
-        return Mesh(self.nodes, self.springs, "line")
-
-    @property
-    def cells(self) -> tuple[str, Ints]:
-        """The springs as lines, shape (n_springs, 2)."""
-        return "line", self.springs
-
-    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring."""
-        tension = self.stress(positions)
-        return {
-            "tension": tension,
-            "stretch": self.stretch(positions),
-            "stiffness": self.stiffness,
-            "strain_energy": tension * (self._lengths(positions)[1] - self.rest_length) / 2,
-        }
-
-    @cached_property
-    def _pattern(self) -> Pattern:
-        return Pattern(self.springs, *self.nodes.shape)
-
-    def _lengths(self, positions: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors, shape (n_springs, dim), and lengths [m]; the vector of a collapsed spring is zero."""
-        across = positions[self.springs[:, 1]] - positions[self.springs[:, 0]]
-        length = np.linalg.norm(across, axis=1)
-        return across / np.where(length > 0, length, 1.0)[:, None], np.asarray(length)
-
-    def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length, shape (n_springs,)."""
-        return self._lengths(positions)[1] / self.rest_length
-
-    def stress(self, positions: Floats) -> Floats:
-        """Tension [N], shape (n_springs,)."""
-        return self.stiffness * (self._lengths(positions)[1] - self.rest_length)
-
-    def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
-        return float(0.5 * self.stiffness @ (self._lengths(positions)[1] - self.rest_length) ** 2)
-
-    def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
-        direction, length = self._lengths(positions)
-        pull = (self.stiffness * (length - self.rest_length))[:, None] * direction
-        return self._pattern.vector(np.concatenate([-pull, pull], axis=1)).reshape(positions.shape)
-
-    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` are the tensions [N] of the geometric part, by default the true ones."""
-        direction, length = self._lengths(positions)
-        tension = self.stiffness * (length - self.rest_length) if stress is None else stress
-        along = direction[:, :, None] * direction[:, None, :]
-        across = np.eye(positions.shape[1]) - along
-        # A collapsed spring has no direction: its geometric part is left out rather than infinite.
-        sideways = np.divide(tension, length, out=np.zeros_like(length), where=length > 0)
-        block = self.stiffness[:, None, None] * along + sideways[:, None, None] * across
-        return self._pattern.matrix(np.block([[block, -block], [-block, block]]))
-
-    def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Each spring's Hessian with its negative eigenvalues cut off: compression bears no geometric part [N/m]."""
-        return self.hessian(positions, np.maximum(self.stress(positions), 0.0))
+# A lattice whose elasticity is within this share of an isotropic one takes a volume term.
+_ISOTROPIC = 1e-6
 
 
 @dataclass(frozen=True)
 class Springs:
-    """The mass-spring model: every element's edges and diagonals carry springs.
+    """The mass-spring model: the edges and diagonals of every element carry springs.
 
     Attributes:
-        rule: how stiffness follows from the material: lloyd, isotropic, least-squares or projected (see RULES).
-        stiffness: numbers of the user's own instead of a rule, in units of thickness times Young's modulus.
+        rule: how stiffness follows from the material, a key of RULES.
+        stiffness: numbers of the user's own instead of a rule.
         sharing: "summed" adds the springs of elements that share a pair of nodes,
             "single" takes one spring a pair (their mean).
         allow_negative: accept springs of negative stiffness, which some rules give on some meshes.
+        volume: add the area or volume term with which an isotropic lattice realises the material's
+            Young's modulus and Poisson's ratio, from 0 on; the springs are rescaled for it.
+        k_body: stiffness of each diagonal through the body of a cube, in E h, for the rule isotropic.
     """
 
     rule: str | None = None
     stiffness: UserStiffness | None = None
     sharing: str = "summed"
     allow_negative: bool = False
+    volume: bool = False
+    k_body: float | None = None
 
     def __post_init__(self) -> None:
         if (self.rule is None) == (self.stiffness is None):
@@ -149,29 +49,97 @@ class Springs:
             raise ModelError(f"rule = '{self.rule}' is unknown{nearest(self.rule, RULES)}; allowed: {', '.join(RULES)}")
         if self.sharing not in ("summed", "single"):
             raise ModelError(f"sharing = '{self.sharing}' is unknown; allowed: summed, single")
+        if self.k_body is not None and not np.isfinite(self.k_body):
+            raise ModelError(f"k_body = {self.k_body}: must be finite")
+        if self.k_body is not None and self.rule is None:
+            raise ModelError("k_body is for the rule isotropic; of your own stiffness `body` is that of the diagonals")
+        if self.sharing == "single" and (self.volume or self.coupled):
+            what = "volume = true" if self.volume else f"rule = '{self.rule}'"
+            raise ModelError(f"{what} takes every element's springs: sharing = 'single' does not go with it")
+        if self.volume and self.coupled:
+            raise ModelError(f"rule = '{self.rule}' realises any Poisson's ratio by itself: leave volume out")
 
     kind = "springs"
 
     @property
+    def coupled(self) -> bool:
+        """Whether the springs of an element answer to each other's lengths: see BiquadraticSprings."""
+        return self.rule is not None and RULES[self.rule].coupled
+
+    @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        rule = self.rule if self.stiffness is None else "own stiffness"
-        return f"springs ({rule}, single)" if self.sharing == "single" else f"springs ({rule})"
+        words = [self.rule or "own stiffness"]
+        words += [f"k_body {self.k_body:g}"] if self.k_body is not None else []
+        words += ["single"] if self.sharing == "single" else []
+        words += ["volume"] if self.volume else []
+        return f"springs ({', '.join(words)})"
 
     def element_stiffness(self, problem: Problem) -> Floats:
         """Stiffness of each element's own springs [N/m], shape (n_elements, links of the kind)."""
-        return element_stiffness(problem, self.rule, self.stiffness)
+        given = self._given_stiffness(problem)
+        if not self.volume:
+            return given
+        scale = {material: self._correction(problem, material)[0] for material in problem.materials}
+        return given * problem.of_elements(lambda material: scale[material])[:, None]
 
-    def potential(self, problem: Problem) -> SpringNetwork:
-        """Return the network on the problem's mesh; raise ModelError for a negative spring unless allowed."""
-        mesh = problem.mesh
+    def _given_stiffness(self, problem: Problem) -> Floats:
+        """What the rule or the user gives, before a volume term rescales it."""
+        if self.stiffness is not None:
+            return user_stiffness(problem, self.stiffness)
+        return rule_stiffness(problem, str(self.rule), {} if self.k_body is None else {"k_body": self.k_body})
+
+    def kappa(self, problem: Problem) -> Floats:
+        """Modulus of the area or volume term of each element [Pa], shape (n_elements,); zero without one."""
+        if not self.volume:
+            return np.zeros(len(problem.mesh.elements))
+        kappas = {material: self._correction(problem, material)[1] for material in problem.materials}
+        return problem.of_elements(lambda material: kappas[material])
+
+    def _correction(self, problem: Problem, material: Material) -> tuple[float, float]:
+        """What scales the springs, and the modulus of the volume term [Pa], on a body of one material.
+
+        Springs alone have lam = mu (Cauchy). Scaled to the material's mu, they leave lam - mu to the
+        term. Scaled to E instead, as is sometimes seen, they leave mu wrong.
+        """
+        _, section = require_body(problem)
+        if material.poisson < 0:
+            raise ModelError(
+                f"volume = true: poisson = {material.poisson:g} is below 0; a volume term realises 0 to 0.5, "
+                "the rule biquadratic any"
+            )
+        alone = replace(problem, material=material, regions=())
+        classes = lattice_classes(problem.mesh)
+        found = lattice_elasticity(alone, affine_energies(alone, self._given_stiffness(alone)), classes)
+        mu = float(found[-1, -1])
+        if classes is None or np.abs(found - hooke(mu, mu, problem.mesh.dim)).max() > _ISOTROPIC * abs(mu):
+            this = "none" if classes is None else "anisotropic"
+            other = "lloyd on body-centred-cubic tetrahedra" if problem.mesh.element == "tetrahedron" else "isotropic"
+            raise ModelError(
+                f"volume = true is for isotropic lattices, this one is {this}: take the rule {other}, "
+                "or the rule biquadratic, which realises any Poisson's ratio on any mesh"
+            )
+        wanted = section.lame_within(material)
+        return wanted.mu / mu, wanted.lam - wanted.mu
+
+    def potential(self, problem: Problem) -> SpringNetwork | BiquadraticSprings | VolumeSprings:
+        """Return the springs on the problem's mesh; raise ModelError for a negative one unless allowed."""
         per_element = self.element_stiffness(problem)
+        if self.coupled:
+            return BiquadraticSprings(problem)
+        network = self._network(problem, per_element)
+        return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
+
+    def _network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
+        mesh = problem.mesh
         pairs = np.sort(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
         springs, inverse = np.unique(pairs, axis=0, return_inverse=True)
         place = inverse.ravel()
         stiffness = np.bincount(place, per_element.ravel()).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)
+        # Rules whose sum is zero on some links leave rounding there, which is no negative spring.
+        stiffness[np.abs(stiffness) <= 1e-12 * np.abs(stiffness).max()] = 0.0
         negative = np.flatnonzero(stiffness < 0)
         if negative.size and not self.allow_negative:
             middle = mesh.nodes[springs[negative[0]]].mean(axis=0)
@@ -181,3 +149,11 @@ class Springs:
                 f"N/m at {middle.tolist()} m: take elements nearer to squares, another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)
+
+
+def hooke(lam: float, mu: float, dim: int) -> Floats:
+    """Return the isotropic elasticity of Lamé's constants [Pa] in Voigt's order, shape (3, 3) or (6, 6)."""
+    n_shear = dim * (dim - 1) // 2
+    elasticity = np.zeros((dim + n_shear, dim + n_shear))
+    elasticity[:dim, :dim] = lam
+    return elasticity + np.diag([2 * mu] * dim + [mu] * n_shear)

@@ -308,6 +308,7 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path
     return State(
         load_factor=surface.load_factor,
         positions=positions,
+        all_positions=positions,
         displacement=displacement,
         reaction=np.full_like(positions, math.nan),
         energy=math.nan,

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from truespring.comparison import compare, most_moved
-from truespring.equilibrium import Path, model_warnings, solve
+from truespring.equilibrium import Path, solve
 from truespring.errors import StudyError
-from truespring.material import PlaneStress
+from truespring.material import PlaneStress, Solid
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, Moduli, Springs, moduli
+from truespring.models import Fem, Moduli, Springs, model_warnings, moduli
 from truespring.problem import Problem
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
@@ -159,7 +159,7 @@ def plan(study: Study) -> dict[str, Any]:
 
 
 def _section(problem: Problem) -> dict[str, Any] | None:
-    if problem.section is None:
+    if problem.section is None or isinstance(problem.section, Solid):
         return None
     kind = "plane-stress" if isinstance(problem.section, PlaneStress) else "plane-strain"
     return {"kind": kind, "thickness": problem.section.thickness}
@@ -167,13 +167,14 @@ def _section(problem: Problem) -> dict[str, Any] | None:
 
 def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
     if not isinstance(entry, Springs):
-        law = {"law": entry.law} if isinstance(entry, Fem) else {"warnings": list(getattr(entry, "warnings", ()))}
-        return {"kind": entry.kind, "label": entry.label, **law}
+        known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
+        law = {"law": entry.law, "element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
+        return {"kind": entry.kind, "label": entry.label, **law, "warnings": list(known)}
     realised = moduli(study.problem, entry)
     return {
         "kind": entry.kind,
         "label": entry.label,
-        "n_springs": len(entry.potential(study.problem).springs),
+        "n_springs": realised.n_springs,
         "moduli": moduli_values(realised),
-        "warnings": list(model_warnings(study.problem, realised)),
+        "warnings": list(model_warnings(study.problem, entry)),
     }

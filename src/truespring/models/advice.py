@@ -1,0 +1,92 @@
+"""What should be known of a model before it is solved, in words."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from truespring.material import PlaneStrain
+from truespring.models.fem import LOCKING_POISSON, Fem
+from truespring.models.moduli import Moduli, moduli
+from truespring.models.rules import RULES
+from truespring.models.springs import Springs
+from truespring.problem import Problem
+
+# Moduli within this share are the material's, a bending factor within that one is worth no word.
+_SAME_MODULI, _SAME_BENDING = 0.01, 0.05
+
+
+def model_warnings(problem: Problem, model: Any) -> tuple[str, ...]:
+    """Return what should be known of a model: springs of other moduli than the material's, elements that lock."""
+    if isinstance(model, Fem):
+        return model.warnings(problem)
+    if not isinstance(model, Springs):
+        return ()
+    several = len(problem.materials) > 1
+    warnings: dict[str, None] = {}
+    for twin in problem.homogeneous:
+        material = twin.material
+        assert material is not None  # springs have asked for it
+        where = f"where E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}: " if several else ""
+        warnings |= {f"{where}{text}": None for text in _springs_warnings(twin, model, moduli(twin, model))}
+    return tuple(warnings)
+
+
+def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> Iterator[str]:
+    yield from _moduli_warning(problem, realised)
+    if not realised.stable:
+        yield "these springs are not stable at rest: nodes inside the body have no positive stiffness"
+    if realised.patch_score and not realised.lattice and not springs.coupled:
+        yield (
+            "on this irregular mesh a uniform strain is no equilibrium of these springs (patch test: "
+            f"{realised.patch_score:.2g} E h unbalanced at inner nodes): they distort where the material would not; "
+            "the rule biquadratic does not"
+        )
+    if realised.n_negative:
+        yield f"{realised.n_negative} of {realised.n_springs} springs have a negative stiffness"
+    factor = realised.bending[realised.depth] if realised.depth else 1.0
+    if abs(factor - 1) > _SAME_BENDING:
+        yield (
+            f"bent along x, {realised.depth} elements deep, these springs have {factor:.4g} times the bending "
+            "stiffness EI of the material"
+        )
+    material = problem.material
+    assert material is not None  # springs have asked for it
+    kappa = float(springs.kappa(problem)[0])
+    if kappa < 0:
+        yield (
+            f"the volume term has a negative modulus ({kappa:.4g} Pa, Poisson's ratio below "
+            f"{'1/3' if problem.mesh.dim == 2 else '1/4'}): at large stretch nothing bounds the energy from below; "
+            "the rule biquadratic has no such limit"
+        )
+    locking = material.poisson > LOCKING_POISSON and problem.mesh.element in ("triangle", "tetrahedron")
+    if locking and (springs.volume or springs.coupled):
+        yield f"at a Poisson's ratio of {material.poisson:g} {problem.mesh.element} elements lock, as those of FEM do"
+    elif springs.coupled and material.poisson > LOCKING_POISSON and problem.mesh.dim == 3:
+        yield (
+            f"at a Poisson's ratio of {material.poisson:g} {RULES['biquadratic'].elements[-1]} elements of full "
+            "integration lock, and these springs are just that: springs with volume = true lock less"
+        )
+
+
+def _moduli_warning(problem: Problem, realised: Moduli) -> Iterator[str]:
+    directions: dict[str, Any]
+    if realised.dim == 2:
+        directions = {f"at {angle} degrees": angle for angle in (0, 45, 90)}
+    else:
+        directions = {"along x": (1, 0, 0), "along y": (0, 1, 0), "along z": (0, 0, 1)}
+        directions |= {"along x + y": (1, 1, 0), "along x + y + z": (1, 1, 1)}
+    found = {name: (realised.young(along), realised.poisson(along)) for name, along in directions.items()}
+    if all(
+        abs(young / realised.young_wanted - 1) <= _SAME_MODULI
+        and abs(poisson - realised.poisson_wanted) <= _SAME_MODULI
+        for young, poisson in found.values()
+    ):
+        return
+    shown: dict[str, str] = {}  # each pair once, at its first direction
+    for name, (young, poisson) in found.items():
+        shown.setdefault(f"{young:.6g} Pa and {poisson:.4g}", name)
+    said = ", ".join(f"{pair} {name}" for pair, name in shown.items())
+    explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
+    yield (
+        f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
+        f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
+    )

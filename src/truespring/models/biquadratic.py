@@ -1,0 +1,116 @@
+"""Biquadratic springs: springs in squared lengths, coupled within an element, that are St. Venant-Kirchhoff FEM."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.models.links import link_coupling
+from truespring.potential import Pattern, SparseMatrix
+from truespring.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class BiquadraticSprings:
+    """Energy W = q . M q of every element, q = l^2 - L^2 of its links, without a quadrature loop.
+
+    With p = 2 M q and d the vector of a link from a to b: force 2 p d on b and -2 p d on a; Hessian
+    J^T 2M J + sum 2 p [[I, -I], [-I, I]], J = dq/dx. Sources: see `link_coupling`.
+    """
+
+    problem: Problem
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference positions [m], shape (n_nodes, dim)."""
+        return self.problem.mesh.nodes
+
+    @cached_property
+    def coupling(self) -> Floats:
+        """M [J/m^4], shape (n_elements, links, links)."""
+        return link_coupling(self.problem)
+
+    @cached_property
+    def _links(self) -> Ints:
+        return np.array(self.problem.mesh.kind.links)
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return Pattern(self.problem.mesh.elements, *self.nodes.shape)
+
+    @cached_property
+    def _at_rest(self) -> Floats:
+        return np.asarray((self._vectors(self.nodes) ** 2).sum(axis=2))
+
+    def _vectors(self, positions: Floats) -> Floats:
+        """Vector of each link [m], shape (n_elements, links, dim)."""
+        at = positions[self.problem.mesh.elements]
+        return np.asarray(at[:, self._links[:, 1]] - at[:, self._links[:, 0]])
+
+    def _change(self, vectors: Floats) -> Floats:
+        """The change q of squared lengths [m^2], shape (n_elements, links)."""
+        return np.asarray((vectors**2).sum(axis=2) - self._at_rest)
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]."""
+        return float(self._element_energies(positions).sum())
+
+    def _element_energies(self, positions: Floats) -> Floats:
+        q = self._change(self._vectors(positions))
+        return np.asarray(np.einsum("ek,ekl,el->e", q, self.coupling, q, optimize=True))
+
+    def stress(self, positions: Floats) -> Floats:
+        """The derivative p = 2 M q of the energy by each squared length [N/m], shape (n_elements, links)."""
+        q = self._change(self._vectors(positions))
+        return np.asarray(2 * np.einsum("ekl,el->ek", self.coupling, q))
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        pull = 2 * self.stress(positions)[:, :, None] * self._vectors(positions)
+        return self._pattern.vector(np.einsum("la,eli->eai", self._incidence, pull)).reshape(positions.shape)
+
+    @cached_property
+    def _incidence(self) -> Floats:
+        """1 at the second, -1 at the first node of each link, shape (links, nodes of the element)."""
+        incidence = np.zeros((len(self._links), self.problem.mesh.kind.n_nodes))
+        every = np.arange(len(self._links))
+        incidence[every, self._links[:, 0]], incidence[every, self._links[:, 1]] = -1, 1
+        return incidence
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
+        p = self.stress(positions) if stress is None else stress
+        d, s = self._vectors(positions), self._incidence
+        n_elements, n_local, dim = len(d), s.shape[1], d.shape[2]
+        J = 2 * np.einsum("la,eli->elai", s, d).reshape(n_elements, len(s), n_local * dim)
+        blocks = J.swapaxes(1, 2) @ (2 * self.coupling) @ J
+        spread = np.einsum("el,la,lb->eab", 2 * p, s, s, optimize=True)
+        blocks = blocks.reshape(n_elements, n_local, dim, n_local, dim)
+        for i in range(dim):
+            blocks[:, :, i, :, i] += spread
+        return self._pattern.matrix(blocks.reshape(n_elements, n_local * dim, n_local * dim))
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """The Hessian without what compressed links add to its geometric part, positive semidefinite [N/m]."""
+        return self.hessian(positions, np.maximum(self.stress(positions), 0.0))
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Length over rest length of each element's links, shape (n_elements * links,)."""
+        squared = (self._vectors(positions) ** 2).sum(axis=2)
+        return np.asarray(np.sqrt(squared / self._at_rest).ravel())
+
+    @cached_property
+    def springs(self) -> Ints:
+        """Each pair of nodes that a link joins once, shape (n_springs, 2)."""
+        pairs = self.problem.mesh.elements[:, self._links].reshape(-1, 2)
+        return np.unique(np.sort(pairs, axis=1), axis=0)
+
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """The elements, shape (n_elements, nodes): their energy is not that of single links."""
+        return self.problem.mesh.kind.vtk, self.problem.mesh.elements
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Strain energy [J] of each element."""
+        return {"strain_energy": self._element_energies(positions)}
