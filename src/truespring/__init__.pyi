@@ -14,6 +14,7 @@ from .mesh import Box as Box
 from .mesh import Mesh as Mesh
 from .mesh import Near as Near
 from .mesh import Plane as Plane
+from .mesh import box as box
 from .mesh import named_point as named_point
 from .mesh import nearest_node as nearest_node
 from .mesh import rectangle as rectangle
@@ -28,5 +29,6 @@ from .models import moduli as moduli
 from .problem import Fixed as Fixed
 from .problem import Force as Force
 from .problem import Problem as Problem
+from .problem import Region as Region
 from .reference import read_stl as read_stl
 from .solvers import Newton as Newton

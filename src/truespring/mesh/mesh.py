@@ -137,21 +137,20 @@ class Mesh:
 
     @cached_property
     def facets(self) -> Ints:
-        """Every facet of every element, node numbers sorted and each once, shape (n_facets, k)."""
-        return np.asarray(self._facets[0])
+        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k)."""
+        return np.asarray(self._all_facets[self._facets[0]])
 
     @cached_property
     def boundary(self) -> Ints:
         """The facets that belong to one element only, in that element's own order of nodes, shape (n, k)."""
-        _, first, count = self._facets
+        first, count = self._facets
         return np.asarray(self._all_facets[first[count == 1]])
 
     @cached_property
-    def _facets(self) -> tuple[Ints, Ints, Ints]:
-        unique, first, count = np.unique(
-            np.sort(self._all_facets, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        return unique, first, count
+    def _facets(self) -> tuple[Ints, Ints]:
+        """Where each facet stands first among all, and how many elements have it."""
+        _, first, count = np.unique(np.sort(self._all_facets, axis=1), axis=0, return_index=True, return_counts=True)
+        return first, count
 
     @cached_property
     def _all_facets(self) -> Ints:

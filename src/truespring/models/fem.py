@@ -111,10 +111,12 @@ def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" 
     """Set up quadrature and constants of `law` on the problem's mesh."""
     if problem.material is None or problem.section is None or problem.mesh.element not in _SKFEM:
         raise ModelError(f"finite elements need a material, a section and elements of a kind among {', '.join(_SKFEM)}")
-    lam, mu = (problem.of_elements(lambda material, i=i: material.lame[i])[:, None] for i in (0, 1))
+    plane_stress = isinstance(problem.section, PlaneStress)
     if len(problem.materials) == 1:
-        lam, mu = lam[0, 0], mu[0, 0]
-    constants = Constants(lam, mu, isinstance(problem.section, PlaneStress))
+        constants = Constants(*problem.material.lame, plane_stress)
+    else:
+        lam, mu = (problem.of_elements(value)[:, None] for value in (lambda one: one.lame.lam, lambda one: one.lame.mu))
+        constants = Constants(lam, mu, plane_stress)
     return (kind or FemPotential)(problem, LAWS[law], constants)
 
 

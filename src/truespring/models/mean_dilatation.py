@@ -121,7 +121,7 @@ class MeanDilatationPotential(FemPotential):
 
         def nodal(first: Floats) -> Floats:
             """The derivative by the nodes of a density with this derivative by F, axes (element, point, dof)."""
-            return np.einsum("ijeq,ajeq->eqai", first, self.shape_gradients).reshape(*J.shape, size)
+            return np.asarray(np.einsum("ijeq,ajeq->eqai", first, self.shape_gradients).reshape(*J.shape, size))
 
         h = nodal(_inverse_transposed(at.F))
         mean_J = self._mean(J)
@@ -138,7 +138,7 @@ class MeanDilatationPotential(FemPotential):
             turned = np.einsum("eq,eqaj,eqbi->eaibj", w * at.pressure - grown, by_node, by_node)
             blocks += turned.reshape(blocks.shape) + np.einsum("eq,eqi,eqj->eij", grown, h, h)
             blocks -= p[:, :, None] * m[:, :, None] * m[:, None, :]
-        return blocks
+        return np.asarray(blocks)
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """True stress averaged over the points of each element [Pa], shape (n_elements, 3, 3)."""

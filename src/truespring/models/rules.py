@@ -93,7 +93,7 @@ def user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
     require_body(problem)
     kind = problem.mesh.kind
     values = [own.edge] * len(kind.edges) + [own.diagonal] * len(kind.diagonals) + [own.body] * len(kind.body_diagonals)
-    return _scale(problem)[:, None] * np.array(values)
+    return np.asarray(_scale(problem)[:, None] * np.array(values))
 
 
 def _scale(problem: Problem) -> Floats:

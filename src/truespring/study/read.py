@@ -13,12 +13,22 @@ from pydantic import ValidationError
 from truespring.equilibrium import Path
 from truespring.errors import NoLoadError, StudyError, TruespringError, close_words, nearest
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
-from truespring.mesh import Mesh, Near, named_point, nearest_node, rectangle, select
+from truespring.mesh import (
+    Mesh,
+    Near,
+    box,
+    named_point,
+    nearest_node,
+    rectangle,
+    select,
+    select_elements,
+)
 from truespring.models import Fem, Model, Springs, UserStiffness, moduli
-from truespring.problem import Fixed, Force, Problem
+from truespring.problem import Fixed, Force, Problem, Region
 from truespring.reference import read_stl
 from truespring.solvers import Newton
 from truespring.study import schema
+from truespring.units import to_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +124,15 @@ class _Builder:
     def problem(self) -> Problem:
         table = self.table
         with self.at("mesh"):
-            mesh = rectangle(table.mesh.size, table.mesh.elements)
+            mesh = self.mesh()
         with self.at("material"):
-            material = Material(table.material.young, table.material.poisson, table.material.density)
-        with self.at("section"):
-            section = _SECTIONS[table.section.kind](table.section.thickness)
+            material = _material(table.material)
+        section = self.section(mesh)
+        regions = []
+        for number, region in enumerate(table.region):
+            with self.at("region", number):
+                select_elements(mesh, region.on)
+                regions.append(Region(region.on, _material(region)))
         supports, loads = [], []
         for number, support in enumerate(table.support):
             with self.at("support", number, "on"):
@@ -129,10 +143,34 @@ class _Builder:
                 select(mesh, load.on)
             loads.append(Force(load.on, load.force))
         try:
-            return Problem(mesh, material, section, supports, loads)
+            return Problem(mesh, material, section, supports, loads, regions)
         except TruespringError as error:
             with self.at("load" if isinstance(error, NoLoadError) else "support"):
                 raise
+
+    def mesh(self) -> Mesh:
+        match self.table.mesh:
+            case schema.RectangleTable() as table:
+                return rectangle(table.size, table.elements, table.element, table.diagonal)
+            case schema.BoxTable() as table:
+                return box(table.size, table.elements, table.element)
+            case table:
+                with self.at("mesh", "unit"):
+                    scale = to_si(f"1 {table.unit}", "length")
+                from truespring.mesh.files import read_mesh
+
+                return read_mesh(self.file.parent / table.file, scale)
+
+    def section(self, mesh: Mesh) -> Section | None:
+        table = self.table.section
+        with self.at("section"):
+            if mesh.dim == 3 and table is not None:
+                raise StudyError("is for plane bodies: a body in 3D has none")
+            if mesh.dim == 3:
+                return None
+            if table is None:
+                raise StudyError(f"is required and missing; kind: {', '.join(_SECTIONS)}, and a thickness")
+            return _SECTIONS[table.kind](table.thickness)
 
     def entry(self, problem: Problem, name: str, table: Any) -> Model | Path:
         with self.at("models", name):
@@ -143,10 +181,10 @@ class _Builder:
                     read: Path = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
                     return read
                 case schema.FemTable():
-                    model: Model = Fem(table.law)
+                    model: Model = Fem(table.law, table.element)
                 case _:
-                    own = table.stiffness and UserStiffness(table.stiffness.edge, table.stiffness.diagonal)
-                    model = Springs(table.rule, own, table.sharing, table.allow_negative)
+                    own = table.stiffness and UserStiffness(*table.stiffness.model_dump().values())
+                    model = Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
                 moduli(problem, model)
@@ -171,6 +209,10 @@ class _Builder:
         if name not in entries:
             with self.at("compare", key):
                 raise StudyError(f"'{name}' is not among the models{nearest(name, entries)}: {', '.join(entries)}")
+
+
+def _material(table: schema.MaterialTable) -> Material:
+    return Material(table.young, table.poisson, table.density)
 
 
 _SECTIONS: dict[str, type[Section]] = {"plane-stress": PlaneStress, "plane-strain": PlaneStrain}
@@ -212,6 +254,12 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             expected = error["ctx"]["expected"]
             words = re.findall(r"'([^']*)'", expected)
             return f"{place} = {value!r}: allowed: {expected}{nearest(str(value), words)}"
+        case "union_tag_invalid" | "union_tag_not_found" if key == ("mesh",):
+            given = value.get("shape") if isinstance(value, dict) else value
+            if given is None:
+                return f"{place}: shape is required and missing; allowed: rectangle, box; or file = a mesh file"
+            close = nearest(str(given), ("rectangle", "box"))
+            return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or file = a mesh file"
         case "union_tag_invalid" | "union_tag_not_found":
             given = value.get("kind") if isinstance(value, dict) else value
             kinds = ("springs", "fem", "stl")
@@ -226,13 +274,14 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
 def _without_tag(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Drop the kind that pydantic puts behind a model's name, and its mark of a faulty key."""
     key = loc[:2] + loc[3:] if loc[0] == "models" and len(loc) > 3 else loc
+    key = key[:1] + key[2:] if key[0] == "mesh" and len(key) > 2 else key
     return tuple(part for part in key if part != "[key]")
 
 
 def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
     """The keys of the table at `loc`."""
     tables: dict[str | int, type[schema.Table]] = {
-        "mesh": schema.MeshTable,
+        "region": schema.RegionTable,
         "material": schema.MaterialTable,
         "section": schema.SectionTable,
         "support": schema.SupportTable,
@@ -247,6 +296,10 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
     }
     if not loc:
         return list(schema.StudyTable.model_fields)
+    if loc[0] == "mesh":
+        meshes: dict[str, type[schema.Table]]
+        meshes = {"rectangle": schema.RectangleTable, "box": schema.BoxTable, "file": schema.FileTable}
+        return list(meshes[str(loc[1])].model_fields)
     if loc[-1] == "stiffness":
         return list(schema.StiffnessTable.model_fields)
     return list((kinds[loc[2]] if loc[0] == "models" else tables[loc[0]]).model_fields)

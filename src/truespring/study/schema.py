@@ -1,6 +1,6 @@
 """The tables of a study file, as pydantic knows them. Numbers are SI; texts carry units."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -10,13 +10,14 @@ from pydantic import (
     Discriminator,
     Field,
     PlainValidator,
+    Tag,
     WithJsonSchema,
     field_validator,
 )
 
 from truespring.errors import TruespringError, nearest
-from truespring.mesh import Box, Near, Plane, Selection
-from truespring.models import LAWS, RULES
+from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
+from truespring.models import ELEMENTS, LAWS, RULES
 from truespring.units import SI_UNITS, Dimension, to_si
 
 
@@ -42,8 +43,8 @@ def _quantity(dimension: Dimension) -> WithJsonSchema:
     return WithJsonSchema({"type": ["number", "string"], "description": description})
 
 
-def _key_of(table: Mapping[str, Any]) -> BeforeValidator:
-    """Accept the keys of RULES or LAWS, so that the table is the one list of names."""
+def _key_of(table: Collection[str]) -> BeforeValidator:
+    """Accept the names of a table such as RULES, so that it is the one list of them."""
 
     def check(value: Any) -> Any:
         if value not in table:
@@ -65,12 +66,16 @@ Force = Annotated[float, _si("force"), _quantity("force")]
 Density = Annotated[float, _si("density"), _quantity("density")]
 RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
 LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
+FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
+PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
+SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
+Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
 Direction = Literal["x", "y", "z"]
 
 _SELECTION_FORMS = (
-    'a side ("left", "right", "bottom", "top"), a point ("right-middle"), '
-    '{ x = "0 mm" }, { box = [[xmin, ymin], [xmax, ymax]] } or { near = [x, y] }'
+    'a side ("left", "right", "bottom", "top", "back", "front"), a group of an imported mesh, a point '
+    '("right-middle"), { x = "0 mm" }, { box = [[xmin, ymin], [xmax, ymax]] } or { near = [x, y] }'
 )
 
 
@@ -133,13 +138,47 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, protected_namespaces=())
 
 
-class MeshTable(Table):
-    """The body's shape and its elements."""
+_Count = Annotated[int, Field(ge=1, le=10**9)]
+_two, _three = Field(min_length=2, max_length=2), Field(min_length=3, max_length=3)
+
+
+class RectangleTable(Table):
+    """A rectangle, and what it is divided into."""
 
     shape: Literal["rectangle"]
-    size: Annotated[list[Length], Field(min_length=2, max_length=2)]
-    elements: Annotated[list[Annotated[int, Field(ge=1, le=10**9)]], Field(min_length=2, max_length=2)]
-    element: Literal["quadrilateral"] = "quadrilateral"
+    size: Annotated[list[Length], _two]
+    elements: Annotated[list[_Count], _two]
+    element: PlaneElement = "quadrilateral"
+    diagonal: Diagonal = "right"
+
+
+class BoxTable(Table):
+    """A box, and what it is divided into."""
+
+    shape: Literal["box"]
+    size: Annotated[list[Length], _three]
+    elements: Annotated[list[_Count], _three]
+    element: SolidElement = "hexahedron"
+
+
+class FileTable(Table):
+    """A mesh from a file; mesh files know no units, so `unit` tells their length unit."""
+
+    file: str
+    unit: str = "m"
+
+
+def _mesh_form(value: Any) -> str | None:
+    """Tell the table of a mesh by its keys."""
+    if not isinstance(value, dict):
+        return None
+    return "file" if "file" in value else str(value.get("shape"))
+
+
+MeshTable = Annotated[
+    Annotated[RectangleTable, Tag("rectangle")] | Annotated[BoxTable, Tag("box")] | Annotated[FileTable, Tag("file")],
+    Discriminator(_mesh_form),
+]
 
 
 class MaterialTable(Table):
@@ -148,6 +187,12 @@ class MaterialTable(Table):
     young: Stress
     poisson: Number
     density: Density | None = None
+
+
+class RegionTable(MaterialTable):
+    """A part of the body of another material."""
+
+    on: On
 
 
 class SectionTable(Table):
@@ -182,10 +227,11 @@ class SolverTable(Table):
 
 
 class StiffnessTable(Table):
-    """Springs of the user's own, in units of thickness times Young's modulus."""
+    """Springs of the user's own, in units of thickness times Young's modulus; in 3D of Young's modulus times size."""
 
     edge: Number
-    diagonal: Number
+    diagonal: Number = 0.0
+    body: Number = 0.0
 
 
 class SpringsTable(Table):
@@ -197,13 +243,7 @@ class SpringsTable(Table):
     sharing: Literal["summed", "single"] = "summed"
     allow_negative: bool = False
     volume: bool = False
-
-    @field_validator("volume")
-    @classmethod
-    def _no_area_term(cls, volume: bool) -> bool:
-        if volume:
-            raise ValueError("volume = true: there is no area term yet; leave the key out, or take an fem model")
-        return volume
+    k_body: Number | None = None
 
 
 class FemTable(Table):
@@ -211,6 +251,7 @@ class FemTable(Table):
 
     kind: Literal["fem"]
     law: LawName
+    element: FemElement | None = None
 
 
 class StlTable(Table):
@@ -242,7 +283,8 @@ class StudyTable(Table):
     title: str | None = None
     mesh: MeshTable
     material: MaterialTable
-    section: SectionTable
+    region: list[RegionTable] = []
+    section: SectionTable | None = None
     support: Annotated[list[SupportTable], Field(min_length=1)]
     load: list[LoadTable] = []
     solver: SolverTable = SolverTable()
