@@ -4,7 +4,8 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.mesh import Mesh
-from truespring.models.links import link_vectors, voigt_pairs
+from truespring.models.links import link_vectors
+from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 
 # A mesh made of so few kinds of elements, up to translation, is a lattice: 12 make the body-centred-cubic one,

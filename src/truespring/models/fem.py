@@ -12,6 +12,7 @@ from truespring.errors import ModelError, nearest
 from truespring.material import PlaneStress
 from truespring.mesh import Mesh
 from truespring.models.laws import LAWS, Constants, Law, Response
+from truespring.models.strain import voigt_pairs
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
@@ -166,6 +167,11 @@ class FemPotential:
         return np.stack([function.grad for (function,) in self._basis.basis])[order]
 
     @cached_property
+    def _gradients(self) -> Floats:
+        """The same, axes (element, point, node of the element, direction)."""
+        return np.ascontiguousarray(np.moveaxis(self.shape_gradients, (2, 3), (0, 1)))
+
+    @cached_property
     def volumes(self) -> Floats:
         """Reference volume of each Gauss point [m^3], axes (element, point)."""
         section = self.problem.section
@@ -178,7 +184,8 @@ class FemPotential:
 
     def _deformation(self, positions: Floats) -> Floats:
         """Deformation gradient at the Gauss points, axes (i, j, element, point)."""
-        return np.asarray(np.einsum("eai,ajeq->ijeq", positions[self.elements], self.shape_gradients))
+        at = positions[self.elements].swapaxes(1, 2)
+        return np.ascontiguousarray(np.moveaxis(at[:, None] @ self._gradients, (2, 3), (0, 1)))
 
     def _respond(self, positions: Floats) -> tuple[Floats, Response]:
         """Deformation gradient and the law's response; the last ones are kept, for energy, gradient and Hessian."""
@@ -213,8 +220,15 @@ class FemPotential:
 
     def _summed(self, first: Floats) -> Floats:
         """Nodal forces [N] of a first Piola-Kirchhoff stress, axes (i, j, element, point)."""
-        forces = np.einsum("ijeq,ajeq->eai", first * self.volumes, self.shape_gradients)
+        forces = self.nodal(first * self.volumes).sum(axis=1)
         return self._pattern.vector(forces).reshape(self.nodes.shape)
+
+    def nodal(self, first: Floats) -> Floats:
+        """Return the derivative by the nodes of a density from that by F, axes (i, j, element, point).
+
+        Its own axes are (element, point, node of the element, direction).
+        """
+        return np.asarray(self._gradients @ np.moveaxis(first, (1, 0), (2, 3)))
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [Pa] makes the geometric part, by default that of the positions."""
@@ -229,20 +243,36 @@ class FemPotential:
     def element_hessians(self, positions: Floats, stress: Floats | None = None) -> Floats:
         """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
         F, response = self._respond(positions)
-        S = response.stress if stress is None else stress
-        return self._tangent(F, S, response.elasticity)
+        if not self.law.finite:
+            F = np.broadcast_to(np.eye(len(F))[:, :, None, None], F.shape)
+        return self._tangent(F, response.stress if stress is None else stress, response.elasticity)
 
     def _tangent(self, F: Floats, S: Floats, elasticity: Floats) -> Floats:
-        """Element matrices [N/m] of a stress and an elasticity by the Green strain, at the deformation gradient F."""
+        """Element matrices [N/m] of a stress and an elasticity by Green's strain, at the deformation gradient F.
+
+        B^T D B with B the derivative of the strain by the nodes, in Voigt's order; F is I for a linear law.
+        """
+        dim, n_local = len(F), self._gradients.shape[2]
+        pairs = voigt_pairs(dim)
+        columns = np.moveaxis(F, (0, 1), (3, 2))[:, :, :, None]  # of F, beside the gradients, (e, q, j, 1, i)
+
+        def strain(j: int, k: int) -> Floats:
+            return np.asarray(columns[:, :, j] * self._gradients[..., [k]])
+
+        rows = [strain(j, k) if j == k else strain(j, k) + strain(k, j) for j, k in pairs]
+        n_elements, n_points = self.volumes.shape
+        B = np.stack(rows, axis=2).reshape(n_elements, n_points, len(pairs), dim * n_local)  # by Green's strain
+        D = np.stack([np.stack([elasticity[one + two] for two in pairs], axis=-1) for one in pairs], axis=-2)
+        weighted = (self.volumes[:, :, None, None] * D) @ B
+        flat = (n_elements, n_points * len(pairs), dim * n_local)
+        blocks = B.reshape(flat).swapaxes(1, 2) @ weighted.reshape(flat)
         if self.law.finite:
-            tangent = np.einsum("ai...,ijkl...,bk...->ajbl...", F, elasticity, F, optimize=True)
-            tangent += np.einsum("ab,jl...->ajbl...", np.eye(len(F)), S)
-        else:
-            tangent = elasticity
-        half = np.einsum("ijkleq,bleq->ijkbeq", tangent * self.volumes, self.shape_gradients)
-        blocks = np.einsum("ajeq,ijkbeq->eaibk", self.shape_gradients, half)
-        size = self._pattern.dofs.shape[1]
-        return np.asarray(blocks.reshape(-1, size, size))
+            stress = np.moveaxis(S * self.volumes, (0, 1), (2, 3))
+            spread = (self._gradients @ stress @ self._gradients.swapaxes(2, 3)).sum(axis=1)
+            by_node = blocks.reshape(n_elements, n_local, dim, n_local, dim)
+            for i in range(dim):
+                by_node[:, :, i, :, i] += spread
+        return np.asarray(blocks)
 
     @property
     def cells(self) -> tuple[str, Ints]:

@@ -18,11 +18,6 @@ def link_vectors(mesh: Mesh) -> Floats:
     return np.asarray(at[:, links[:, 1]] - at[:, links[:, 0]])
 
 
-def voigt_pairs(dim: int) -> tuple[tuple[int, int], ...]:
-    """Directions of each component of a strain in Voigt's order: xx, yy, xy, or xx, yy, zz, yz, xz, xy."""
-    return ((0, 0), (1, 1), (0, 1)) if dim == 2 else ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-
-
 def link_coupling(problem: Problem) -> Floats:
     """Return M of W = q . M q, the energy of an element in the changes q = l^2 - L^2 of its squared link lengths.
 

@@ -120,23 +120,21 @@ class MeanDilatationPotential(FemPotential):
         size = blocks.shape[1]
 
         def nodal(first: Floats) -> Floats:
-            """The derivative by the nodes of a density with this derivative by F, axes (element, point, dof)."""
-            return np.asarray(np.einsum("ijeq,ajeq->eqai", first, self.shape_gradients).reshape(*J.shape, size))
+            return self.nodal(first).reshape(*J.shape, size)
 
         h = nodal(_inverse_transposed(at.F))
         mean_J = self._mean(J)
         m = np.einsum("eq,eqi->ei", w * J, h) / (w.sum(axis=1, keepdims=True) * mean_J)  # derivative of ln Jm
         t = m[:, None] - h
         c = nodal(np.einsum("ik...,kj...->ij...", at.F, at.mixed))
-        mixed = np.einsum("eq,eqi,eqj->eij", w, c, t)
-        blocks += mixed + mixed.swapaxes(1, 2) + np.einsum("eq,eqi,eqj->eij", w * at.second, t, t)
+        mixed = _summed(w, c, t)
+        blocks += mixed + mixed.swapaxes(1, 2) + _summed(w * at.second, t, t)
         if self.law.finite:
             p = self._mean(at.pressure) * w.sum(axis=1, keepdims=True)
             grown = p * w * J / (w.sum(axis=1, keepdims=True) * mean_J)
             n_local, dim = size // self.mesh.dim, self.mesh.dim
-            by_node = h.reshape(*J.shape, n_local, dim)
-            turned = np.einsum("eq,eqaj,eqbi->eaibj", w * at.pressure - grown, by_node, by_node)
-            blocks += turned.reshape(blocks.shape) + np.einsum("eq,eqi,eqj->eij", grown, h, h)
+            turned = _summed(w * at.pressure - grown, h, h).reshape(-1, n_local, dim, n_local, dim)
+            blocks += turned.swapaxes(2, 4).reshape(blocks.shape) + _summed(grown, h, h)
             blocks -= p[:, :, None] * m[:, :, None] * m[:, None, :]
         return np.asarray(blocks)
 
@@ -144,6 +142,11 @@ class MeanDilatationPotential(FemPotential):
         """True stress averaged over the points of each element [Pa], shape (n_elements, 3, 3)."""
         F_bar, response = self._respond(positions)
         return true_stress(F_bar, response, self.law.finite)
+
+
+def _summed(weight: Floats, left: Floats, right: Floats) -> Floats:
+    """Sum of weighted outer products over the points, shapes (n, points), (n, points, k) twice, to (n, k, k)."""
+    return np.asarray((weight[:, :, None] * left).swapaxes(1, 2) @ right)
 
 
 def _inverse_transposed(F: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """Moduli: what a spring model realises, known before anything is solved."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -13,15 +14,19 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
 from truespring.models.elasticity import affine_energies, lattice_classes, lattice_elasticity
-from truespring.models.fem import element_matrices
-from truespring.models.links import CORNERS, link_vectors, voigt_pairs
+from truespring.models.fem import Fem, element_matrices
+from truespring.models.links import CORNERS, link_vectors
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs, hooke
+from truespring.models.strain import voigt_pairs
 from truespring.models.volume import VolumeTerm
-from truespring.problem import Problem
+from truespring.problem import Fixed, Force, Problem
 
 #: Depths, in elements, at which the bending factor is shown.
 DEPTHS = (1, 2, 3, 4, 6, 8)
+
+# Sections of more elements than this have no bending factor of their own.
+_FINEST_SECTION = 150
 
 # Unbalanced forces below this share of E h^(d-1) are rounding: a uniform strain is an equilibrium.
 _BALANCED = 1e-8
@@ -39,7 +44,8 @@ class Moduli:
         bending: EI of a strip n elements deep (in 3D n by n), bent along x, over that of the material; n to factor.
         fem_bending: the same of linear finite elements on this mesh: the error of the reference itself.
         depth: the number of elements through the depth (y) of this mesh, None where it is no lattice of
-            rectangles or bricks along the axes; in 3D `bending[depth]` has this mesh's width (z).
+            rectangles or bricks along the axes, or one so fine that its bending factor is that of the bulk; in
+            3D `bending[depth]` has this mesh's width (z).
         lattice: whether the mesh is a lattice, whose moduli are exact.
         patch_score: the patch test under unit uniform strains: root-mean-square unbalanced force at inner nodes
             over E h^(d-1) [-], h the size of an element; 0 where uniform strain is an equilibrium.
@@ -209,15 +215,17 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
     _require_resistance(elasticity)
     young, poisson = section.apparent_moduli(material)
     counts = _cells(mesh)
-    depth = counts[1] if counts else None
+    sizes = {n: (n,) * (mesh.dim - 1) for n in DEPTHS} if counts else {}
+    depth = counts[1] if counts and math.prod(counts[1:]) <= _FINEST_SECTION else None
+    if counts and depth:
+        sizes[depth] = counts[1:]
     per_spring = _spring_sums(mesh, stiffness)
-    sizes = {n: (n,) * (mesh.dim - 1) for n in DEPTHS} | ({depth: counts[1:]} if counts and depth else {})
     return Moduli(
         elasticity=elasticity,
         young_wanted=young,
         poisson_wanted=poisson,
-        bending=_bending(alone, springs, sizes) if counts else MappingProxyType({}),
-        fem_bending=_bending(alone, None, sizes) if counts else MappingProxyType({}),
+        bending=_bending(alone, springs, sizes),
+        fem_bending=_bending(alone, None, sizes),
         depth=depth,
         lattice=classes is not None,
         patch_score=patch_score,
@@ -313,13 +321,28 @@ def _bending(
     problem: Problem, springs: Springs | None, sizes: dict[int, tuple[int, ...]]
 ) -> MappingProxyType[int, float]:
     """Bending factors by depth, of sections of so many elements through depth (and width); of FEM without springs."""
-    return MappingProxyType({depth: _bending_factor(problem, springs, sizes[depth]) for depth in sorted(sizes)})
+    if not sizes:
+        return MappingProxyType({})
+    one = _first_element(problem)
+    return MappingProxyType({depth: _bending_factor(one, springs, sizes[depth]) for depth in sorted(sizes)})
+
+
+def _first_element(problem: Problem) -> Problem:
+    """The mesh's first element as a problem of its own, held and loaded in some way."""
+    mesh = problem.mesh
+    last = mesh.kind.n_nodes - 1
+    return replace(
+        problem,
+        mesh=Mesh(mesh.nodes[mesh.elements[0]], np.arange(last + 1)[None], mesh.element),
+        supports=[Fixed(on=range(last))],
+        loads=[Force(on=[last], total=[1.0] * mesh.dim)],
+    )
 
 
 def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int, ...]) -> float:
-    """EI of a strip of elements under pure bending along x, over E I of the material in its section.
+    """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
 
-    A column of elements is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
+    A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
     from column to column and makes the energy least; EI is twice that energy by length. For springs on
     squares with summed sharing it is e0 (1 - 1/n^2) + 6 a / n^2, e0 = E_0 / E.
     """
@@ -330,13 +353,12 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
     grid = np.array([count + 1 for count in counts])
     n_free = dim * int(np.prod(grid))
     energy = np.zeros((n_free + 1, n_free + 1))
-    known: dict[bytes, Floats] = {}
+    single = springs is not None and springs.sharing == "single"
+    matrix = _element_matrix(problem, springs)
     for cell in np.ndindex(*counts):
         places = corners[:, 1:] + np.array(cell)
-        share = _shares_of_links(problem, cell, counts) if springs is not None and springs.sharing == "single" else None
-        key = b"" if share is None else share.tobytes()
-        if key not in known:
-            known[key] = _element_matrix(problem, springs, share)
+        if single:
+            matrix = _element_matrix(problem, springs, _shares_of_links(problem, cell, counts))
         numbers = np.ravel_multi_index(tuple(places.T), tuple(grid))
         moved = np.zeros((len(corners), dim, n_free + 1))
         for axis in range(dim):
@@ -345,7 +367,7 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
         moved[:, 0, -1] = -corners[:, 0] * sides[0] * height
         moved[:, 1, -1] = corners[:, 0] * sides[0] ** 2 / 2
         flat = moved.reshape(-1, n_free + 1)
-        energy += flat.T @ known[key] @ flat
+        energy += flat.T @ matrix @ flat
     free = -np.linalg.pinv(energy[:-1, :-1], rcond=1e-10, hermitian=True) @ energy[:-1, -1]
     unit = np.append(free, 1.0)
     young, _ = section.apparent_moduli(material)
@@ -353,9 +375,11 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
     return float(unit @ energy @ unit / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
 
 
-def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None) -> Floats:
+def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:
     """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
-    if springs is None or springs.coupled:  # coupled springs are FEM
+    if springs is None:
+        return np.asarray(Fem("linear").potential(problem).element_hessians(problem.mesh.nodes)[0])
+    if springs.coupled:  # these are FEM
         return np.asarray(element_matrices(problem)[0])
     mesh = problem.mesh
     links, across = np.array(mesh.kind.links), link_vectors(mesh)[0]

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import permutations
 from math import factorial
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.mesh import ElementKind
 from truespring.models.network import SpringNetwork
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
@@ -16,8 +18,7 @@ from truespring.problem import Problem
 class VolumeTerm:
     """Energy kappa/2 V0 (V / V0 - 1)^2 of each element, V its signed area times thickness, or volume.
 
-    `kappa` [Pa], shape (n_elements,). Golec et al., The Visual Computer 36 (2020), for cubes. The
-    volume of a hexahedron is the mean of its two divisions into five tetrahedra, which is exact.
+    `kappa` [Pa], shape (n_elements,). Golec et al., The Visual Computer 36 (2020), for cubes.
     """
 
     problem: Problem
@@ -28,28 +29,35 @@ class VolumeTerm:
         return Pattern(self.problem.mesh.elements, *self.problem.mesh.nodes.shape)
 
     @cached_property
-    def _simplices(self) -> Ints:
-        return np.array(self.problem.mesh.kind.simplices)
-
-    @property
-    def _thickness(self) -> float:
+    def _form(self) -> Floats:
         section = self.problem.section
         assert section is not None  # the springs beside it need one
-        return section.thickness
+        return section.thickness * volume_form(self.problem.mesh.kind)
 
     @cached_property
     def _at_rest(self) -> Floats:
         return self._volumes(self.problem.mesh.nodes)
 
+    def _places(self, positions: Floats) -> Floats:
+        """Nodes of each element from their middle [m], shape (n_elements, n_dof): volumes are small differences."""
+        at = positions[self.problem.mesh.elements]
+        return np.asarray((at - at.mean(axis=1, keepdims=True)).reshape(len(at), -1))
+
+    def _curvatures(self, places: Floats) -> Floats:
+        """Second derivative of each element's volume by its nodes [m], shape (n_elements, n_dof, n_dof)."""
+        n_dof = places.shape[1]
+        if self._form.ndim == 2:
+            return np.broadcast_to(self._form, (len(places), n_dof, n_dof))
+        return np.asarray((places @ self._form.reshape(n_dof, -1)).reshape(-1, n_dof, n_dof))
+
+    def _slopes(self, places: Floats) -> Floats:
+        """The derivative of each element's volume by its nodes [m^2], shape (n_elements, n_dof)."""
+        return np.asarray(np.einsum("eij,ej->ei", self._curvatures(places), places) / (self._form.ndim - 1))
+
     def _volumes(self, positions: Floats) -> Floats:
         """Signed volume of each element [m^3]; of a plane one area times thickness."""
-        return self._thickness * self.problem.mesh.measures_at(positions)
-
-    @property
-    def _share(self) -> float:
-        """The volume of an element over the sum of the determinants of its simplices."""
-        kind = self.problem.mesh.kind
-        return self._thickness * kind.simplex_weight / factorial(kind.dim)
+        places = self._places(positions)
+        return np.asarray((self._slopes(places) * places).sum(axis=1) / self._form.ndim)
 
     def element_energies(self, positions: Floats) -> Floats:
         """Stored energy of each element [J], shape (n_elements,)."""
@@ -61,25 +69,13 @@ class VolumeTerm:
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        forces = self.pressure(positions)[:, None, None] * self._slopes(positions)
+        forces = self.pressure(positions)[:, None] * self._slopes(self._places(positions))
         return self._pattern.vector(forces).reshape(positions.shape)
-
-    def _slopes(self, positions: Floats) -> Floats:
-        """The derivative of each element's volume by its nodes [m^2], shape (n_elements, nodes, dim)."""
-        mesh = self.problem.mesh
-        at = positions[mesh.elements]
-        slopes = np.zeros_like(at)
-        for simplex in self._simplices:
-            spans = at[:, simplex[1:]] - at[:, simplex[:1]]
-            cofactors = _cofactors(spans)
-            slopes[:, simplex[1:]] += cofactors
-            slopes[:, simplex[0]] -= cofactors.sum(axis=1)
-        return np.asarray(slopes * self._share)
 
     def hessian(self, positions: Floats, pressure: Floats) -> SparseMatrix:
         """Tangent stiffness [N/m], the curvature of the volumes weighted by `pressure` [Pa]."""
-        blocks = self.stiffening(positions)
-        return self._pattern.matrix(blocks + pressure[:, None, None] * self._curvatures(positions))
+        bent = pressure[:, None, None] * self._curvatures(self._places(positions))
+        return self._pattern.matrix(self.stiffening(positions) + bent)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """What of the Hessian is positive semidefinite everywhere: the stiffness against a change of volume [N/m]."""
@@ -88,54 +84,28 @@ class VolumeTerm:
 
     def stiffening(self, positions: Floats) -> Floats:
         """Stiffness of each element against a change of its volume [N/m], shape (n_elements, n_dof, n_dof)."""
-        slopes = self._slopes(positions).reshape(len(self.kappa), -1)
+        slopes = self._slopes(self._places(positions))
         return np.asarray((self.kappa / self._at_rest)[:, None, None] * slopes[:, :, None] * slopes[:, None, :])
 
-    def _curvatures(self, positions: Floats) -> Floats:
-        """Second derivative of each element's volume by its nodes, shape (n_elements, n_dof, n_dof)."""
-        mesh = self.problem.mesh
-        at = positions[mesh.elements]
-        n_elements, n_local, dim = at.shape
-        curvature = np.zeros((n_elements, n_local, dim, n_local, dim))
-        for simplex in self._simplices:
-            spans = at[:, simplex[1:]] - at[:, simplex[:1]]
-            first, others = simplex[0], simplex[1:]
-            for i in range(dim):
-                for j in range(dim):
-                    if i == j:
-                        continue
-                    block = _mixed_derivative(spans, i, j)
-                    a, b = others[i], others[j]
-                    for node, other, sign in ((a, b, 1), (a, first, -1), (first, b, -1), (first, first, 1)):
-                        curvature[:, node, :, other, :] += sign * block
-        return np.asarray(curvature.reshape(n_elements, n_local * dim, -1) * self._share)
 
+def volume_form(kind: ElementKind) -> Floats:
+    """Return the last derivative of an element's area or volume by its nodes: a constant, shape (n_dof,) * dim.
 
-def _cofactors(spans: Floats) -> Floats:
-    """Derivative of the determinant by its rows, shape (n, dim, dim)."""
-    if spans.shape[1] == 2:
-        a, b = spans[:, 0], spans[:, 1]
-        return np.stack([np.stack([b[:, 1], -b[:, 0]], axis=1), np.stack([-a[:, 1], a[:, 0]], axis=1)], axis=1)
-    return np.stack([np.cross(spans[:, (i + 1) % 3], spans[:, (i + 2) % 3]) for i in range(3)], axis=1)
-
-
-def _mixed_derivative(spans: Floats, i: int, j: int) -> Floats:
-    """Second derivative of the determinant by rows i and j, shape (n, dim, dim)."""
-    n, dim = spans.shape[:2]
-    if dim == 2:
-        turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
-        return np.broadcast_to(turn if i < j else -turn, (n, 2, 2))
-    c = spans[:, 3 - i - j] * (1.0 if (i + 1) % 3 == j else -1.0)
-    zero = np.zeros(n)
-    # det = r_i . (r_j x r_k) for (i, j, k) in order: the derivative by r_i and r_j is -[r_k]x transposed.
-    return np.stack(
-        [
-            np.stack([zero, c[:, 2], -c[:, 1]], axis=1),
-            np.stack([-c[:, 2], zero, c[:, 0]], axis=1),
-            np.stack([c[:, 1], -c[:, 0], zero], axis=1),
-        ],
-        axis=1,
+    The area is quadratic in the nodes, the volume cubic: sums of determinants over the simplices.
+    """
+    dim, n_dof = kind.dim, kind.n_nodes * kind.dim
+    signs = np.linalg.det(np.eye(dim)[np.array(list(np.ndindex(*(dim,) * dim)))]).reshape((dim,) * dim)
+    axes = "abc"[:dim], "ijk"[:dim]
+    rule = (
+        ",".join(f"{node}" for node in axes[0]) + f",{axes[1]}->" + "".join(a + i for a, i in zip(*axes, strict=True))
     )
+    form = np.zeros((n_dof,) * dim)
+    for simplex in kind.simplices:
+        edges = np.zeros((dim, kind.n_nodes))  # each edge from the simplex' first node, as a sum of nodes
+        edges[np.arange(dim), simplex[1:]], edges[:, simplex[0]] = 1, -1
+        form += np.einsum(rule, *edges, signs).reshape(form.shape)
+    symmetric = sum(np.transpose(form, order) for order in permutations(range(dim)))
+    return np.asarray(symmetric * kind.simplex_weight / factorial(dim))
 
 
 @dataclass(frozen=True, eq=False)
