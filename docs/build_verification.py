@@ -116,28 +116,161 @@ def elastica() -> Iterator[Row]:
             )
 
 
-def cook_mesh(n: int) -> ts.Mesh:
-    """Cook's membrane of n by n quadrilaterals."""
-    unit = ts.rectangle((1.0, 1.0), (n, n))
+def body(mesh: ts.Mesh, poisson: float, section: ts.PlaneStress | ts.PlaneStrain | None = None) -> ts.Problem:
+    """A body of E = 1 that is held on the left and pulled on the right."""
+    section = section or (ts.PlaneStress(1.0) if mesh.dim == 2 else None)
+    pull = (1.0, *(0.0,) * (mesh.dim - 1))
+    return ts.Problem(mesh, ts.Material(1.0, poisson), section, [ts.Fixed("left")], [ts.Force("right", pull)])
+
+
+def lattices() -> Iterator[Row]:
+    """Moduli of the unbounded lattices of triangles, cubes and tetrahedra."""
+    triangles = body(ts.rectangle((4.0, 2.0), (8, 4), "triangle"), 1 / 3)
+    cubes = body(ts.box((4.0, 2.0, 2.0), (4, 2, 2)), 1 / 4)
+    centred = body(ts.box((4.0, 4.0, 4.0), (4, 4, 4), "bcc-tetrahedron"), 1 / 4)
+    six = body(ts.box((4.0, 4.0, 4.0), (4, 4, 4), "tetrahedron"), 1 / 4)
+    fit = "least squares of the element's matrix by hand"
+    homogenised = "homogenised by an independent code"
+    for rule, along in {"van-gelder": (1, 1, 1 / 3), "lloyd": (3**0.5 / 2, 3**0.5, 2 * 3**0.5 / 10)}.items():
+        realised = ts.moduli(triangles, ts.Springs(rule))
+        for angle, wanted in zip((0, 45, -45), along, strict=True):
+            yield Row(f"right triangles, {rule}: E at {angle} degrees", realised.young(angle), wanted, homogenised)
+    for rule, along in {
+        "least-squares": (0.726, 0.813, 0.847),
+        "projected": (0.833, 1.022, 1.106),
+        "isotropic": (1.0, 1.0, 1.0),
+    }.items():
+        realised = ts.moduli(cubes, ts.Springs(rule))
+        for direction, wanted in zip(((1, 0, 0), (1, 1, 0), (1, 1, 1)), along, strict=True):
+            where = " + ".join(axis for axis, part in zip("xyz", direction, strict=True) if part)
+            source = "Golec et al. 2020" if rule == "isotropic" else homogenised
+            yield Row(f"cubes, {rule}: E along {where}", realised.young(direction), wanted, source)
+    stiffness = ts.Springs("least-squares").element_stiffness(cubes)[0]
+    for what, place, wanted in (
+        ("edge", 0, 29 / 350),
+        ("face diagonal", 12, 188 / 1575),
+        ("body diagonal", 24, 41 / 525),
+    ):
+        yield Row(f"cubes, least-squares: {what}, in E h", float(stiffness[place]), wanted, fit)
+    for name, problem, rule, wanted_range in (
+        ("body-centred-cubic tetrahedra", centred, "lloyd", (1.00794, 1.00794)),
+        ("body-centred-cubic tetrahedra", centred, "van-gelder", (0.857, 1.091)),
+        ("six tetrahedra a cube", six, "lloyd", (0.390, 2.857)),
+    ):
+        found = ts.moduli(problem, ts.Springs(rule)).young_range
+        for extreme, value, wanted in zip(("smallest", "largest"), found, wanted_range, strict=True):
+            yield Row(f"{name}, {rule}: {extreme} E of all directions", value, wanted, homogenised)
+    for k_body, factors in {0.0: (1.80, 1.22, 1.10), 0.15: (2.25, 1.31, 1.14), 0.3: (2.40, 1.37, 1.17)}.items():
+        bending = ts.moduli(cubes, ts.Springs("isotropic", k_body=k_body)).bending
+        for depth, wanted in zip((1, 2, 3), factors, strict=True):
+            what = f"cubes, isotropic, k_body = {k_body:g}: bending factor, {depth} by {depth}"
+            yield Row(what, bending[depth], wanted, "pure bending, an independent code")
+
+
+def volume_terms() -> Iterator[Row]:
+    """Young's modulus and Poisson's ratio of blocks of springs with a volume term, by solving a tensile test."""
+    for mesh in (ts.rectangle((2.0, 1.0), (4, 2)), ts.box((2.0, 1.0, 1.0), (4, 2, 2))):
+        where = "squares, plane stress" if mesh.dim == 2 else "cubes"
+        for poisson in (0.0, 0.1, 0.25, 0.4, 0.49):
+            axes, small = "xyz"[: mesh.dim], 1e-6
+            sides = ("left", "bottom", "back")[: mesh.dim]
+            supports = [ts.Fixed(side, [axis]) for side, axis in zip(sides, axes, strict=True)]
+            loads = [ts.Force("right", (small, *(0.0,) * (mesh.dim - 1)))]
+            section = ts.PlaneStress(1.0) if mesh.dim == 2 else None
+            problem = ts.Problem(mesh, ts.Material(1.0, poisson), section, supports, loads)
+            path = ts.solve(problem, ts.Springs("isotropic", volume=True), ts.Newton(load_steps=1))
+            strain = path.states[-1].displacement.max(axis=0)[0] / 2
+            across = -path.states[-1].displacement[:, 1].min()
+            yield Row(f"{where}, volume term: E, poisson = {poisson:g}", small / strain, 1.0, "the material")
+            yield Row(f"{where}, volume term: Poisson's ratio", float(across / strain), poisson, "the material")
+
+
+def biquadratic_springs() -> Iterator[Row]:
+    """Biquadratic springs against St. Venant-Kirchhoff finite elements, far from rest."""
+    generator = np.random.default_rng(3)
+    for mesh in (
+        ts.rectangle((2.0, 1.0), (2, 1), "triangle"),
+        ts.rectangle((2.0, 1.0), (2, 1)),
+        ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron"),
+        ts.box((2.0, 1.0, 1.0), (2, 1, 1)),
+    ):
+        moved = mesh.nodes + generator.uniform(-0.1, 0.1, mesh.nodes.shape)
+        problem = ts.Problem(
+            ts.Mesh(moved, mesh.elements, mesh.element),
+            ts.Material(1.0, 0.3),
+            ts.PlaneStress(1.0) if mesh.dim == 2 else None,
+            [ts.Fixed(range(mesh.dim + 1))],
+            [ts.Force([mesh.n_nodes - 1], (1.0,) * mesh.dim)],
+        )
+        springs = ts.Springs("biquadratic").potential(problem)
+        elements = ts.Fem("saint-venant-kirchhoff", "linear").potential(problem)
+        positions = moved @ generator.normal(size=(mesh.dim, mesh.dim)) + generator.uniform(-0.2, 0.2, moved.shape)
+        for what, mine, theirs in (
+            ("energy", springs.energy(positions), elements.energy(positions)),
+            ("force", springs.gradient(positions), elements.gradient(positions)),
+            ("tangent", springs.hessian(positions).toarray(), elements.hessian(positions).toarray()),
+        ):
+            apart = np.abs(np.asarray(mine) - theirs).max() / np.abs(theirs).max()
+            yield Row(
+                f"biquadratic springs, {mesh.element}: {what} against FEM", float(apart), 0.0, "the same function"
+            )
+
+
+def cook_mesh(n: int, element: str = "quadrilateral", diagonal: str = "right") -> ts.Mesh:
+    """Cook's membrane of n by n quadrilaterals, or twice as many triangles."""
+    unit = ts.rectangle((1.0, 1.0), (n, n), element, diagonal)
     s, t = unit.nodes.T
-    return ts.Mesh(np.stack([48 * s, 44 * s + t * (44 - 28 * s)], axis=1), unit.elements)
+    return ts.Mesh(np.stack([48 * s, 44 * s + t * (44 - 28 * s)], axis=1), unit.elements, element)
+
+
+def cook_tip(mesh: ts.Mesh, model: ts.Springs | ts.Fem) -> float:
+    """Deflection at (48, 52) of Cook's membrane under a unit load, plane stress, E = 1, nu = 1/3; linearised."""
+    small = 1.0 if isinstance(model, ts.Fem) else 1e-6
+    loads = [ts.Force("right", (0.0, small))]
+    problem = ts.Problem(mesh, ts.Material(1.0, 1 / 3), ts.PlaneStress(1.0), [ts.Fixed("left")], loads)
+    state = ts.solve(problem, model, ts.Newton(load_steps=1)).states[-1]
+    return float(state.displacement[ts.nearest_node(mesh, (48.0, 52.0)), 1]) / small
 
 
 def cook() -> Iterator[Row]:
-    """Cook's membrane, linear, plane stress, E = 1, nu = 1/3."""
+    """Cook's membrane, linear, by finite elements."""
+    source = "an independent four-node code; converged 23.97, FinEtools tutorial"
     for n, wanted in ((8, 22.0792), (16, 23.4304), (32, 23.8176), (64, 23.9245), (128, 23.9548)):
-        mesh = cook_mesh(n)
-        problem = ts.Problem(
-            mesh,
-            ts.Material(1.0, 1 / 3),
-            ts.PlaneStress(1.0),
-            [ts.Fixed("left")],
-            [ts.Force("right", (0.0, 1.0))],
-        )
-        state = ts.solve(problem, ts.Fem("linear"), ts.Newton(load_steps=1)).states[-1]
-        found = float(state.displacement[ts.nearest_node(mesh, (48.0, 52.0)), 1])
-        source = "an independent four-node code; converged 23.97, FinEtools tutorial"
+        found = cook_tip(cook_mesh(n), ts.Fem("linear"))
         yield Row(f"Cook's membrane, linear FEM, n = {n}: tip", found, wanted, source)
+    found = cook_tip(cook_mesh(32, "triangle"), ts.Fem("linear", "quadratic"))
+    yield Row("Cook's membrane, quadratic triangles, n = 32: tip", found, 23.97, "FinEtools tutorial")
+
+
+def cook_springs() -> Iterator[Row]:
+    """Cook's membrane by springs on triangles: wrong answers, which the moduli predict."""
+    for diagonal, tips in {"right": (45.338, 18.088), "left": (33.341, 15.938)}.items():
+        for rule, wanted in zip(("van-gelder", "lloyd"), tips, strict=True):
+            found = cook_tip(cook_mesh(64, "triangle", diagonal), ts.Springs(rule))
+            what = f"Cook's membrane, {rule} springs on triangles, n = 64, diagonal {diagonal}: tip"
+            yield Row(what, found, wanted, "an independent code; the right answer is 23.97")
+
+
+def locking() -> Iterator[Row]:
+    """A cantilever of 20 by 5 by 5 hexahedra under a small end load, over the deflection by quadratic elements."""
+    mesh, size = ts.box((4.0, 1.0, 1.0), (20, 5, 5)), "20 x 5 x 5"
+    fine = ts.box((4.0, 1.0, 1.0), (20, 5, 5), "tetrahedron")
+    for poisson, printed in ((0.45, 0.937), (0.49, 0.819)):
+
+        def tip(where: ts.Mesh, model: ts.Fem | ts.Springs, poisson: float = poisson) -> float:
+            loads = [ts.Force("right", (0.0, -1e-7, 0.0))]
+            problem = ts.Problem(where, ts.Material(1.0, poisson), None, [ts.Fixed("left")], loads)
+            state = ts.solve(problem, model, ts.Newton(load_steps=1)).states[-1]
+            return float(state.displacement[ts.named_point(where, "right-middle"), 1])
+
+        true = tip(fine, ts.Fem("linear", "quadratic"))
+        for label, model, wanted, source in (
+            ("linear hexahedra", ts.Fem("linear", "linear"), printed, "an independent code"),
+            ("hexahedra of mean dilatation", ts.Fem("linear", "mean-dilatation"), 1.0, "quadratic tetrahedra"),
+            ("springs with a volume term", ts.Springs("isotropic", volume=True), 1.0, "quadratic tetrahedra"),
+        ):
+            what = f"{size} {label}, poisson = {poisson:g}: deflection over the true one"
+            yield Row(what, tip(mesh, model) / true, wanted, source)
 
 
 def shipped_studies() -> str:
@@ -184,8 +317,10 @@ def page() -> str:
     versions = ", ".join(f"{name} {version(name)}" for name in ("truespring", "numpy", "scipy", "scikit-fem"))
     parts = [HEAD.format(versions=f"Python {platform.python_version()}, {versions}")]
     for title, rows in (
-        ("Springs", (two_springs, uniform_tension, moduli, elastica)),
-        ("Finite elements", (cook,)),
+        ("Springs", (two_springs, uniform_tension, moduli, lattices, elastica)),
+        ("Any Poisson's ratio", (volume_terms, biquadratic_springs)),
+        ("Where springs are wrong, and the moduli say so", (cook_springs,)),
+        ("Finite elements", (cook, locking)),
     ):
         table = ["| what | truespring | reference | apart | source |", "|---|---|---|---|---|"]
         table += [str(row) for make in rows for row in make()]

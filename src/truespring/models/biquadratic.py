@@ -28,7 +28,7 @@ class BiquadraticSprings:
 
     @cached_property
     def coupling(self) -> Floats:
-        """M [J/m^4], shape (n_elements, links, links)."""
+        """M [J/m^4], shape (n_elements, links, links), or one for all elements."""
         return link_coupling(self.problem)
 
     @cached_property
@@ -41,16 +41,22 @@ class BiquadraticSprings:
 
     @cached_property
     def _at_rest(self) -> Floats:
-        return np.asarray((self._vectors(self.nodes) ** 2).sum(axis=2))
+        return _squared(self._vectors(self.nodes))
 
     def _vectors(self, positions: Floats) -> Floats:
         """Vector of each link [m], shape (n_elements, links, dim)."""
-        at = positions[self.problem.mesh.elements]
-        return np.asarray(at[:, self._links[:, 1]] - at[:, self._links[:, 0]])
+        first, second = self._ends
+        return np.asarray(np.take(positions, second, axis=0) - np.take(positions, first, axis=0))
+
+    @cached_property
+    def _ends(self) -> tuple[Ints, Ints]:
+        """The first and the second node of each link, shape (n_elements, links) each."""
+        elements = self.problem.mesh.elements
+        return elements[:, self._links[:, 0]], elements[:, self._links[:, 1]]
 
     def _change(self, vectors: Floats) -> Floats:
         """The change q of squared lengths [m^2], shape (n_elements, links)."""
-        return np.asarray((vectors**2).sum(axis=2) - self._at_rest)
+        return _squared(vectors) - self._at_rest
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""
@@ -58,17 +64,24 @@ class BiquadraticSprings:
 
     def _element_energies(self, positions: Floats) -> Floats:
         q = self._change(self._vectors(positions))
-        return np.asarray(np.einsum("ek,ekl,el->e", q, self.coupling, q, optimize=True))
+        return np.asarray((self._coupled(q) * q).sum(axis=1))
+
+    def _coupled(self, q: Floats) -> Floats:
+        """M q of each element, shape (n_elements, links)."""
+        if len(self.coupling) == 1:
+            return np.asarray(q @ self.coupling[0])
+        return np.asarray((self.coupling @ q[:, :, None])[:, :, 0])
 
     def stress(self, positions: Floats) -> Floats:
         """The derivative p = 2 M q of the energy by each squared length [N/m], shape (n_elements, links)."""
         q = self._change(self._vectors(positions))
-        return np.asarray(2 * np.einsum("ekl,el->ek", self.coupling, q))
+        return 2 * self._coupled(q)
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        pull = 2 * self.stress(positions)[:, :, None] * self._vectors(positions)
-        return self._pattern.vector(np.einsum("la,eli->eai", self._incidence, pull)).reshape(positions.shape)
+        vectors = self._vectors(positions)
+        pull = 4 * self._coupled(self._change(vectors))[:, :, None] * vectors
+        return self._pattern.vector(self._incidence.T @ pull).reshape(positions.shape)
 
     @cached_property
     def _incidence(self) -> Floats:
@@ -97,8 +110,7 @@ class BiquadraticSprings:
 
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length of each element's links, shape (n_elements * links,)."""
-        squared = (self._vectors(positions) ** 2).sum(axis=2)
-        return np.asarray(np.sqrt(squared / self._at_rest).ravel())
+        return np.asarray(np.sqrt(_squared(self._vectors(positions)) / self._at_rest).ravel())
 
     @cached_property
     def springs(self) -> Ints:
@@ -114,3 +126,8 @@ class BiquadraticSprings:
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Strain energy [J] of each element."""
         return {"strain_energy": self._element_energies(positions)}
+
+
+def _squared(vectors: Floats) -> Floats:
+    """Squared lengths [m^2], shape (n_elements, links)."""
+    return np.asarray(np.einsum("eli,eli->el", vectors, vectors))
