@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test verification clean
+.PHONY: demo test verification viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -19,6 +19,10 @@ verification: .venv/test
 	$(BIN)/python -m pytest -q -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
+
+# The scene of the report that turns, bundled with three.js; needs node. The result is kept in the repository.
+viewer:
+	cd viewer && npm ci --ignore-scripts && npm run build
 
 .venv/created:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "truespring needs Python 3.11 or newer; try: make PYTHON=python3.12 ...")'

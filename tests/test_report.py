@@ -61,6 +61,7 @@ def path(
             ts.State(
                 load_factor=level,
                 positions=nodes + displacement,
+                all_positions=nodes + displacement,
                 displacement=displacement,
                 reaction=np.zeros_like(nodes),
                 energy=0.0,

@@ -10,11 +10,11 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path
 from truespring.mesh import Mesh
-from truespring.mesh.selections import select
-from truespring.models import SpringNetwork
-from truespring.report.quantity import Scale, given, natural_scale, percent, quantity, round_factor, times
+from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.quantity import Scale, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, POINT, RED, full_name, text_width
+from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name, text_width
+from truespring.report.symbols import ROLLER, draw_arrow, draw_dot, draw_loaded, draw_pin, find_arrows
 from truespring.report.verdict import display_name, level_name
 
 if TYPE_CHECKING:
@@ -22,11 +22,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+def spring_lines(path: Path) -> Ints | None:
+    """Return the pairs of nodes that the springs of a path join, shape (n, 2); None where it has none."""
+    springs: Ints | None = getattr(path.potential, "springs", None)
+    return springs
+
+
 def path_lines(path: Path) -> Ints:
     """Return the pairs of nodes that a path is drawn by: its springs, else the edges of its elements, shape (n, 2)."""
-    if isinstance(path.potential, SpringNetwork):
-        return path.potential.springs
-    return path.problem.mesh.edges
+    springs = spring_lines(path)
+    return path.problem.mesh.edges if springs is None else springs
 
 
 def magnification(result: Result) -> float:
@@ -61,28 +66,18 @@ def picture_box(points: Floats, others: Sequence[Floats]) -> tuple[Floats, Float
 _WIDEST = 3.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """A line of a legend: what it stands for, its colour and its mark."""
-
-    text: str
-    color: str
-    marker: str = ""
-    linestyle: Any = "-"
-
-
 def _body_figure(
-    title: str, lower: Floats, upper: Floats, legend: Sequence[_Entry], remark: str = ""
+    title: str, lower: Floats, upper: Floats, legend: Sequence[Entry], remark: str = ""
 ) -> "tuple[Figure, Axes, Scale]":
     """A figure whose one pair of axes shows the box from `lower` to `upper` [m] at equal scales, words on top."""
     from matplotlib.figure import Figure
 
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
-    columns, words = _legend_columns(legend, 4.7)
+    columns, words = legend_columns(legend, 4.7)
     rows = len(columns[0])
     words = max(words, text_width(title, 9, bold=True), text_width(remark, 8))
-    left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + 0.18 * rows + 0.18 * bool(remark)
+    left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + ROW * rows + ROW * bool(remark)
     width = min(5.4 - left - right, 4.4 * extent[0] / extent[1])
     height = width * extent[1] / extent[0]
     # A narrow body leaves room for the legend: the box grows sideways, the scales stay equal.
@@ -101,52 +96,8 @@ def _body_figure(
     figure.text(left / total[0], 1 - 0.17 / total[1], title, weight="bold", size=9, va="center")
     if remark:
         figure.text(left / total[0], 1 - 0.37 / total[1], remark, color=LOAD, size=8, va="center")
-    _legend(figure, columns, left, float(total[1]) - top + 0.14 + 0.18 * rows)
+    draw_legend(figure, columns, left, float(total[1]) - top + 0.14 + ROW * rows)
     return figure, axes, scale
-
-
-# Widths in a legend [inch]: the sample of a line, the gap to its text, the gap to the next column.
-_SAMPLE, _GAP, _COLUMNS_APART = 0.18, 0.06, 0.13
-
-
-def _legend_columns(entries: Sequence[_Entry], room: float) -> tuple[list[Sequence[_Entry]], float]:
-    """Return a legend in columns, of the fewest rows that `room` [inch] allows, and how wide it is [inch]."""
-    columns: list[Sequence[_Entry]] = []
-    width = 0.0
-    for rows in range(1, len(entries) + 1):
-        columns = [entries[start : start + rows] for start in range(0, len(entries), rows)]
-        width = sum(_column_width(column) for column in columns) - _COLUMNS_APART
-        if width <= room:
-            break
-    return columns, width
-
-
-def _column_width(column: Sequence[_Entry]) -> float:
-    return _SAMPLE + _GAP + max(text_width(one.text, 8) for one in column) + _COLUMNS_APART
-
-
-def _legend(figure: "Figure", columns: Sequence[Sequence[_Entry]], left: float, top: float) -> None:
-    """Draw a legend whose upper left corner is at (left, top) [inch]: many times faster than matplotlib's."""
-    from matplotlib.lines import Line2D
-
-    for column in columns:
-        for row, one in enumerate(column):
-            y = top - 0.18 * (row + 0.5)
-            sample = Line2D(
-                [left, left + _SAMPLE / 2, left + _SAMPLE],
-                [y, y, y],
-                color=one.color,
-                ls=one.linestyle,
-                lw=1.4,
-                marker=one.marker,
-                ms=5,
-                markevery=[1],
-                transform=figure.dpi_scale_trans,
-            )
-            figure.add_artist(sample)
-            at = left + _SAMPLE + _GAP
-            figure.text(at, y, one.text, size=8, va="center_baseline", transform=figure.dpi_scale_trans)
-        left += _column_width(column)
 
 
 def _lines(axes: "Axes", points: Floats, lines: Ints, color: str, width: float, name: str, **more: Any) -> None:
@@ -159,10 +110,6 @@ def _lines(axes: "Axes", points: Floats, lines: Ints, color: str, width: float, 
     outline = Outline(points[lines].reshape(-1, 2), codes)
     # Not add_patch, which measures every segment to find limits that are already set.
     axes.add_artist(PathPatch(outline, fill=False, edgecolor=color, lw=width, gid=name, **more))
-
-
-def _dot(axes: "Axes", point: Floats) -> None:
-    axes.plot(*point, "o", color=RED, ms=5.5, mec="white", mew=0.6, zorder=10, gid="probe", clip_on=False)
 
 
 def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | None":
@@ -192,12 +139,12 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | 
     remarks = [f"displacements {times(factor)}"] if factor != 1 else []
     remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
     legend = [
-        _Entry(full_name(result, result.model or ""), BLUE),
-        _Entry(full_name(result, name), INK),
-        _Entry("at rest", FAINT, linestyle=(0, (3, 2))),
-        _Entry("probe", RED, "o", ""),
+        Entry(full_name(result, result.model or ""), BLUE),
+        Entry(full_name(result, name), INK),
+        Entry("at rest", FAINT, linestyle=(0, (3, 2))),
+        Entry("probe", RED, "o", ""),
     ]
-    title = _over_title(result, level, comparison)
+    title = over_title(result, level, comparison)
     figure, axes, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
     outline = mesh.boundary if mesh.element != "line" else path_lines(model)
     _lines(axes, rest / scale.size, outline, FAINT, 0.8, "rest", linestyle=(0, (3, 2)), zorder=1)
@@ -205,11 +152,12 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | 
         _lines(axes, points / scale.size, inside, "#8b9299", 0.4, "triangles", zorder=2)
     _lines(axes, points / scale.size, lines, INK, 1.3, "reference", zorder=3)
     _lines(axes, positions / scale.size, path_lines(model), BLUE, 0.75, "model", zorder=4)
-    _dot(axes, positions[comparison.probe] / scale.size)
+    draw_dot(axes, positions[comparison.probe] / scale.size)
     return figure
 
 
-def _over_title(result: Result, level: float, comparison: Comparison) -> str:
+def over_title(result: Result, level: float, comparison: Comparison) -> str:
+    """Return the level at which the two paths of a comparison are drawn, and how far they are apart."""
     at = level_name(result, level).capitalize()
     if comparison.load_factors.size:
         return f"{at}: {percent(float(comparison.rms_errors[-1]))} apart (root mean square)"
@@ -223,13 +171,13 @@ def undeformed_figure(result: Result) -> "Figure":
     mesh = result.problem.mesh
     model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
     size = float((mesh.upper - mesh.lower).max())
-    arrows = _arrows(result, size)
+    arrows = find_arrows(result, size)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    springs = isinstance(model.potential, SpringNetwork)
-    legend = [_Entry("elements", INK)] if mesh.element != "line" else []
-    legend += [_Entry("springs", BLUE)] if springs else []
-    legend += [_Entry("probe", RED, "o", "")]
+    springs = spring_lines(model) is not None
+    legend = [Entry("elements", INK)] if mesh.element != "line" else []
+    legend += [Entry("springs", BLUE)] if springs else []
+    legend += [Entry("probe", RED, "o", "")]
     title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
     title += f", {len(path_lines(model))} springs" if springs else ""
     figure, axes, scale = _body_figure(title, lower, upper, legend)
@@ -239,76 +187,10 @@ def undeformed_figure(result: Result) -> "Figure":
         _lines(axes, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, "springs", zorder=3)
     _supports(axes, result, scale, 0.028 * size)
     for arrow in arrows:
-        _arrow(axes, arrow, scale)
-    _dot(axes, mesh.nodes[result.probe] / scale.size)
+        draw_loaded(axes, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
+        draw_arrow(axes, arrow, scale)
+    draw_dot(axes, mesh.nodes[result.probe] / scale.size)
     return figure
-
-
-@dataclass(frozen=True, slots=True)
-class _Arrow:
-    """A load or a prescribed motion: from tail to head [m], the nodes it acts on, what is written beside it.
-
-    `side` is 1 where the text stands to the right, -1 where to the left; it ends before `room`.
-    """
-
-    ends: tuple[Floats, Floats]
-    side: int
-    room: Floats
-    nodes: Floats
-    text: str
-    color: str
-
-
-def _arrows(result: Result, size: float) -> list[_Arrow]:
-    mesh = result.problem.mesh
-    acting = [(load.on, np.array(load.total, dtype=float), "N", LOAD) for load in result.problem.loads]
-    acting += [
-        (support.on, np.array(support.displacement, dtype=float), "m", MOTION)
-        for support in result.problem.supports
-        if support.displacement is not None
-    ]
-    found = []
-    for on, vector, unit, color in acting:
-        if not vector.any():
-            continue
-        nodes = mesh.nodes[select(mesh, on)]
-        direction = vector / np.linalg.norm(vector)
-        centre = nodes.mean(axis=0)
-        outward = centre - (mesh.lower + mesh.upper) / 2
-        along = float(direction @ outward)
-        length = 0.13 * size * direction
-        gap = 0.025 * size
-        if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # it pulls or presses: off the body's face
-            tail = centre + gap * direction if along > 0 else centre - gap * direction - length
-        else:  # it shears: beside the face
-            beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
-            tail = centre + 2 * gap * beside - length / 2
-        symbol = "F" if unit == "N" else "u"
-        text = f"{symbol} = {given(float(np.linalg.norm(vector)), unit)}"
-        side = 1 if centre[0] + 1e-9 * size >= (mesh.lower + mesh.upper)[0] / 2 else -1
-        near = tail if (side > 0) == (length[0] >= 0) else tail + length
-        room = near + np.array([side * 0.24 * size, 0.0])
-        found.append(_Arrow((tail, tail + length), side, room, nodes, text, color))
-    return found
-
-
-def _arrow(axes: "Axes", arrow: _Arrow, scale: Scale) -> None:
-    (x, y), (to_x, to_y) = (end / scale.size for end in arrow.ends)
-    axes.plot(*(arrow.nodes / scale.size).T, "o", color=arrow.color, ms=3, zorder=8, ls="", gid="loaded")
-    style = {"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": arrow.color, "lw": 1.8}
-    axes.annotate("", (to_x, to_y), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
-    upright = abs(to_y - y) > abs(to_x - x)
-    axes.annotate(
-        arrow.text,
-        (min(x, to_x) if arrow.side > 0 else max(x, to_x), (y + to_y) / 2),
-        xytext=(7 * arrow.side, 0 if upright else 7),
-        textcoords="offset points",
-        ha="left" if arrow.side > 0 else "right",
-        va="center" if upright else "bottom",
-        color=arrow.color,
-        zorder=11,
-        bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.8},
-    )
 
 
 def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
@@ -324,22 +206,17 @@ def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
     single = still & ~hatched[:, None]
     for run in _rolling_runs(mesh, still):
         single[run.nodes, run.axis] = False
-        for node in run.thinned(mesh.nodes, 1.5 * _ROLLER * _inch(axes) * scale.size):
+        for node in run.thinned(mesh.nodes, 1.5 * ROLLER * _inch(axes) * scale.size):
             if not hatched[node]:
-                _pin(axes, mesh.nodes[node] / scale.size, run.away, run.beside)
+                draw_pin(axes, mesh.nodes[node] / scale.size, run.away, run.beside)
     centre = (mesh.lower + mesh.upper) / 2
     for node in np.flatnonzero(single.any(axis=1)):
         at = mesh.nodes[node]
         if single[node].all():
-            _pin(axes, at / scale.size, np.array([0.0, -1.0]), roller=False)
+            draw_pin(axes, at / scale.size, np.array([0.0, -1.0]), roller=False)
             continue
         for axis in np.flatnonzero(single[node]):
-            _pin(axes, at / scale.size, np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0))
-
-
-# A unit of a symbol is half of 11 points; the line under a roller is its widest part [inch].
-_SYMBOL = 11.0
-_ROLLER = 1.4 * _SYMBOL / 2 * POINT
+            draw_pin(axes, at / scale.size, np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0))
 
 
 def _inch(axes: "Axes") -> float:
@@ -411,24 +288,3 @@ def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
     _lines(axes, strokes.reshape(-1, 2), pairs, "#3d4248", 0.9, "support", zorder=1, clip_on=False)
     sides = np.arange(2 * len(edges)).reshape(-1, 2)
     _lines(axes, edges.reshape(-1, 2), sides, "#3d4248", 2.2, "clamped", zorder=5)
-
-
-def _pin(axes: "Axes", point: Floats, away: Floats, beside: Floats | None = None, roller: bool = True) -> None:
-    """A triangle whose tip touches the node; under a roller a line, set off. Sized in points, as text is.
-
-    With `beside` it stands off the node on an arm, so that it does not cover the edge that it runs along.
-    """
-    from matplotlib.path import Path as Outline
-
-    across = np.array([-away[1], away[0]])
-    corners = [np.zeros(2), away + 0.55 * across, away - 0.55 * across, np.zeros(2)]
-    codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
-    if roller:
-        corners += [1.35 * away + 0.7 * across, 1.35 * away - 0.7 * across]
-        codes += [Outline.MOVETO, Outline.LINETO]
-    if beside is not None and beside.any():
-        corners = [np.zeros(2)] + [corner + beside for corner in corners]
-        codes = [Outline.MOVETO, Outline.LINETO, *codes[1:]]
-    symbol = Outline(np.array(corners), codes)
-    size = _SYMBOL * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
-    axes.plot(*point, marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=6, ls="", gid="support")

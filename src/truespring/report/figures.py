@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from truespring.report.bodies import over_figure, undeformed_figure
+from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
+from truespring.report.frame3d import figure_of, shot
 from truespring.report.plots import curves_figure, error_figure, moduli_figure
+from truespring.report.render import render
 from truespring.report.result import Result
 from truespring.report.style import figure_style
 
@@ -26,25 +29,29 @@ _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure as the bytes of its two files, its title for those who cannot see it, and its width [inch]."""
+    """A figure as the bytes of its two files, its title for those who cannot see it, and its width [inch].
+
+    `note` tells what a reader should know of how it was drawn, and is mostly empty.
+    """
 
     png: bytes
     svg: bytes
     title: str
     width: float
+    note: str = ""
 
 
 def draw_figures(result: Result) -> "dict[str, Figure]":
     """Return the figures of a study by the stem of their file names."""
     with figure_style():
-        return _draw(result)
+        return {name: figure for name, (figure, _) in _draw(result).items()}
 
 
 def render_figures(result: Result) -> dict[str, Drawing]:
     """Return the figures of a study as PNG and SVG, by the stem of their file names."""
     if result not in _DRAWN:
         with figure_style():
-            _DRAWN[result] = {name: _render(figure) for name, figure in _draw(result).items()}
+            _DRAWN[result] = {name: _written(figure, note) for name, (figure, note) in _draw(result).items()}
     return _DRAWN[result]
 
 
@@ -60,17 +67,27 @@ def save_figures(result: Result, folder: FilePath) -> dict[str, Drawing]:
 
 def over_name(result: Result, reference: str) -> str:
     """Return the stem of the figure of the model over a reference: path-safe, whatever the models are called."""
-    return re.sub(r"[^\w.-]+", "-", f"{result.model}_over_{reference}")
+    return _safe(f"{result.model}_over_{reference}")
 
 
-def _render(figure: "Figure") -> Drawing:
+def distance_name(result: Result, reference: str) -> str:
+    """Return the stem of the figure of the model coloured by its distance from a reference."""
+    return _safe(f"{result.model}_error_{reference}")
+
+
+def _safe(name: str) -> str:
+    return re.sub(r"[^\w.-]+", "-", name)
+
+
+def _written(figure: "Figure", note: str) -> Drawing:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
     png, svg = io.BytesIO(), io.BytesIO()
     figure.savefig(png, format="png", dpi=_DPI, pil_kwargs={"compress_level": 4})
     figure.savefig(svg, format="svg", metadata={"Date": None})
-    return Drawing(png.getvalue(), _shorter(svg.getvalue()), str(figure.get_label()), float(figure.get_figwidth()))
+    width = float(figure.get_figwidth())
+    return Drawing(png.getvalue(), _shorter(svg.getvalue()), str(figure.get_label()), width, note)
 
 
 def _shorter(svg: bytes) -> bytes:
@@ -80,16 +97,35 @@ def _shorter(svg: bytes) -> bytes:
     return re.sub(r"\n\s*", "\n", text).encode()
 
 
-def _draw(result: Result) -> "dict[str, Figure]":
-    figures = {"undeformed": undeformed_figure(result)}
+def _draw(result: Result) -> "dict[str, tuple[Figure, str]]":
+    """Every figure by its name, with a note."""
+    figures = _bodies_in_space(result) if result.problem.mesh.dim == 3 else _plane_bodies(result)
+    if any(len(path.states) > 1 for path in result.paths.values()):
+        figures["curves"] = curves_figure(result), ""
+    if any(one.load_factors.size for one in result.comparisons.values()):
+        figures["error"] = error_figure(result), ""
+    if any(path.moduli is not None for path in result.paths.values()):
+        figures["moduli"] = moduli_figure(result), ""
+    return figures
+
+
+def _plane_bodies(result: Result) -> "dict[str, tuple[Figure, str]]":
+    figures = {"undeformed": (undeformed_figure(result), "")}
     for name, comparison in result.comparisons.items():
         drawn = over_figure(result, name, comparison)
         if drawn is not None:
-            figures[over_name(result, name)] = drawn
-    if any(len(path.states) > 1 for path in result.paths.values()):
-        figures["curves"] = curves_figure(result)
-    if any(one.load_factors.size for one in result.comparisons.values()):
-        figures["error"] = error_figure(result)
-    if any(path.moduli is not None for path in result.paths.values()):
-        figures["moduli"] = moduli_figure(result)
+            figures[over_name(result, name)] = drawn, ""
     return figures
+
+
+def _bodies_in_space(result: Result) -> "dict[str, tuple[Figure, str]]":
+    pictures = {"undeformed": undeformed_picture(result)}
+    for name, comparison in result.comparisons.items():
+        for called, draw in ((over_name, over_picture), (distance_name, distance_picture)):
+            picture = draw(result, name, comparison)
+            if picture is not None:
+                pictures[called(result, name)] = picture
+    images, note = render([shot(picture) for picture in pictures.values()])
+    return {
+        name: (figure_of(picture, image), note) for (name, picture), image in zip(pictures.items(), images, strict=True)
+    }

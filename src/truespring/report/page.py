@@ -3,7 +3,7 @@
 import base64
 import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path as FilePath
@@ -12,23 +12,21 @@ from urllib.parse import quote
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
 from truespring.equilibrium import Path, Status
-from truespring.material import PlaneStrain, PlaneStress
+from truespring.material import Material, PlaneStrain, PlaneStress
+from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
-from truespring.problem import Problem
-from truespring.report.bodies import magnification, path_lines, picture_box
-from truespring.report.figures import Drawing, over_name, render_figures
-from truespring.report.quantity import given, natural_scale, percent, quantity, significant, times, tolerance_percent
+from truespring.problem import Problem, Region
+from truespring.report.figures import Drawing, distance_name, over_name, render_figures
+from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
-from truespring.report.style import full_name
 from truespring.report.verdict import (
     closest_sentence,
     deep,
     display_name,
-    drive,
     force_sentence,
     level_name,
+    linear_fem,
     material_name,
     mesh_sentence,
     moduli_sentence,
@@ -36,6 +34,7 @@ from truespring.report.verdict import (
     reach,
     verdict_sentences,
 )
+from truespring.report.viewer import viewer
 
 #: Numbers that the viewers of one page may hold together: about a megabyte.
 _BUDGET = 400_000
@@ -57,12 +56,15 @@ def render_page(results: Sequence[Result], command: str) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["close"] = _close
     template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
+    studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
+    turning = any(study["viewer"] and study["in_space"] for study in studies)
+    scripts = [*(["scene.min.js"] if turning else []), "viewer.js"]
     return template.render(
         title=results[0].title if len(results) == 1 else f"{len(results)} studies",
-        studies=[_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)],
+        studies=studies,
         versions=_versions(),
         command=command,
-        script=(folder / "viewer.js").read_text(encoding="utf-8"),
+        scripts=[(folder / script).read_text(encoding="utf-8") for script in scripts],
     )
 
 
@@ -84,6 +86,8 @@ def _versions() -> list[tuple[str, str]]:
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     drawings = render_figures(result)
     nearest = result.closest if len(result.comparisons) == 1 else nearest_reference(result)
+    in_space = result.problem.mesh.dim == 3
+    moving = viewer(result, budget)
     return {
         "id": f"study-{place}",
         "title": result.title,
@@ -92,17 +96,22 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "converged": result.converged,
         "closest": display_name(result, nearest) if nearest else None,
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
+        "mesh_notes": result.problem.mesh.notes,
+        "drawing_notes": sorted({drawing.note for drawing in drawings.values()} - {""}),
+        "in_space": in_space,
+        "too_large": in_space and moving is None and any(len(path.states) > 1 for path in result.paths.values()),
         "facts": _facts(result),
         "short": _in_short(result),
         "note": result.note,
         "file": str(result.file),
         "pictures": {name: _picture(drawings[name]) for name in drawings},
         "over": [
-            {"name": name, "label": one.reference.label, "picture": _picture(drawings[over_name(result, name)])}
-            for name, one in result.comparisons.items()
-            if over_name(result, name) in drawings
+            _picture(drawings[drawn])
+            for name in result.comparisons
+            for drawn in (over_name(result, name), distance_name(result, name))
+            if drawn in drawings
         ],
-        "viewer": _viewer(result, budget),
+        "viewer": moving,
         "model": result.model,
         "full": level_name(result, 1.0),
         "tolerance": tolerance_percent(result.tolerance),
@@ -137,15 +146,29 @@ def _facts(result: Result) -> list[tuple[str, str]]:
         ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.element})"),
     ]
     if problem.material is not None:
-        young = given(problem.material.young, "Pa")
-        facts.append(("material", f"Young’s modulus {young}, Poisson’s ratio {problem.material.poisson:.4g}"))
-    if problem.section is not None:
+        facts.append(("material", _material_words(problem.material)))
+    facts += [_region_fact(problem, region) for region in problem.regions]
+    if isinstance(problem.section, PlaneStress | PlaneStrain):
         kind = "plane stress" if isinstance(problem.section, PlaneStress) else "plane strain"
         facts.append(("section", f"{kind}, {given(problem.section.thickness, 'm')} thick"))
     facts += _drive_facts(problem)
     at = ", ".join(given(float(value), "m") for value in mesh.nodes[result.probe])
     facts.append(("probe", f"node {result.probe} at ({at}), the red dot"))
     return facts
+
+
+def _material_words(material: Material) -> str:
+    return f"Young’s modulus {given(material.young, 'Pa')}, Poisson’s ratio {material.poisson:.4g}"
+
+
+def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
+    """A part of another material: the group's name, or where it lies."""
+    named = region.on if isinstance(region.on, str) else "elements by number"
+    if isinstance(region.on, Box):
+        corners = (", ".join(given(value, "m") for value in corner) for corner in (region.on.lower, region.on.upper))
+        named = " to ".join(f"({corner})" for corner in corners)
+    count = len(select_elements(problem.mesh, region.on))
+    return "region", f"{named}, {count} element{'s' * (count != 1)}: {_material_words(region.material)}"
 
 
 def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
@@ -169,6 +192,8 @@ def _in_short(result: Result) -> str:
     if problem.material is not None:
         parts.append(f"E = {given(problem.material.young, 'Pa')}, ν = {problem.material.poisson:.4g}")
     parts += [words[name] for name in ("section",) if name in words]
+    n_regions = len(problem.regions)
+    parts += [f"{n_regions} region{'s' * (n_regions != 1)} of another material"] if n_regions else []
     parts += [f"{name} {words[name]}" for name in ("total force", "prescribed motion") if name in words]
     return " · ".join([*parts, f"{len(problem.mesh.elements)} elements"])
 
@@ -216,7 +241,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "seconds": f"{path.seconds:.2f}" if solved else "–",
-        "unknowns": str(int((~path.problem.loading.held).sum())) if solved else "–",
+        "unknowns": str(path.n_unknowns) if solved else "–",
         "area": f"{min(areas):.3f}" if areas else "–",
         "stretch": stretch,
         "stability": _stability(path) if solved else "–",
@@ -234,142 +259,50 @@ def _stability(path: Path) -> str:
 
 
 def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
-    young, poisson = quantity(moduli.young_wanted, "Pa"), f"{moduli.poisson_wanted:.3f}"
     path = result.paths[name]
     return {
         "name": name,
         "label": path.label,
         "sentence": moduli_sentence(path),
-        "wanted": material_name(result),
-        "rows": [
-            ("Young’s modulus along x", quantity(moduli.young(), "Pa"), young),
-            ("Young’s modulus at 45°", quantity(moduli.young(45), "Pa"), young),
-            ("Poisson’s ratio along x", f"{moduli.poisson():.3f}", poisson),
-            ("Poisson’s ratio at 45°", f"{moduli.poisson(45):.3f}", poisson),
-            ("Zener ratio (1 is isotropic)", f"{moduli.zener:.3f}", "1"),
-        ],
+        "wanted": material_name(result) + (", outside its regions" if result.problem.regions else ""),
+        "rows": _moduli_rows(moduli),
+        "elements": linear_fem(path).removeprefix("linear "),
         "bending": [
-            (deep(depth), significant(factor, 4), significant(moduli.fem_bending[depth], 4), depth == moduli.depth)
+            (
+                deep(depth) if moduli.dim == 2 or depth == moduli.depth else f"{depth} by {depth} elements",
+                significant(factor, 4),
+                significant(moduli.fem_bending[depth], 4),
+                depth == moduli.depth,
+            )
             for depth, factor in sorted(moduli.bending.items())
         ],
     }
+
+
+def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
+    """What springs realise beside what is wanted of them."""
+    plane = moduli.dim == 2
+    youngs = [("along x", moduli.young()), *([("at 45°", moduli.young(45))] if plane else [])]
+    poissons = [("along x", moduli.poisson()), *([("at 45°", moduli.poisson(45))] if plane else [])]
+    if not plane or not np.allclose(sorted(value for _, value in youngs), moduli.young_range, rtol=1e-3):
+        extremes = ("smallest of all directions", "largest of all directions")
+        youngs += zip(extremes, moduli.young_range, strict=True)
+        poissons += zip(extremes, moduli.poisson_range, strict=True)
+    young, poisson = quantity(moduli.young_wanted, "Pa"), f"{moduli.poisson_wanted:.3f}"
+    ratio = "Zener ratio (1 is isotropic)" if plane else "largest over smallest Young’s modulus"
+    return [
+        *((f"Young’s modulus {where}", quantity(value, "Pa"), young) for where, value in youngs),
+        *((f"Poisson’s ratio {where}", f"{value:.3f}", poisson) for where, value in poissons),
+        (ratio, f"{moduli.anisotropy:.3f}", "1"),
+    ]
 
 
 def _section_note(problem: Problem) -> str | None:
     """In plane strain, where the wanted moduli come from."""
     if problem.material is None or not isinstance(problem.section, PlaneStrain):
         return None
-    young, poisson = problem.section.plane_moduli(problem.material)
+    young, poisson = problem.section.apparent_moduli(problem.material)
     seen = f"E/(1 − ν²) = {quantity(young, 'Pa')} and ν/(1 − ν) = {poisson:.3f}"
     own = f"E = {given(problem.material.young, 'Pa')} and ν = {problem.material.poisson:.4g}"
     unbroken = re.sub(r" (?=[−=])|(?<=[−=]) ", "\N{NO-BREAK SPACE}", f"{seen}: the material’s own are {own}")
     return f"In plane strain a test within the plane finds {unbroken}."
-
-
-# --- the viewer -----------------------------------------------------------------------------------
-
-
-def _viewer(result: Result, budget: int) -> dict[str, Any] | None:
-    """What the picture that moves is drawn from; None where nothing moves or it would be too much for a page."""
-    order = [result.model] if result.model is not None else []
-    names = order + [name for name in result.paths if name not in order]
-    shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
-    shown = [name for name in shown if result.paths[name].states or result.paths[name].surface is not None]
-    if not shown or shown[0] != names[0]:
-        return None
-    mesh = result.problem.mesh
-    levels = _levels(result.paths[names[0]], budget // (2 * mesh.n_nodes * len(shown)))
-    if len(levels) < 2:
-        return None
-    factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
-    first, *others = (_cloud(result.paths[name], factor) for name in shown)
-    lower, upper, leaves = picture_box(np.concatenate([mesh.nodes, first]), others)
-    extent = (upper - lower)[:2]
-    pack = _Packing(lower[:2], float(extent.max()))
-    scale = natural_scale(float(extent.max()), "m")
-    closest = shown.index(result.closest) - 1 if result.closest in shown else 0
-    return {
-        "magnified": f"displacements {times(factor)}" if factor != 1 else "",
-        "motion": not result.problem.loads,
-        "unit": scale.unit,
-        "box": [float(value) for value in extent / scale.size],
-        "n_nodes": mesh.n_nodes,
-        "probe": result.probe,
-        "chosen": closest,
-        "rest": pack.places(mesh.nodes),
-        "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
-        "paths": [
-            _viewer_path(result, name, levels, pack, factor, beyond)
-            for name, beyond in zip(shown, [False, *leaves], strict=True)
-        ],
-    }
-
-
-def _only_surface(path: Path) -> bool:
-    """Whether a path was read from a file that does not tell where each node went."""
-    return path.surface is not None and not path.states
-
-
-def _cloud(path: Path, factor: float) -> Floats:
-    """Every place [m] that the viewer draws of a path, shape (n, dim)."""
-    clouds = [path.problem.mesh.nodes + factor * state.displacement for state in path.states]
-    return np.concatenate(clouds + ([path.surface.points] if path.surface is not None and factor == 1 else []))
-
-
-def _levels(path: Path, budget: int) -> list[float]:
-    """The load levels to keep so that no more than `budget` states are: every n-th, first and last always."""
-    levels = path.load_factors.tolist()
-    step = max(1, -(-len(levels) // max(budget - 1, 1)))
-    return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
-
-
-def _viewer_path(
-    result: Result, name: str, levels: Sequence[float], pack: "_Packing", factor: float, beyond: bool
-) -> Mapping[str, Any]:
-    """What is drawn and told of a path; `beyond` tells that it leaves the picture, `factor` magnifies."""
-    path = result.paths[name]
-    to = drive(result)
-    rest = path.problem.mesh.nodes
-    states = [state for level in levels if (state := path.at(level)) is not None]
-    one = result.comparisons.get(name)
-    known = dict(zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True)) if one else {}
-    errors = [next((error for at, error in known.items() if abs(at - s.load_factor) < 1e-9), None) for s in states]
-    values: dict[str, Any] = {
-        "name": name,
-        "label": full_name(result, name),
-        "kind": path.kind,
-        "beyond": beyond,
-        "levels": [state.load_factor for state in states],
-        "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
-        "lines": pack.pairs(path_lines(path)),
-        "force": [quantity(to.along(path.applied_force(state)), "N") for state in states],
-        "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
-        "errors": [None if error is None else percent(error) for error in errors],
-        "surface": None,
-    }
-    if path.surface is not None and factor == 1:
-        surface = path.surface
-        values["surface"] = {
-            "level": surface.load_factor,
-            "points": pack.places(surface.points, beyond),
-            "lines": pack.pairs(surface.outline),
-        }
-    return values
-
-
-class _Packing:
-    """Numbers as base64: places in 65536 steps of the box, far below a pixel, and pairs of node numbers.
-
-    Places beyond the box are written as single precision numbers of the same steps.
-    """
-
-    def __init__(self, lower: Floats, extent: float) -> None:
-        self.lower, self.extent = lower, extent or 1.0
-
-    def places(self, points: Floats, beyond: bool = False) -> str:
-        steps = 65535 * (points[:, :2] - self.lower) / self.extent
-        packed = steps.astype("<f4") if beyond else np.rint(steps).astype("<u2")
-        return base64.b64encode(packed.tobytes()).decode()
-
-    def pairs(self, lines: Ints) -> str:
-        return base64.b64encode(lines.astype("<u4").tobytes()).decode()

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.report.quantity import natural_scale, quantity, tolerance_percent
+from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK, POINT, is_strong, label_and_name, path_styles, text_width
+from truespring.report.style import BLUE, FAINT, POINT, is_strong, label_and_name, path_styles, text_width
 from truespring.report.verdict import display_name, drive, material_name
+from truespring.report.young import Known, young_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -208,47 +209,11 @@ def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
 
 
 def moduli_figure(result: Result) -> "Figure":
-    """Young's modulus in a test along every direction: the springs against the material's circle."""
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-    known = {name: path.moduli for name, path in result.paths.items() if path.moduli is not None}
-    wanted = next(iter(known.values())).young_wanted
-    angles = np.arange(0, 361, 3.0)
-    young = {name: np.array([one.young(angle) for angle in angles]) for name, one in known.items()}
-    largest = max(wanted, *(float(values.max()) for values in young.values()))
-    scale = natural_scale(largest, "Pa")
-    title = "Young's modulus by direction"
-    figure = Figure(figsize=(3.9, 4.25 + 0.18 * len(known)), label=title)
-    total = figure.get_size_inches()
-    foot = (0.65 + 0.18 * len(known)) / total[1]
-    axes = figure.add_axes((0.12, foot, 0.76, 0.76 * total[0] / total[1]), projection="polar")
-    axes.plot(np.radians(angles), np.full(angles.shape, wanted / scale.size), color=INK, lw=1.3, ls=(0, (5, 2)))
-    handles, labels = (
-        [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))],
-        [f"{material_name(result)}: {quantity(wanted, 'Pa')}"],
-    )
+    """Young's modulus in a test along every direction: what the springs of a study realise beside the material's."""
     styles = path_styles(result)
-    for name, values in young.items():
-        color, dashes, _ = styles[name]
-        axes.plot(np.radians(angles), values / scale.size, color=color, lw=2, ls=dashes)
-        handles.append(Line2D([], [], color=color, lw=2, ls=dashes))
-        extremes = dict.fromkeys(quantity(float(value), "Pa") for value in (values.min(), values.max()))
-        labels.append(f"{display_name(result, name)}: {' to '.join(extremes)}")
-    axes.set_ylim(0, 1.12 * largest / scale.size)
-    axes.set_yticks(_ticks(largest / scale.size))
-    axes.set_rlabel_position(22.5)  # type: ignore[attr-defined]
-    axes.set_thetagrids(np.arange(0, 360, 45))  # type: ignore[attr-defined]
-    axes.tick_params(pad=2)
-    axes.spines["polar"].set_visible(False)
-    figure.text(0.5, 1 - 0.19 / total[1], f"{title} [{scale.unit}]", weight="bold", size=9, va="center", ha="center")
-    figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 0.02), borderpad=0, fontsize=8)
-    return figure
-
-
-def _ticks(largest: float) -> Floats:
-    """Three or four round numbers from zero on."""
-    from matplotlib.ticker import MaxNLocator
-
-    ticks = np.asarray(MaxNLocator(4).tick_values(0, largest))
-    return ticks[(ticks > 0) & (ticks <= 1.1 * largest)]
+    several = [
+        Known(display_name(result, name), path.moduli, *styles[name][:2])
+        for name, path in result.paths.items()
+        if path.moduli is not None
+    ]
+    return young_figure(several, material_name(result))

@@ -10,6 +10,7 @@ from truespring.arrays import Floats, Ints
 from truespring.equilibrium import Path, State
 from truespring.mesh import Surface
 from truespring.potential import Visible
+from truespring.report.surfaces import facets_of, triangles_of
 
 if TYPE_CHECKING:
     import meshio
@@ -45,7 +46,7 @@ def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
     mesh = path.problem.mesh
     visible = path.potential if isinstance(path.potential, Visible) else None
     kind, cells = visible.cells if visible else (mesh.kind.vtk, mesh.elements)
-    fields = visible.cell_fields(state.positions) if visible else {}
+    fields = visible.cell_fields(state.all_positions) if visible else {}
     return meshio.Mesh(
         _in_space(mesh.nodes),
         [(kind, cells)],
@@ -55,25 +56,30 @@ def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
 
 
 def _surface_mesh(surface: Surface) -> "meshio.Mesh":
+    return _triangle_mesh(surface.points, surface.triangles)
+
+
+def _triangle_mesh(points: Floats, triangles: Ints) -> "meshio.Mesh":
     import meshio
 
-    return meshio.Mesh(_in_space(surface.points), [("triangle", surface.triangles)])
+    return meshio.Mesh(_in_space(points), [("triangle", triangles)])
 
 
 def write_stl(path: Path, file: FilePath) -> None:
-    """Write the body of the last state as binary STL [m], in the plane z = 0; nothing where there is no body."""
+    """Write the body of the last state as binary STL [m]; nothing where there is no body.
+
+    Of a plane body its elements, in the plane z = 0, of one in 3D its surface, seen from outside
+    anticlockwise; quadrilaterals as two triangles.
+    """
+    mesh = path.problem.mesh
     if path.surface is not None:
-        surface = path.surface
-    elif path.states and path.problem.mesh.element != "line":
-        surface = Surface(path.states[-1].positions, _split(path.problem.mesh.elements))
+        drawn = _surface_mesh(path.surface)
+    elif path.states and mesh.element != "line":
+        facets = mesh.elements if mesh.dim == 2 else facets_of(mesh)
+        drawn = _triangle_mesh(path.states[-1].positions, triangles_of(facets))
     else:
         return
-    _surface_mesh(surface).write(file, file_format="stl", binary=True)
-
-
-def _split(quadrilaterals: Ints) -> Ints:
-    """Each quadrilateral as two triangles, shape (2 n, 3)."""
-    return np.concatenate([quadrilaterals[:, [0, 1, 2]], quadrilaterals[:, [0, 2, 3]]])
+    drawn.write(file, file_format="stl", binary=True)
 
 
 def _in_space(vectors: Floats) -> Floats:

@@ -5,10 +5,16 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+import numpy as np
+
+from truespring.arrays import Floats
 from truespring.report.result import Result
 
 #: Colours that stay apart for colour-blind eyes and on grey paper (blue, vermillion, green: Okabe and Ito).
 INK, BLUE, RED, LOAD, MOTION, FAINT = "#16191d", "#0072b2", "#d3222a", "#b84a00", "#00795a", "#a9b0b7"
+
+#: How far two paths are apart, from nothing to the largest distance: matplotlib's magma from its light end on.
+_ERROR_RANGE = (0.97, 0.27)
 
 _SPRING_STYLES = ((BLUE, "-", "o"), ("#3a9bdc", "--", "s"), ("#00476f", "-.", "^"), ("#5c7fb8", ":", "D"))
 _REFERENCE_STYLES = (
@@ -56,6 +62,14 @@ def figure_style() -> Iterator[None]:
 
     with matplotlib.rc_context(_RC):
         yield
+
+
+def error_colors(shares: Floats) -> Floats:
+    """Return the colours of distances, each a share 0 ... 1 of the largest: red, green, blue, shape (..., 3)."""
+    import matplotlib
+
+    light, dark = _ERROR_RANGE
+    return np.asarray(matplotlib.colormaps["magma"](light + (dark - light) * shares)[..., :3])
 
 
 def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:

@@ -32,7 +32,7 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "newton_iterations": path.newton_iterations,
         "seconds": path.seconds,
         "n_nodes": path.problem.mesh.n_nodes,
-        "n_unknowns": int((~path.problem.loading.held).sum()),
+        "n_unknowns": path.n_unknowns,
         "probe_displacement": last.displacement[probe].tolist() if last else None,
         "force": [_known(force) for force in path.applied_force(last).tolist()] if last else None,
         "residual": _known(last.residual) if last else None,
@@ -46,16 +46,38 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
 
 
 def moduli_values(moduli: Moduli) -> dict[str, Any]:
-    """Return the moduli that springs realise; Young's moduli in Pa, the bending factor by depth in elements."""
+    """Return the moduli that springs realise, beside those wanted; Young's moduli in Pa, bending by elements deep."""
+    plane = moduli.dim == 2
     return {
         "young": moduli.young(),
         "poisson": moduli.poisson(),
-        "anisotropy": moduli.zener,
-        "young_45": moduli.young(45),
-        "poisson_45": moduli.poisson(45),
+        "anisotropy": moduli.anisotropy,
+        **({"young_45": moduli.young(45), "poisson_45": moduli.poisson(45)} if plane else {}),
+        "young_min": moduli.young_range[0],
+        "young_max": moduli.young_range[1],
+        "poisson_min": moduli.poisson_range[0],
+        "poisson_max": moduli.poisson_range[1],
+        "young_wanted": moduli.young_wanted,
+        "poisson_wanted": moduli.poisson_wanted,
+        "directions": [
+            {"along": list(along), "young": moduli.young(along), "poisson": moduli.poisson(along)}
+            for along in (_PLANE if plane else _SPACE)
+        ],
+        "depth": moduli.depth,
         "bending_factor": {str(depth): factor for depth, factor in moduli.bending.items()},
         "fem_bending_factor": {str(depth): factor for depth, factor in moduli.fem_bending.items()},
+        "lattice": moduli.lattice,
+        "patch_score": moduli.patch_score,
+        "n_springs": moduli.n_springs,
+        "n_negative": moduli.n_negative,
+        "n_zero": moduli.n_zero,
+        "stable": moduli.stable,
     }
+
+
+# Directions in which moduli are told.
+_PLANE = ((1, 0), (0, 1), (1, 1), (1, -1))
+_SPACE = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1))
 
 
 def _comparison(comparison: Comparison) -> dict[str, Any]:

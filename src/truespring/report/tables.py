@@ -1,7 +1,7 @@
 """Tables for a terminal, as rich renderables: moduli before a solve, status and errors after it."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
@@ -13,23 +13,67 @@ if TYPE_CHECKING:
 
 def moduli_table(title: str, moduli: Moduli) -> "Table":
     """Return what springs realise beside what the material has in its section."""
-    table = _table(title, "", "springs", "four-node FEM", "material")
+    plane = moduli.dim == 2
+    # Finite elements realise the material, but for bending on a coarse mesh.
+    elements = ("four-node FEM" if plane else "eight-node FEM",) if moduli.bending else ()
+    table = _table(title, "", "springs", *elements, "material")
+
+    def add(what: str, found: str, wanted: str = "") -> None:
+        table.add_row(what, found, *[wanted] * (1 + len(elements)))
+
     young, poisson = f"{moduli.young_wanted:.6g}", f"{moduli.poisson_wanted:.4f}"
-    table.add_row("Young's modulus at 0 degrees [Pa]", f"{moduli.young():.6g}", young, young)
-    table.add_row("Young's modulus at 45 degrees [Pa]", f"{moduli.young(45):.6g}", young, young)
-    table.add_row("Poisson's ratio at 0 degrees", f"{moduli.poisson():.4f}", poisson, poisson)
-    table.add_row("Poisson's ratio at 45 degrees", f"{moduli.poisson(45):.4f}", poisson, poisson)
-    table.add_row("Zener ratio", f"{moduli.zener:.4f}", "1.0000", "1.0000")
+    directions = _PLANE if plane else _SPACE
+    for name, along in directions.items():
+        add(f"Young's modulus {name} [Pa]", f"{moduli.young(along):.6g}", young)
+    for extreme, value in zip(("smallest", "largest"), moduli.young_range, strict=True):
+        add(f"{extreme} Young's modulus [Pa]", f"{value:.6g}", young)
+    for name in directions:
+        add(f"Poisson's ratio {name}", f"{moduli.poisson(directions[name]):.4f}", poisson)
+    for extreme, value in zip(("smallest", "largest"), moduli.poisson_range, strict=True):
+        add(f"{extreme} Poisson's ratio", f"{value:.4f}", poisson)
+    add("Zener ratio" if plane else "largest over smallest E", f"{moduli.anisotropy:.4f}", "1.0000")
     for depth, factor in moduli.bending.items():
-        elements = "element" if depth == 1 else "elements"
-        here = " (this mesh)" if depth == moduli.depth else ""
-        fem = f"{moduli.fem_bending[depth]:.4f}"
-        table.add_row(f"bending factor EI, {depth} {elements} deep{here}", f"{factor:.4f}", fem, "1.0000")
+        table.add_row(_section(moduli, depth), f"{factor:.4f}", f"{moduli.fem_bending[depth]:.4f}", "1.0000")
+    add(f"patch test, unbalanced [E h{'' if plane else '^2'}]", f"{moduli.patch_score:.2g}", "0")
+    add("springs", str(moduli.n_springs))
+    add("springs of negative stiffness", str(moduli.n_negative))
+    add("springs of no stiffness", str(moduli.n_zero))
+    return table
+
+
+# Directions in which moduli are told: angles from x to y, or vectors.
+_PLANE: dict[str, float | tuple[int, ...]] = {"at 0 degrees": 0.0, "at 45 degrees": 45.0}
+_SPACE: dict[str, float | tuple[int, ...]] = {
+    "along x": (1, 0, 0),
+    "along y": (0, 1, 0),
+    "along z": (0, 0, 1),
+    "along x + y": (1, 1, 0),
+    "along x + y + z": (1, 1, 1),
+}
+
+
+def _section(moduli: Moduli, depth: int) -> str:
+    """The section that is bent: this mesh's own, or of so many elements, in space as many across."""
+    elements = "element" if depth == 1 else "elements"
+    if depth == moduli.depth:
+        return f"bending factor EI, {depth} {elements} deep (this mesh)"
+    return (
+        f"bending factor EI, {depth} {elements} deep" if moduli.dim == 2 else f"bending factor EI, {depth} by {depth}"
+    )
+
+
+def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
+    """Return the stiffness rules: what each is made for, what it realises, and where it comes from."""
+    table = _table("Stiffness rules", "rule", "", "uses nu", "")
+    for name, rule in rules.items():
+        uses = "yes" if rule["follows_poisson"] else "no"
+        words = f"{rule['realises']}\nSource: {rule['source']}"
+        table.add_row(name, "\n".join(rule["elements"]), uses, words, end_section=True)
     return table
 
 
 def result_tables(result: Result) -> "Iterator[Table | str]":
-    """Yield the state of every path, the errors, the verdict and the warnings of a study."""
+    """Yield the state of every path, the errors, the verdict, notes and warnings of a study."""
     table = _table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
     for name, path in result.paths.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
@@ -38,6 +82,8 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     if result.comparisons:
         yield _error_table(result)
     yield verdict(result)
+    for note in result.problem.mesh.notes:
+        yield f"note: mesh: {note}"
     for name, path in result.paths.items():
         for warning in path.warnings:
             yield f"warning: {name}: {warning}"

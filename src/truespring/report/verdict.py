@@ -11,6 +11,7 @@ from truespring.equilibrium import Path, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
 from truespring.models import Moduli
+from truespring.models.fem import FemPotential
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 
@@ -84,17 +85,19 @@ def force_sentence(result: Result) -> str | None:
 def mesh_sentence(result: Result) -> str | None:
     """Return how far off the reference's own elements are in bending; None where that is little or not known.
 
-    The springs' moduli hold it, for bending along x, so it is said of bodies that are driven across x.
+    The springs' moduli hold it for linear elements and bending along x, so it is said of bodies that are
+    driven across x, along y.
     """
     known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
-    finite = any(one.reference.kind == "fem" for one in result.comparisons.values())
+    finite = any(type(one.reference.potential) is FemPotential for one in result.comparisons.values())
     if known is None or known.depth is None or not finite or drive(result).axis != 1:
         return None
     excess = known.fem_bending[known.depth] - 1
     if abs(excess) <= 0.01:
         return None
+    stiff = "stiff" if excess > 0 else "soft"
     return (
-        f"The four-node elements themselves are {percent(abs(excess))} too {'stiff' if excess > 0 else 'soft'} in "
+        f"The {_ELEMENTS[result.problem.mesh.element]} themselves are {percent(abs(excess))} too {stiff} in "
         f"bending on this mesh ({deep(known.depth)}): a refined mesh tells how much of the distance is theirs."
     )
 
@@ -102,6 +105,21 @@ def mesh_sentence(result: Result) -> str | None:
 def material_name(result: Result) -> str:
     """Return what the moduli that are wanted are called: in plane strain they are not the material's own."""
     return "material in plane strain" if isinstance(result.problem.section, PlaneStrain) else "material"
+
+
+def linear_fem(path: Path) -> str:
+    """Return what finite elements of first order on the mesh of a path are called."""
+    corners = {"quadrilateral": "four-node ", "hexahedron": "eight-node "}
+    return f"linear {corners.get(path.problem.mesh.element, '')}FEM"
+
+
+# What the elements of first order of each kind of mesh are called.
+_ELEMENTS = {
+    "quadrilateral": "four-node elements",
+    "triangle": "linear triangles",
+    "hexahedron": "eight-node elements",
+    "tetrahedron": "linear tetrahedra",
+}
 
 
 def deep(depth: int) -> str:
@@ -119,22 +137,31 @@ def moduli_sentence(path: Path) -> str | None:
         factor, other = (significant(known[moduli.depth], 4) for known in (moduli.bending, moduli.fem_bending))
         bending = (
             f" Bent {deep(moduli.depth)}, they have {factor} times the material's bending stiffness EI; "
-            f"linear four-node FEM on this mesh has {other} times."
+            f"{linear_fem(path)} on this mesh has {other} times."
         )
-    return f"{_stiffness_sentence(moduli)}{bending}"
+    regions = " This is for the body's own material, outside its regions." if path.problem.regions else ""
+    return f"{_stiffness_sentence(moduli)}{bending}{regions}"
 
 
 def _stiffness_sentence(moduli: Moduli) -> str:
     wanted = f"{given(float(f'{moduli.young_wanted:.4g}'), 'Pa')} and {moduli.poisson_wanted:.2f}"
-    found = [(moduli.young(angle) / moduli.young_wanted, moduli.poisson(angle)) for angle in (0.0, 45.0)]
-    if np.allclose(found, (1.0, moduli.poisson_wanted), rtol=0, atol=1e-3):  # two directions fix all four constants
+    found = [*(np.array(moduli.young_range) / moduli.young_wanted - 1), *moduli.poisson_range]
+    if np.allclose(found, [0.0, 0.0] + 2 * [moduli.poisson_wanted], rtol=0, atol=1e-3):
         return f"These springs realise the material, in every direction: E and Poisson's ratio are {wanted}."
-    along, diagonal = (
-        f"{quantity(moduli.young(angle), 'Pa')} and {moduli.poisson(angle):.2f}" for angle in (0.0, 45.0)
-    )
+    if moduli.dim == 2 and np.allclose(sorted([moduli.young(), moduli.young(45)]), moduli.young_range, rtol=1e-3):
+        along, diagonal = (
+            f"{quantity(moduli.young(angle), 'Pa')} and {moduli.poisson(angle):.2f}" for angle in (0.0, 45.0)
+        )
+        return (
+            f"These springs realise a Young's modulus and a Poisson's ratio of {along} along x, "
+            f"{diagonal} at 45 degrees; the material in its section has {wanted}."
+        )
+    youngs = " to ".join(dict.fromkeys(quantity(value, "Pa") for value in moduli.young_range))
+    poissons = " to ".join(dict.fromkeys(f"{value:.2f}" for value in moduli.poisson_range))
+    in_section = " in its section" if moduli.dim == 2 else ""
     return (
-        f"These springs realise a Young's modulus and a Poisson's ratio of {along} along x, "
-        f"{diagonal} at 45 degrees; the material in its section has {wanted}."
+        f"These springs realise a Young's modulus of {youngs} and a Poisson's ratio of {poissons} over all directions; "
+        f"the material{in_section} has {wanted}."
     )
 
 

@@ -1,12 +1,13 @@
 // Draws the model over a reference at each load level. Plain JavaScript, no library, nothing is fetched.
+// Bodies in 3D are painted by truespringScene, of scene.min.js.
 "use strict";
 (() => {
-  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GRID = "#e9ecef";
+  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7";
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-  // x, y, x, y, ... in 0 ... 65535 of the box, or beyond it
+  // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
   const places = (text, beyond) => new (beyond ? Float32Array : Uint16Array)(bytes(text));
-  const pairs = (text) => new Uint32Array(bytes(text)); // from, to, from, to, ...
+  const pairs = (text) => new Uint32Array(bytes(text || "")); // from, to, from, to, ...
 
   for (const host of document.querySelectorAll("[data-viewer]")) {
     const data = JSON.parse(document.getElementById(host.dataset.viewer).textContent);
@@ -18,20 +19,26 @@
     const paths = data.paths.map((path) => ({
       ...path,
       lines: pairs(path.lines),
+      inside: pairs(path.inside),
       positions: path.positions.map((text) => places(text, path.beyond)),
       surface: path.surface && {
         ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
       },
     }));
-    return { ...data, paths, rest: places(data.rest), outline: pairs(data.outline) };
+    return {
+      ...data, paths, rest: places(data.rest), outline: pairs(data.outline),
+      triangles: pairs(data.triangles), edges: pairs(data.edges),
+    };
   }
 
   function start(host, data) {
     const canvas = host.querySelector("canvas"), slider = host.querySelector("input[type=range]");
-    const play = host.querySelector("button"), apart = host.querySelector("input[type=checkbox]");
-    const readout = host.querySelector("output"), context = canvas.getContext("2d");
-    const model = data.paths[0], others = data.paths.slice(1);
+    const play = host.querySelector("button"), boxes = [...host.querySelectorAll("input[type=checkbox]")];
+    const readout = host.querySelector("output");
+    const model = data.paths[0], others = data.paths.slice(1), dim = data.box.length;
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const paint = dim === 3 ? window.truespringScene(canvas, data, bar) : plane(canvas, data);
+    if (!paint) return instead(host);
     let reference = others[data.chosen] || null, playing = 0;
     slider.max = model.levels.length - 1;
     slider.value = slider.max;
@@ -40,7 +47,7 @@
       choice.addEventListener("change", () => { reference = others[Number(choice.value)]; draw(); });
     }
     slider.addEventListener("input", () => { stop(); draw(); });
-    if (apart) apart.addEventListener("change", () => draw());
+    for (const box of boxes) box.addEventListener("change", () => draw());
     play.addEventListener("click", () => (playing ? stop() : run()));
     let width = 0, asked = 0;
     new ResizeObserver(([entry]) => { // once a frame, and not for the height that draw() itself sets
@@ -90,9 +97,46 @@
     }
 
     function draw(place = Number(slider.value)) {
-      const level = Math.floor(place + 1e-9), width = canvas.parentElement.clientWidth;
-      if (!width) return;
-      const pad = 14, [wide, high] = data.box;
+      const level = Math.floor(place + 1e-9);
+      if (!canvas.parentElement.clientWidth) return;
+      const shown = {
+        level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
+        ticked: boxes.filter((box) => box.checked).map((box) => box.name),
+      };
+      paint(shown);
+      say(level, reference && reference.beyond && leaves(shown.outline ? shown.outline.points : shown.theirs));
+    }
+
+    function leaves(points) {
+      const longest = Math.max(...data.box), ends = data.box.map((one) => 65535 * one / longest);
+      return points && points.some((value, i) => value < -1 || value > ends[i % dim] + 1);
+    }
+
+    function say(level, gone) {
+      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
+      const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
+      // Under loads the force is the same for all; a motion takes another of each.
+      const told = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
+      if (!data.motion) parts.push(force(model, level));
+      parts.push(`<i class="blue"></i>${told(model, level)}`);
+      if (reference) {
+        const other = index(reference, level);
+        if (other >= 0) parts.push(`<i class="black"></i>${told(reference, other)}`);
+        if (gone) parts.push("it leaves the picture");
+        if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
+        if (other >= 0 && level && reference.most && reference.most[other]) parts.push(`at most <b>${reference.most[other]}</b>`);
+        if (other < 0 && level) parts.push(surface(level) ? "an outline only" : "the reference is not known at this level");
+      }
+      readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
+    }
+  }
+
+  // The picture of a plane body; `ticked` shows the distances.
+  function plane(canvas, data) {
+    const context = canvas.getContext("2d"), model = data.paths[0];
+
+    return ({ level, reference, outline, mine, theirs, ticked }) => {
+      const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
       const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
       const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
       if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {
@@ -125,7 +169,7 @@
         context.stroke();
       };
 
-      bar(scale, height - 8, pad);
+      bar(context, data.unit, scale, height - 8, pad);
       context.save();
       context.beginPath();
       context.rect(0, 0, width, scale * high + 2 * pad);
@@ -133,12 +177,10 @@
       context.setLineDash([4, 3]);
       stroke(data.rest, data.outline, FAINT, 1);
       context.setLineDash([]);
-      const mine = at(model, place), theirs = reference && at(reference, place);
-      const outline = surface(level);
       if (outline) stroke(outline.points, outline.lines, INK, 1.8);
       else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
       stroke(mine, model.lines, BLUE, 1);
-      if (theirs && apart && apart.checked) {
+      if (theirs && ticked.length) {
         const same = new Uint32Array(2 * data.n_nodes);
         for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;
         stroke(mine, same, RED, 1.4, theirs);
@@ -154,45 +196,30 @@
       if (theirs) dot(theirs, data.probe, 4.5, "#fff", INK);
       dot(mine, data.probe, 4.5, RED, "#fff");
       context.restore();
-      say(level, reference && reference.beyond && leaves(outline ? outline.points : theirs));
-    }
+    };
+  }
 
-    function leaves(points) {
-      const longest = Math.max(...data.box), ends = data.box.map((one) => 65535 * one / longest);
-      return points && points.some((value, i) => value < -1 || value > ends[i % 2] + 1);
-    }
+  // A bar of a round length, so that the picture has a size; `scale` is pixels a unit.
+  function bar(context, unit, scale, bottom, left) {
+    const aim = 90 / scale, power = 10 ** Math.floor(Math.log10(aim));
+    const length = [5, 2, 1].map((digit) => digit * power).find((value) => value <= aim) || power;
+    context.fillStyle = context.strokeStyle = "#5b6168";
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.moveTo(left, bottom - 4);
+    context.lineTo(left, bottom);
+    context.lineTo(left + length * scale, bottom);
+    context.lineTo(left + length * scale, bottom - 4);
+    context.stroke();
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(`${+length.toPrecision(3)} ${unit}`, left + length * scale + 7, bottom + 1);
+  }
 
-    // A bar of a round length, so that the picture has a size.
-    function bar(scale, bottom, left) {
-      const aim = 90 / scale, power = 10 ** Math.floor(Math.log10(aim));
-      const length = [5, 2, 1].map((digit) => digit * power).find((value) => value <= aim) || power;
-      context.fillStyle = context.strokeStyle = "#5b6168";
-      context.lineWidth = 1.5;
-      context.beginPath();
-      context.moveTo(left, bottom - 4);
-      context.lineTo(left, bottom);
-      context.lineTo(left + length * scale, bottom);
-      context.lineTo(left + length * scale, bottom - 4);
-      context.stroke();
-      context.font = "12px system-ui, sans-serif";
-      context.fillText(`${+length.toPrecision(3)} ${data.unit}`, left + length * scale + 7, bottom + 1);
-    }
-
-    function say(level, gone) {
-      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
-      const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
-      // Under loads the force is the same for all; a motion takes another of each.
-      const told = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
-      if (!data.motion) parts.push(force(model, level));
-      parts.push(`<i class="blue"></i>${told(model, level)}`);
-      if (reference) {
-        const other = index(reference, level);
-        if (other >= 0) parts.push(`<i class="black"></i>${told(reference, other)}`);
-        if (gone) parts.push("it leaves the picture");
-        if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
-        if (other < 0 && level) parts.push(surface(level) ? "an outline only" : "the reference is not known at this level");
-      }
-      readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
-    }
+  // Without WebGL: the picture that the page has of the model over a reference, and why.
+  function instead(host) {
+    const picture = host.parentElement.querySelector("figure.over img");
+    for (const part of host.querySelectorAll("canvas, .controls, output")) part.remove();
+    for (const words of host.querySelectorAll(".missing")) words.hidden = false;
+    if (picture) host.append(Object.assign(picture.cloneNode(), { className: "still" }));
   }
 })();

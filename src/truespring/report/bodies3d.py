@@ -1,0 +1,233 @@
+"""Pictures of bodies in 3D: as asked for, a model over a reference, and where the two are apart.
+
+What hides what is an image (render.py); words, marks, arrows and scales are drawn over it as in 2D.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.comparison import Comparison
+from truespring.report.bodies import magnification, over_title, path_lines, picture_box, spring_lines
+from truespring.report.frame3d import Bar, Picture
+from truespring.report.legend import Entry
+from truespring.report.quantity import Scale, natural_scale, percent, quantity, times
+from truespring.report.render import Layer, rgb
+from truespring.report.result import Result
+from truespring.report.style import BLUE, FAINT, INK, RED, error_colors, full_name
+from truespring.report.supports3d import clamped_nodes, draw_lines, draw_supports
+from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
+from truespring.report.symbols import Arrow, draw_arrow, draw_dot, draw_loaded, find_arrows
+from truespring.report.verdict import display_name, level_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Surfaces: of the body as asked for, of a reference, where it is held; their light comes from above, left of the eye.
+_BODY, _REFERENCE, _HELD = "#f7f8f9", "#e6e9ec", "#bcc2c8"
+_LIGHT = np.array([-0.3, 0.6, 0.74]) / np.linalg.norm([-0.3, 0.6, 0.74])
+_DASHES = (0, (3, 2))
+
+
+def undeformed_picture(result: Result) -> Picture:
+    """The body as it is asked for: mesh, springs, supports, loads and the probe."""
+    mesh = result.problem.mesh
+    model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
+    springs = spring_lines(model)
+    size = float((mesh.upper - mesh.lower).max())
+    points, facets = seen(mesh.nodes), facets_of(mesh)
+    arrows = find_arrows(result, size, lambda places: seen(places)[:, :2])
+    layers = []
+    if len(facets):
+        layers.append(_solid(points, facets, _tinted(result, facets, arrows), edges_of(facets), INK, 1.0))
+    if springs is not None:
+        layers.append(_wires(points, facets, springs, 0.6))
+    title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
+    title += f", {len(springs)} springs" if springs is not None else ""
+    legend = [Entry("elements", INK)] if len(facets) else []
+    legend += [Entry("springs", BLUE)] if springs is not None else []
+    taken = np.concatenate([_spots(points, facets, mesh.edges), *(np.stack([*one.ends, one.room]) for one in arrows)])
+
+    def marks(axes: "Axes", scale: Scale) -> None:
+        draw_supports(axes, result, scale, 0.028 * size)
+        for arrow in arrows:
+            if not _within(facets, arrow.nodes, mesh.n_nodes).any():
+                draw_loaded(axes, points[arrow.nodes, :2] / scale.size, arrow.color)
+            draw_arrow(axes, arrow, scale)
+        draw_dot(axes, points[result.probe, :2] / scale.size)
+
+    lower, upper = taken.min(axis=0) - 0.03 * size, taken.max(axis=0) + 0.03 * size
+    entries = (*legend, Entry("probe", RED, "o", ""))
+    return Picture(title, "", entries, lower, upper, taken, tuple(layers), marks)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Pair:
+    """A model and a reference at the last level that both have, as they are drawn: `factor` magnifies.
+
+    Places are as `seen` gives them [m].
+    """
+
+    level: float
+    factor: float
+    rest: Floats
+    mine: Floats
+    theirs: Floats
+    distance: Floats
+    largest: float
+
+
+def _pair(result: Result, comparison: Comparison) -> _Pair | None:
+    level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
+    mine, theirs = comparison.model.at(level), comparison.reference.at(level)
+    if mine is None or theirs is None or not level:
+        return None
+    rest, factor = comparison.model.problem.mesh.nodes, magnification(result)
+    return _Pair(
+        level=level,
+        factor=factor,
+        rest=seen(rest),
+        mine=seen(rest + factor * mine.displacement),
+        theirs=seen(rest + factor * theirs.displacement),
+        distance=np.linalg.norm(mine.displacement - theirs.displacement, axis=1),
+        largest=float(np.linalg.norm(theirs.displacement, axis=1).max()),
+    )
+
+
+def over_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
+    """The model in blue over a reference in black, at the last load level that both have."""
+    pair = _pair(result, comparison)
+    if pair is None:
+        return None
+    mesh = comparison.model.problem.mesh
+    facets, lines = facets_of(mesh), path_lines(comparison.reference)
+    if len(facets):
+        black = _solid(pair.theirs, facets, _one_color(facets, _REFERENCE), lines, INK, 1.2)
+    else:
+        black = _wires(pair.theirs, facets, lines, 1.3, INK)
+    blue = _wires(pair.mine, facets, path_lines(comparison.model), 0.8)
+    legend = (
+        Entry(full_name(result, result.model or ""), BLUE),
+        Entry(full_name(result, name), INK),
+        Entry("at rest", FAINT, linestyle=_DASHES),
+        Entry("probe", RED, "o", ""),
+    )
+    return _pair_picture(
+        result, name, comparison, pair, over_title(result, pair.level, comparison), legend, (black, blue)
+    )
+
+
+def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
+    """The model's surface coloured by the distance of its nodes from the reference, whose outline is black."""
+    pair = _pair(result, comparison)
+    mesh = comparison.model.problem.mesh
+    facets = facets_of(mesh)
+    if pair is None or not len(facets) or not np.isfinite(pair.distance).all():
+        return None
+    farthest = float(pair.distance.max())
+    colors = error_colors(pair.distance / (farthest or 1.0))[facets]
+    surface = _solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
+    black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
+    reference = display_name(result, name)
+    if pair.largest:
+        bar = Bar("distance [% of the reference's largest displacement]", 100 * farthest / pair.largest)
+        most = f"{percent(farthest / pair.largest)}, {quantity(farthest, 'm', 2)}"
+    else:
+        scale = natural_scale(farthest, "m")
+        bar, most = Bar(f"distance [{scale.unit}]", farthest / scale.size), quantity(farthest, "m", 2)
+    title = f"{level_name(result, pair.level).capitalize()}: at most {most} from {reference}"
+    legend = (
+        Entry(f"outline of {full_name(result, name)}", INK),
+        Entry("at rest", FAINT, linestyle=_DASHES),
+        Entry("probe", RED, "o", ""),
+    )
+    return _pair_picture(result, name, comparison, pair, title, legend, (surface, black), bar)
+
+
+def _pair_picture(
+    result: Result,
+    name: str,
+    comparison: Comparison,
+    pair: _Pair,
+    title: str,
+    legend: tuple[Entry, ...],
+    layers: tuple[Layer, ...],
+    bar: Bar | None = None,
+) -> Picture:
+    mesh = comparison.model.problem.mesh
+    facets = facets_of(mesh)
+    spots = [_spots(points, facets, mesh.edges) for points in (pair.rest, pair.mine, pair.theirs)]
+    lower, upper, (leaves,) = picture_box(np.concatenate(spots[:2]), spots[2:])
+    margin = 0.03 * float((upper - lower).max())
+    remarks = [f"displacements {times(pair.factor)}"] if pair.factor != 1 else []
+    remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
+    at_rest = outline(pair.rest, facets, silhouette=True) if len(facets) else mesh.edges
+
+    def marks(axes: "Axes", scale: Scale) -> None:
+        draw_lines(axes, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES)
+        draw_dot(axes, pair.mine[comparison.probe, :2] / scale.size)
+
+    return Picture(
+        title, " · ".join(remarks), legend, lower - margin, upper + margin, np.concatenate(spots), layers, marks, bar
+    )
+
+
+# --- layers ---------------------------------------------------------------------------------------
+
+
+def _solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, width: float) -> Layer:
+    """A lit surface with lines on it; colours of shape (n_facets, corners, 3)."""
+    on, owners = lines_on(facets, lines)
+    facing = normals(points, facets) @ _LIGHT
+    lit = colors * (0.8 + 0.2 * facing.clip(0, 1))[:, None, None]
+    return Layer(points[facets], lit, points[lines[on]], owners, ink, _thin(width, int(on.sum())))
+
+
+def _wires(points: Floats, facets: Ints, lines: Ints, width: float, ink: str = BLUE) -> Layer:
+    """Lines that lie on a surface, hidden where it is nearer; of a body without a surface, all lines."""
+    if not len(facets):
+        return Layer(np.zeros((0, 3, 3)), None, points[lines], np.zeros((0, 2), int), ink, _thin(width, len(lines)))
+    on, owners = lines_on(facets, lines)
+    return Layer(points[facets], None, points[lines[on]], owners, ink, _thin(width, int(on.sum())))
+
+
+def _thin(width: float, count: int) -> float:
+    """Fine meshes in fine lines [points]."""
+    return width * min(1.0, max(0.3, float(np.sqrt(1200 / max(count, 1)))))
+
+
+def _one_color(facets: Ints, color: str) -> Floats:
+    return np.broadcast_to(rgb(color), (*facets.shape, 3))
+
+
+def _tinted(result: Result, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
+    """Colours of the body as asked for: darker where it is clamped, those of the arrows where they act."""
+    mesh = result.problem.mesh
+    colors = _one_color(facets, _BODY).copy()
+    clamped = clamped_nodes(result)[facets].all(axis=1)
+    colors[clamped] = _one_color(facets[clamped], _HELD)
+    for arrow in arrows:
+        acted = _within(facets, arrow.nodes, mesh.n_nodes)
+        colors[acted] = 0.7 * _one_color(facets[acted], _BODY) + 0.3 * _one_color(facets[acted], arrow.color)
+    return colors
+
+
+def _within(facets: Ints, nodes: Ints, n_nodes: int) -> Bools:
+    inside = np.zeros(n_nodes, dtype=bool)
+    inside[nodes] = True
+    return np.asarray(inside[facets].all(axis=1))
+
+
+def _spots(points: Floats, facets: Ints, lines: Ints) -> Floats:
+    """Places on paper that a body covers, close enough to see whether there is room beside it, shape (n, 2)."""
+    share = np.linspace(0, 1, 5 if len(facets) < 5000 else 2)
+    if not len(facets):
+        ends = points[lines, :2]
+        return (ends[:, :1] * (1 - share)[:, None] + ends[:, 1:] * share[:, None]).reshape(-1, 2)
+    corners = points[facets][:, [0, 1, 2, -1], :2]
+    u, v = (grid.ravel() for grid in np.meshgrid(share, share))
+    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+    return np.asarray(np.einsum("sc,fcd->fsd", weights, corners).reshape(-1, 2))

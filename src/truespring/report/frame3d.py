@@ -1,0 +1,186 @@
+"""The frame of a picture in 3D: an image with a title, a legend, a triad that is its scale, and a bar of colours."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.quantity import Scale, natural_scale, quantity
+from truespring.report.render import Image, Layer, Shot
+from truespring.report.style import LOAD, error_colors, text_width
+from truespring.report.surfaces import VIEW
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Images are this fine [pixels an inch]: finer than the PNG that they become a part of.
+_DPI = 200
+
+_TRIAD = "#3d4248"
+
+#: Draws marks into axes in units of a scale.
+Marks = Callable[["Axes", Scale], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A bar of colours from 0 to `largest`, in the unit that `label` names."""
+
+    label: str
+    largest: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Picture:
+    """A picture of a body in 3D before its image is there.
+
+    Attributes:
+        title, remark: the words on top; the remark may be empty.
+        legend: what lines stand for.
+        lower, upper: the corners of what is shown, right and up [m], shape (2,).
+        taken: places on paper where something is drawn [m], shape (n, 2).
+        layers: what the image shows.
+        marks: what is drawn over the image and, with a low zorder, behind it.
+        bar: the colours of the image, if they stand for numbers.
+    """
+
+    title: str
+    remark: str
+    legend: tuple[Entry, ...]
+    lower: Floats
+    upper: Floats
+    taken: Floats
+    layers: tuple[Layer, ...]
+    marks: Marks
+    bar: Bar | None = None
+
+
+# Inches around the image, of the colour bar with its words, and of the triad beyond its arms.
+_SIDE, _BOTTOM, _TOP, _BAR, _WORDS = 0.12, 0.06, 0.32, 0.44, 0.17
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Layout:
+    """Where things are on paper.
+
+    Attributes:
+        width, height: of the image [inch].
+        top: what words take above it [inch].
+        lower, upper: the corners of what is shown, right and up [m], shape (2,).
+        columns: of the legend.
+        arm, origin: length of the arms of the triad and where they start, right and up [m].
+    """
+
+    width: float
+    height: float
+    top: float
+    lower: Floats
+    upper: Floats
+    columns: list[Sequence[Entry]]
+    arm: float
+    origin: Floats
+
+
+def _layout(picture: Picture) -> _Layout:
+    columns, words = legend_columns(picture.legend, 5.0)
+    words = max(words, text_width(picture.title, 9, bold=True), text_width(picture.remark, 8))
+    words = max(words, text_width(picture.bar.label, 8)) if picture.bar else words
+    top = _TOP + ROW * len(columns[0]) + ROW * bool(picture.remark) + _BAR * bool(picture.bar)
+    extent = picture.upper - picture.lower
+    inch = float(max(extent[0] / 5.4, extent[1] / 4.4))  # [m] on paper
+    arm = _round_length(0.15 * float(extent.max()))
+    lower, upper, origin = _triad_place(picture, arm, _WORDS * inch)
+    # A narrow body leaves room for the words: the box grows sideways.
+    broad = max(float(upper[0] - lower[0]) / inch, 3.3, words + 0.05)
+    wider = (broad * inch - (upper[0] - lower[0])) / 2 * np.array([1.0, 0.0])
+    lower, upper = lower - wider, upper + wider
+    return _Layout(broad, float(upper[1] - lower[1]) / inch, top, lower, upper, columns, arm, origin)
+
+
+def _round_length(most: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... times a power of ten that is not above `most`."""
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(max(digit * power for digit in (1, 2, 5) if digit * power <= most * (1 + 1e-9)))
+
+
+def _triad_place(picture: Picture, arm: float, words: float) -> tuple[Floats, Floats, Floats]:
+    """Where the triad starts: in a corner that nothing else takes, else in a strip below; and the box with it [m]."""
+    tips = np.concatenate([arm * VIEW[:2].T, np.zeros((1, 2))])
+    low, high = tips.min(axis=0) - words * np.array([1.2, 2.0]), tips.max(axis=0) + words * np.array([1.2, 1.0])
+    lower, upper = picture.lower, picture.upper
+    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        origin = np.where([right, up], upper - high, lower - low)
+        inside = (picture.taken >= origin + low) & (picture.taken <= origin + high)
+        if not inside.all(axis=1).any():
+            return lower, upper, origin
+    strip = np.array([0.0, float((high - low)[1])])
+    return lower - strip, upper, lower - strip - low
+
+
+def shot(picture: Picture) -> Shot:
+    """Return what the image of a picture is to show."""
+    at = _layout(picture)
+    pixels = (round(at.width * _DPI), round(at.height * _DPI))
+    return Shot(picture.layers, at.lower, at.upper, pixels, _DPI / 72)
+
+
+def figure_of(picture: Picture, image: Image) -> "Figure":
+    """Return a picture with its image as a figure."""
+    from matplotlib.figure import Figure
+
+    at = _layout(picture)
+    scale = natural_scale(float(np.abs(picture.upper - picture.lower).max()), "m")
+    told = f"{picture.title}; {picture.remark}" if picture.remark else picture.title
+    figure = Figure(figsize=(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top), label=told)
+    total = figure.get_size_inches()
+    axes = figure.add_axes((_SIDE / total[0], _BOTTOM / total[1], at.width / total[0], at.height / total[1]))
+    axes.set_axis_off()
+    (left, bottom), (right, top) = at.lower / scale.size, at.upper / scale.size
+    axes.imshow(image, extent=(left, right, bottom, top), zorder=3, gid="image", aspect="auto")
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    picture.marks(axes, scale)
+    _draw_triad(axes, at, scale)
+    figure.text(_SIDE / total[0], 1 - 0.17 / total[1], picture.title, weight="bold", size=9, va="center")
+    below = 0.30
+    if picture.remark:
+        figure.text(_SIDE / total[0], 1 - 0.37 / total[1], picture.remark, color=LOAD, size=8, va="center")
+        below += ROW
+    draw_legend(figure, at.columns, _SIDE, float(total[1]) - below)
+    if picture.bar:
+        _draw_bar(figure, picture.bar, float(total[1]) - below - ROW * len(at.columns[0]) - 0.08)
+    return figure
+
+
+def _draw_triad(axes: "Axes", at: _Layout, scale: Scale) -> None:
+    """Draw arms along x, y and z, each as long as is written beside them."""
+    x, y = at.origin / scale.size
+    for axis, name in enumerate("xyz"):
+        right, up = at.arm * VIEW[:2, axis] / scale.size
+        style = {"arrowstyle": "-|>,head_width=0.14,head_length=0.28", "color": _TRIAD, "lw": 1.0}
+        axes.annotate("", (x + right, y + up), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
+        beyond = 6 / float(np.hypot(right, up))
+        offset = (beyond * right, beyond * up)
+        told: dict[str, Any] = {"ha": "center", "va": "center", "size": 8, "zorder": 9}
+        axes.annotate(name, (x + right, y + up), xytext=offset, textcoords="offset points", **told)
+    lowest = y + float((at.arm * VIEW[1]).min()) / scale.size
+    told = {"ha": "center", "va": "center", "size": 7.5, "zorder": 9, "color": _TRIAD}
+    axes.annotate(f"each {quantity(at.arm, 'm', 1)}", (x, lowest), xytext=(0, -11), textcoords="offset points", **told)
+
+
+def _draw_bar(figure: "Figure", bar: Bar, top: float) -> None:
+    """Draw a bar of colours with its label above, whose upper edge is at `top` [inch]."""
+    width, height = figure.get_size_inches()
+    figure.text(_SIDE / width, (top - 0.07) / height, bar.label, size=8, va="center")
+    axes = figure.add_axes((_SIDE / width, (top - 0.26) / height, 2.6 / width, 0.09 / height), gid="bar")
+    colors = error_colors(np.linspace(0, 1, 256))[None]
+    axes.imshow(colors, extent=(0, bar.largest or 1.0, 0, 1), aspect="auto")
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.locator_params(axis="x", nbins=5)
+    axes.tick_params(labelsize=7.5, length=2.5, pad=1.5)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(True)

@@ -1,0 +1,66 @@
+"""Legends above a picture: many times faster than matplotlib's own, and in as few rows as the room allows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from truespring.report.style import text_width
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Widths [inch]: the sample of a line, the gap to its text, the gap to the next column.
+_SAMPLE, _GAP, _COLUMNS_APART = 0.18, 0.06, 0.13
+
+#: The height of a row [inch].
+ROW = 0.18
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A line of a legend: what it stands for, its colour and its mark."""
+
+    text: str
+    color: str
+    marker: str = ""
+    linestyle: Any = "-"
+
+
+def legend_columns(entries: Sequence[Entry], room: float) -> tuple[list[Sequence[Entry]], float]:
+    """Return a legend in columns, of the fewest rows that `room` [inch] allows, and how wide it is [inch]."""
+    columns: list[Sequence[Entry]] = []
+    width = 0.0
+    for rows in range(1, len(entries) + 1):
+        columns = [entries[start : start + rows] for start in range(0, len(entries), rows)]
+        width = sum(_column_width(column) for column in columns) - _COLUMNS_APART
+        if width <= room:
+            break
+    return columns, width
+
+
+def _column_width(column: Sequence[Entry]) -> float:
+    return _SAMPLE + _GAP + max(text_width(one.text, 8) for one in column) + _COLUMNS_APART
+
+
+def draw_legend(figure: "Figure", columns: Sequence[Sequence[Entry]], left: float, top: float) -> None:
+    """Draw a legend whose upper left corner is at (left, top) [inch]."""
+    from matplotlib.lines import Line2D
+
+    for column in columns:
+        for row, one in enumerate(column):
+            y = top - ROW * (row + 0.5)
+            sample = Line2D(
+                [left, left + _SAMPLE / 2, left + _SAMPLE],
+                [y, y, y],
+                color=one.color,
+                ls=one.linestyle,
+                lw=1.4,
+                marker=one.marker,
+                ms=5,
+                markevery=[1],
+                transform=figure.dpi_scale_trans,
+            )
+            figure.add_artist(sample)
+            at = left + _SAMPLE + _GAP
+            figure.text(at, y, one.text, size=8, va="center_baseline", transform=figure.dpi_scale_trans)
+        left += _column_width(column)

@@ -1,0 +1,49 @@
+"""Numbers as base64, for a page."""
+
+import base64
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+
+
+class Packing:
+    """Places in 65536 steps of a box, far below a pixel, and pairs or triples of the nodes that are kept.
+
+    Places beyond the box are written as single precision numbers of the same steps.
+    """
+
+    def __init__(self, lower: Floats, extent: float, nodes: Ints, n_nodes: int) -> None:
+        """Take the box's lower corner [m], its longest edge [m], and which of `n_nodes` nodes are kept."""
+        self.lower, self.extent, self.nodes = lower, extent or 1.0, nodes
+        self._number = np.full(n_nodes, -1)
+        self._number[nodes] = np.arange(len(nodes))
+
+    def steps(self, length: float) -> float:
+        """Return a length [m] in steps."""
+        return 65535 * length / self.extent
+
+    def number(self, node: int) -> int:
+        """Return the place of a node among those that are kept."""
+        return int(self._number[node])
+
+    def places(self, positions: Floats, beyond: bool = False) -> str:
+        """Pack the positions of the nodes that are kept; of all nodes, shape (n_nodes, dim) [m]."""
+        return self.points(positions[self.nodes], beyond)
+
+    def points(self, points: Floats, beyond: bool = False) -> str:
+        """Pack points that are no nodes [m], shape (n, dim)."""
+        steps = 65535 * (points - self.lower) / self.extent
+        return _base64(steps.astype("<f4") if beyond else np.rint(steps).astype("<u2"))
+
+    def pairs(self, lines: Ints) -> str:
+        """Pack node numbers, shape (n, k), as places among the nodes that are kept."""
+        return self.numbers(self._number[lines])
+
+    def numbers(self, values: Ints) -> str:
+        """Pack numbers as they are."""
+        return _base64(values.astype("<u4"))
+
+
+def _base64(array: np.ndarray) -> str:
+    return base64.b64encode(array.tobytes()).decode()

@@ -1,0 +1,229 @@
+"""Bodies in 3D as images: by PyVista in a child process, or by matplotlib where that is not to be had.
+
+Both are given the same faces, coloured and lit beforehand, and the same lines: they find what hides what.
+"""
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.arrays import Floats, Ints
+
+#: An image: red, green, blue and opacity in 0 ... 255, shape (height, width, 4), the upper row first.
+Image = NDArray[np.uint8]
+
+# The child that draws may take so many seconds, and so many more for each image: software rendering on a slow machine.
+_PATIENCE, _PATIENCE_EACH = 60.0, 20.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Layer:
+    """Lines, hidden where faces are nearer to the eye. The faces are to be seen where they have colours.
+
+    All places are as `surfaces.seen` gives them.
+
+    Attributes:
+        faces: their corners [m], shape (n_faces, 3 or 4, 3).
+        colors: of every corner, 0 ... 1, shape (n_faces, 3 or 4, 3); None where faces hide lines and no more.
+        lines: their ends [m], shape (n_lines, 2, 3).
+        owners: two faces that each line lies on, shape (n_lines, 2); empty where lines lie on none.
+        ink: the colour of the lines, as #rrggbb.
+        width: of the lines [points].
+    """
+
+    faces: Floats
+    colors: Floats | None
+    lines: Floats
+    owners: Ints
+    ink: str
+    width: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Shot:
+    """What one image shows: layers, each over the one before.
+
+    Attributes:
+        layers: what is drawn.
+        lower, upper: the corners of the image, right and up [m], shape (2,).
+        size: width and height [pixels].
+        points: the size of a typographical point [pixels].
+    """
+
+    layers: tuple[Layer, ...]
+    lower: Floats
+    upper: Floats
+    size: tuple[int, int]
+    points: float
+
+
+def render(shots: Sequence[Shot]) -> tuple[list[Image], str]:
+    """Return an image of each shot, and where PyVista did not draw them why, and the way out."""
+    if importlib.util.find_spec("pyvista") is None:
+        images, why = None, "PyVista is not installed; pip install 'truespring[3d]' brings it"
+    else:
+        images, why = _by_child(shots)
+    if images is not None:
+        return images, ""
+    return [draw(shot) for shot in shots], f"The pictures in 3D are drawn by matplotlib, more coarsely: {why}."
+
+
+def _command(job: Path, answer: Path) -> list[str]:
+    """The child that draws; -P keeps a file of the user's own folder from being taken for a library."""
+    return [sys.executable, "-P", "-m", "truespring.report.offscreen", str(job), str(answer)]
+
+
+def _by_child(shots: Sequence[Shot]) -> tuple[list[Image] | None, str]:
+    """Have a child draw, so that a graphics library that crashes or hangs takes no results with it."""
+    patience = _PATIENCE + _PATIENCE_EACH * len(shots)
+    with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
+        job, answer = Path(folder) / "job.npz", Path(folder) / "images.npz"
+        write_job(shots, job)
+        try:
+            done = subprocess.run(
+                _command(job, answer), stdin=subprocess.DEVNULL, capture_output=True, timeout=patience, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return None, f"PyVista's process took more than {patience:.0f} s"
+        except OSError as error:
+            return None, f"PyVista's process could not be started ({error})"
+        if done.returncode or not answer.exists():
+            return None, f"PyVista's process {_ending(done.returncode, done.stderr)}; {_NEEDS}"
+        with np.load(answer) as file:
+            images = [file[f"image_{number}"] for number in range(len(shots))]
+        if not all(image[..., 3].any() for image in images):
+            return None, f"PyVista drew nothing; {_NEEDS}"
+        return images, ""
+
+
+_NEEDS = "on Linux it needs a display, or libegl1 and libgl1-mesa-dri"
+
+
+def _ending(code: int, said: bytes) -> str:
+    """How a process ended, and the last that it said."""
+    lines = re.sub(r"\x1b\[[\d;]*m", "", said.decode(errors="replace")).strip().splitlines()
+    last = lines[-1].split("| ")[-1].strip()[:160].rstrip(".") if lines else ""
+    ended = f"was ended by signal {-code}" if code < 0 else f"failed (exit code {code})"
+    return f"{ended}, saying: {last}" if last else ended
+
+
+def write_job(shots: Sequence[Shot], file: Path) -> None:
+    """Write shots to an .npz file."""
+    arrays: dict[str, Any] = {}
+    words = []
+    for number, shot in enumerate(shots):
+        arrays[f"{number}_box"] = np.stack([shot.lower, shot.upper])
+        layers = [{"ink": one.ink, "width": one.width, "filled": one.colors is not None} for one in shot.layers]
+        words.append({"size": shot.size, "points": shot.points, "layers": layers})
+        for place, layer in enumerate(shot.layers):
+            for name in ("faces", "colors", "lines", "owners"):
+                values = getattr(layer, name)
+                arrays[f"{number}_{place}_{name}"] = np.zeros(0) if values is None else values
+    np.savez(file, words=np.array(json.dumps(words)), **arrays)
+
+
+def read_job(file: Path) -> list[Shot]:
+    """Read what `write_job` wrote."""
+    with np.load(file) as job:
+        return [
+            Shot(
+                layers=tuple(
+                    Layer(
+                        job[f"{number}_{place}_faces"],
+                        job[f"{number}_{place}_colors"] if layer["filled"] else None,
+                        job[f"{number}_{place}_lines"],
+                        job[f"{number}_{place}_owners"],
+                        layer["ink"],
+                        layer["width"],
+                    )
+                    for place, layer in enumerate(shot["layers"])
+                ),
+                lower=job[f"{number}_box"][0],
+                upper=job[f"{number}_box"][1],
+                size=tuple(shot["size"]),
+                points=shot["points"],
+            )
+            for number, shot in enumerate(json.loads(str(job["words"])))
+        ]
+
+
+def rgb(color: str) -> Floats:
+    """Return red, green and blue, 0 ... 1, of a colour as #rrggbb."""
+    return np.array([int(color[start : start + 2], 16) for start in (1, 3, 5)]) / 255
+
+
+def inked(coverage: Image, ink: str) -> Image:
+    """Return an image of one colour that covers each pixel by 0 ... 255."""
+    image = np.empty((*coverage.shape, 4), dtype=np.uint8)
+    image[..., :3] = np.rint(255 * rgb(ink))
+    image[..., 3] = coverage
+    return image
+
+
+def stacked(images: Sequence[Image]) -> Image:
+    """Return images one over the other as one."""
+    below = images[0].astype(np.float32) / 255
+    for image in images[1:]:
+        above = image.astype(np.float32) / 255
+        share = above[..., 3:]
+        rest = (1 - share) * below[..., 3:]
+        opacity = share + rest
+        color = (share * above[..., :3] + rest * below[..., :3]) / np.where(opacity > 0, opacity, 1)
+        below = np.concatenate([color, opacity], axis=2)
+    return np.rint(255 * below).astype(np.uint8)
+
+
+def draw(shot: Shot) -> Image:
+    """Draw a shot by matplotlib: what is farther first, each face in one colour."""
+    return stacked([_draw_layer(layer, shot) for layer in shot.layers])
+
+
+def _draw_layer(layer: Layer, shot: Shot) -> Image:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    filled = layer.colors is not None
+    n_faces, k = layer.faces.shape[:2]
+    depth = layer.faces[:, :, 2].mean(axis=1)
+    # A line comes after the faces that it lies on: a polygon there and back, so that both are of one kind.
+    near = depth[layer.owners].max(axis=1) if len(layer.owners) else layer.lines[:, :, 2].mean(axis=1)
+    strokes = layer.lines[:, [0] + [1] * (k - 1)]
+    corners = np.concatenate([layer.faces, strokes])[:, :, :2]
+    order = np.lexsort((np.arange(len(corners)) >= n_faces, np.concatenate([depth, near])))
+    if layer.colors is not None:
+        fill, line = layer.colors.mean(axis=1), rgb(layer.ink)
+    else:
+        fill, line = np.zeros((n_faces, 3)), np.ones(3)
+    edge = np.concatenate([fill, np.broadcast_to(line, (len(strokes), 3))])
+    inside = np.concatenate([np.column_stack([fill, np.ones(n_faces)]), np.zeros((len(strokes), 4))])
+    widths = np.concatenate([np.full(n_faces, 0.4), np.full(len(strokes), layer.width)])
+    dpi = 72 * shot.points
+    figure = Figure(figsize=(shot.size[0] / dpi, shot.size[1] / dpi), dpi=dpi)
+    figure.patch.set(facecolor="black", alpha=0.0 if filled else 1.0)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.set(xlim=(shot.lower[0], shot.upper[0]), ylim=(shot.lower[1], shot.upper[1]))
+    polygons = PolyCollection(
+        corners[order],  # type: ignore[arg-type]
+        facecolors=inside[order],
+        edgecolors=edge[order],
+        linewidths=widths[order],
+        joinstyle="round",
+        capstyle="round",
+    )
+    axes.add_collection(polygons, autolim=False)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    image = np.array(canvas.buffer_rgba())
+    return image if filled else inked(image[..., 0], layer.ink)

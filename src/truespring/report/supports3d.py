@@ -1,0 +1,87 @@
+"""Supports of a body in 3D: clamped faces hatched at their rim, other nodes on pins and rollers."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.report.quantity import Scale
+from truespring.report.result import Result
+from truespring.report.surfaces import VIEW, facets_of, normals, seen
+from truespring.report.symbols import draw_pin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SUPPORT = "#3d4248"
+
+
+def clamped_nodes(result: Result) -> Bools:
+    """Tell which nodes are held in every direction, shape (n_nodes,)."""
+    loading = result.problem.loading
+    return np.asarray((loading.held & (loading.displacement == 0)).all(axis=1))
+
+
+def draw_supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
+    """Hatch the rim of clamped faces; nodes that are held besides stand on pins or rollers. `size` of a stroke [m]."""
+    mesh, loading = result.problem.mesh, result.problem.loading
+    points, facets = seen(mesh.nodes), facets_of(mesh)
+    facing = normals(points, facets)
+    clamped = clamped_nodes(result)
+    patch = np.flatnonzero(clamped[facets].all(axis=1))
+    _hatch(axes, points, facets[patch], facing[patch], scale, size)
+    hatched = np.zeros(mesh.n_nodes, dtype=bool)
+    hatched[facets[patch]] = True
+    visible = np.zeros(mesh.n_nodes, dtype=bool)
+    visible[facets[facing[:, 2] > 0]] = True
+    still = loading.held & (loading.displacement == 0) & ~hatched[:, None]
+    pinned = still.all(axis=1)
+    for node in _thinned(mesh.nodes, np.flatnonzero(pinned), 3.2 * size):
+        at = points[node, :2] / scale.size
+        draw_pin(axes, at, np.array([0.0, -1.0]), roller=False, zorder=6 if visible[node] else 1.5)
+    centre = (mesh.lower + mesh.upper) / 2
+    for axis in range(3):
+        for node in _thinned(mesh.nodes, np.flatnonzero(still[:, axis] & ~pinned), 3.2 * size):
+            away = VIEW[:2, axis] * (1.0 if mesh.nodes[node, axis] > centre[axis] else -1.0)
+            away = away / np.linalg.norm(away)
+            draw_pin(axes, points[node, :2] / scale.size, away, zorder=6 if visible[node] else 1.5)
+
+
+def _thinned(places: Floats, nodes: Ints, spacing: float) -> Ints:
+    """Of nodes, one in each cube of an edge `spacing` [m]."""
+    cubes = np.floor(places[nodes] / spacing + 1e-6)
+    return np.asarray(nodes[np.unique(cubes, axis=0, return_index=True)[1]])
+
+
+def _hatch(axes: "Axes", points: Floats, facets: Ints, facing: Floats, scale: Scale, size: float) -> None:
+    """Short strokes out of the rim of a patch of facets, those that face away behind the body."""
+    if not len(facets):
+        return
+    around = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2)
+    edges = around.reshape(-1, 2)
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    rim = first[count == 1]
+    starts, ends, owner = points[edges[rim, 0]], points[edges[rim, 1]], rim // facets.shape[1]
+    length = np.linalg.norm(ends - starts, axis=1)
+    for front, zorder in ((True, 5), (False, 1.5)):
+        strokes = []
+        for at in np.flatnonzero((facing[owner, 2] > 0) == front):
+            n_strokes = max(1, round(float(length[at]) / (0.6 * size)))
+            along = (ends[at] - starts[at]) / n_strokes
+            foot = starts[at] + along * (np.arange(n_strokes)[:, None] + 0.5)
+            slant = size * (facing[owner[at]] - 0.7 * along / np.linalg.norm(along))
+            strokes.append(np.stack([foot, foot + slant], axis=1))
+        if strokes:
+            draw_lines(axes, np.concatenate(strokes)[:, :, :2] / scale.size, _SUPPORT, 0.9, zorder, "support")
+            sides = points[edges[rim[(facing[owner, 2] > 0) == front]]][:, :, :2]
+            draw_lines(axes, sides / scale.size, _SUPPORT, 2.2, zorder, "clamped")
+
+
+def draw_lines(axes: "Axes", ends: Floats, color: str, width: float, zorder: float, name: str, **more: Any) -> None:
+    """Draw segments between ends on paper, in units of the axes, shape (n, 2, 2)."""
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(
+        LineCollection(list(ends), colors=color, linewidths=width, zorder=zorder, gid=name, clip_on=False, **more),
+        autolim=False,
+    )

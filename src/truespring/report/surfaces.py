@@ -1,0 +1,88 @@
+"""The surface of a body in 3D: triangles, normals, the lines that lie on it, and how it is seen on paper."""
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.mesh import Mesh
+
+# Where the eye is: at the front, to the right and above, far away. y is up, as bottom and top say.
+_TOWARDS = (0.55, 0.5, 1.0)
+
+# Neighbours that meet at more than this angle have a sharp edge between them.
+_SHARP = np.cos(np.radians(30))
+
+
+def _axes_of_view() -> Floats:
+    towards = np.array(_TOWARDS) / np.linalg.norm(_TOWARDS)
+    right = np.cross([0.0, 1.0, 0.0], towards)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+#: Unit vectors to the right, upwards and towards the eye, shape (3, 3).
+VIEW = _axes_of_view()
+
+
+def seen(points: Floats) -> Floats:
+    """Return how far points, shape (..., 3), lie to the right, up and towards the eye, in their own unit."""
+    return np.asarray(points @ VIEW.T)
+
+
+def facets_of(mesh: Mesh) -> Ints:
+    """Return the facets that bound a body, outward and anticlockwise, shape (n, 3 or 4); of a network none."""
+    return mesh.boundary if mesh.boundary.shape[1] > 2 else np.zeros((0, 3), dtype=np.int64)
+
+
+def triangles_of(facets: Ints) -> Ints:
+    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3)."""
+    if facets.shape[1] == 3:
+        return facets
+    return np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
+
+
+def normals(points: Floats, facets: Ints) -> Floats:
+    """Return the unit normals of facets, shape (n, 3); zero where a facet is flat."""
+    a, b, c, d = (points[facets[:, corner]] for corner in (0, 1, 2, -1))
+    across = np.cross(c - a, d - b) if facets.shape[1] == 4 else np.cross(b - a, c - a)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return np.asarray(across / np.where(length > 0, length, 1.0))
+
+
+def lines_on(facets: Ints, lines: Ints) -> tuple[Bools, Ints]:
+    """Tell which lines, shape (n, 2), join two nodes of one facet, and of these the first and last such facet.
+
+    Shapes (n,) and (m, 2).
+    """
+    k = facets.shape[1]
+    pairs = np.array([(i, j) for j in range(k) for i in range(j)])
+    n_nodes = int(max(facets.max(initial=0), lines.max(initial=0))) + 1
+
+    def keys(ends: Ints) -> Ints:
+        ordered = np.sort(ends, axis=-1)
+        return np.asarray(ordered[..., 0] * n_nodes + ordered[..., 1])
+
+    of_facets = keys(facets[:, pairs]).ravel()
+    order = np.argsort(of_facets, kind="stable")
+    known, wanted = of_facets[order], keys(lines)
+    first, last = (np.searchsorted(known, wanted, side) for side in ("left", "right"))
+    on = first < last
+    return on, np.stack([order[first[on]], order[last[on] - 1]], axis=1) // len(pairs)
+
+
+def edges_of(facets: Ints) -> Ints:
+    """Return every edge of the facets once, shape (n, 2)."""
+    around = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    return np.unique(np.sort(around, axis=1), axis=0)
+
+
+def outline(points: Floats, facets: Ints, silhouette: bool = False) -> Ints:
+    """Return the sharp edges of a surface, and with `silhouette` those where `seen` points turn away, shape (n, 2)."""
+    edges = edges_of(facets)
+    if not len(edges):
+        return edges
+    _, sides = lines_on(facets, edges)
+    first, second = (normals(points, facets)[sides[:, side]] for side in (0, 1))
+    drawn = (first * second).sum(axis=1) < _SHARP
+    if silhouette:
+        drawn |= (first[:, 2] > 0) != (second[:, 2] > 0)
+    return np.asarray(edges[drawn])

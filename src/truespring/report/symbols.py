@@ -1,0 +1,139 @@
+"""Marks on a picture of a body: the probe, loads and prescribed motions as arrows, supports on pins and rollers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.mesh import select
+from truespring.report.quantity import Scale, given
+from truespring.report.result import Result
+from truespring.report.style import LOAD, MOTION, POINT, RED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: From places of a body [m], shape (n, dim), to places on paper [m], shape (n, 2).
+View = Callable[[Floats], Floats]
+
+
+def as_it_is(points: Floats) -> Floats:
+    """Look at a plane body."""
+    return points
+
+
+def draw_dot(axes: "Axes", point: Floats) -> None:
+    """Draw the red dot of the probe."""
+    axes.plot(*point, "o", color=RED, ms=5.5, mec="white", mew=0.6, zorder=10, gid="probe", clip_on=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """A load or a prescribed motion on paper: from tail to head [m], the nodes it acts on, what is written beside it.
+
+    `side` is 1 where the text stands to the right, -1 where to the left; it ends before `room`.
+    """
+
+    ends: tuple[Floats, Floats]
+    side: int
+    room: Floats
+    nodes: Ints
+    text: str
+    color: str
+
+
+def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arrow]:
+    """Return the arrows of all loads and motions of a body that is about `size` [m] large."""
+    mesh = result.problem.mesh
+    acting = [(load.on, np.array(load.total, dtype=float), "N", LOAD) for load in result.problem.loads]
+    acting += [
+        (support.on, np.array(support.displacement, dtype=float), "m", MOTION)
+        for support in result.problem.supports
+        if support.displacement is not None
+    ]
+    middle = (mesh.lower + mesh.upper) / 2
+    found = []
+    for on, vector, unit, color in acting:
+        if not vector.any():
+            continue
+        nodes = select(mesh, on)
+        direction = vector / np.linalg.norm(vector)
+        centre = mesh.nodes[nodes].mean(axis=0)
+        outward = centre - middle
+        along = float(direction @ outward)
+        length = 0.13 * size * direction
+        gap = 0.025 * size
+        if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # it pulls or presses: off the body's face
+            tail = centre + gap * direction if along > 0 else centre - gap * direction - length
+        else:  # it shears: beside the face
+            beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
+            tail = centre + 2 * gap * beside - length / 2
+        symbol = "F" if unit == "N" else "u"
+        text = f"{symbol} = {given(float(np.linalg.norm(vector)), unit)}"
+        start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
+        side = 1 if seen[0] + 1e-9 * size >= seen_middle[0] else -1
+        near = start if (side > 0) == (end[0] >= start[0]) else end
+        found.append(Arrow((start, end), side, near + np.array([side * 0.24 * size, 0.0]), nodes, text, color))
+    return found
+
+
+def draw_arrow(axes: "Axes", arrow: Arrow, scale: Scale) -> None:
+    """Draw an arrow with its text."""
+    (x, y), (to_x, to_y) = (end / scale.size for end in arrow.ends)
+    style = {"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": arrow.color, "lw": 1.8}
+    axes.annotate("", (to_x, to_y), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
+    upright = abs(to_y - y) > abs(to_x - x)
+    axes.annotate(
+        arrow.text,
+        (min(x, to_x) if arrow.side > 0 else max(x, to_x), (y + to_y) / 2),
+        xytext=(7 * arrow.side, 0 if upright else 7),
+        textcoords="offset points",
+        ha="left" if arrow.side > 0 else "right",
+        va="center" if upright else "bottom",
+        color=arrow.color,
+        zorder=11,
+        bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.8},
+    )
+
+
+def draw_loaded(axes: "Axes", points: Floats, color: str) -> None:
+    """Draw dots where a load or a motion acts, in units of the axes."""
+    axes.plot(*points.T, "o", color=color, ms=3, zorder=8, ls="", gid="loaded")
+
+
+# A unit of a pin is half of 11 points; the line under a roller is its widest part.
+_SYMBOL = 11.0
+#: The width of a roller [inch].
+ROLLER = 1.4 * _SYMBOL / 2 * POINT
+
+
+def draw_pin(
+    axes: "Axes",
+    point: Floats,
+    away: Floats,
+    beside: Floats | None = None,
+    roller: bool = True,
+    zorder: float = 6,
+) -> None:
+    """Draw a triangle whose tip touches the node; under a roller a line, set off. Sized in points, as text is.
+
+    With `beside` it stands off the node on an arm, so that it does not cover the edge that it runs along.
+    """
+    from matplotlib.path import Path as Outline
+
+    across = np.array([-away[1], away[0]])
+    corners = [np.zeros(2), away + 0.55 * across, away - 0.55 * across, np.zeros(2)]
+    codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
+    if roller:
+        corners += [1.35 * away + 0.7 * across, 1.35 * away - 0.7 * across]
+        codes += [Outline.MOVETO, Outline.LINETO]
+    if beside is not None and beside.any():
+        corners = [np.zeros(2)] + [corner + beside for corner in corners]
+        codes = [Outline.MOVETO, Outline.LINETO, *codes[1:]]
+    symbol = Outline(np.array(corners), codes)
+    size = _SYMBOL * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
+    axes.plot(
+        *point, marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=zorder, ls="", gid="support"
+    )

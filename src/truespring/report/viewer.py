@@ -1,0 +1,117 @@
+"""What the page's pictures that move are drawn from: the positions of every path at every load level, packed."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.equilibrium import Path
+from truespring.report.bodies import magnification, path_lines, picture_box
+from truespring.report.packing import Packing
+from truespring.report.quantity import natural_scale, percent, quantity, times
+from truespring.report.result import Result
+from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
+from truespring.report.style import full_name
+from truespring.report.verdict import drive
+
+
+def viewer(result: Result, budget: int) -> dict[str, Any] | None:
+    """Return what a study's moving picture is drawn from, as values that JSON can hold.
+
+    None where nothing moves, or where it would take more than `budget` numbers.
+    """
+    mesh = result.problem.mesh
+    shown = _shown(result)
+    nodes = scene_nodes(result, shown) if mesh.dim == 3 else np.arange(mesh.n_nodes)
+    if not shown:
+        return None
+    levels = _levels(result.paths[shown[0]], budget // (mesh.dim * len(nodes) * len(shown)))
+    if len(levels) < 2:
+        return None
+    factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
+    first, *others = (_cloud(result.paths[name], factor) for name in shown)
+    lower, upper, leaves = picture_box(np.concatenate([mesh.nodes, first]), others)
+    extent = upper - lower
+    pack = Packing(lower, float(extent.max()), nodes, mesh.n_nodes)
+    scale = natural_scale(float(extent.max()), "m")
+    closest = shown.index(result.closest) - 1 if result.closest in shown else 0
+    values = {
+        "magnified": f"displacements {times(factor)}" if factor != 1 else "",
+        "motion": not result.problem.loads,
+        "unit": scale.unit,
+        "box": [float(value) for value in extent / scale.size],
+        "n_nodes": len(nodes),
+        "probe": pack.number(result.probe),
+        "chosen": closest,
+        "rest": pack.places(mesh.nodes),
+        "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
+        "paths": [
+            _path(result, name, levels, pack, factor, beyond)
+            for name, beyond in zip(shown, [False, *leaves], strict=True)
+        ],
+    }
+    return {**values, **surface_in_scene(mesh, pack)} if mesh.dim == 3 else values
+
+
+def _shown(result: Result) -> list[str]:
+    """The paths that are drawn: the model, then all that it can be laid over; none where the model does not move."""
+    order = [result.model] if result.model is not None else []
+    names = order + [name for name in result.paths if name not in order]
+    shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
+    shown = [name for name in shown if result.paths[name].states or _only_surface(result.paths[name])]
+    return shown if shown and shown[0] == names[0] else []
+
+
+def _only_surface(path: Path) -> bool:
+    """Whether a path was read from a file that does not tell where each node went."""
+    return path.surface is not None and not path.states
+
+
+def _cloud(path: Path, factor: float) -> Floats:
+    """Every place [m] that the viewer draws of a path, shape (n, dim)."""
+    clouds = [path.problem.mesh.nodes + factor * state.displacement for state in path.states]
+    return np.concatenate(clouds + ([path.surface.points] if path.surface is not None and factor == 1 else []))
+
+
+def _levels(path: Path, budget: int) -> list[float]:
+    """The load levels to keep so that no more than `budget` states are: every n-th, first and last always."""
+    levels = path.load_factors.tolist()
+    step = max(1, -(-len(levels) // max(budget - 1, 1)))
+    return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
+
+
+def _path(
+    result: Result, name: str, levels: Sequence[float], pack: Packing, factor: float, beyond: bool
+) -> dict[str, Any]:
+    """What is drawn and told of a path; `beyond` tells that it leaves the picture, `factor` magnifies."""
+    path = result.paths[name]
+    to = drive(result)
+    rest = path.problem.mesh.nodes
+    states = [state for level in levels if (state := path.at(level)) is not None]
+    one = result.comparisons.get(name)
+    known = dict(zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True)) if one else {}
+    errors = [next((error for at, error in known.items() if abs(at - s.load_factor) < 1e-9), None) for s in states]
+    values: dict[str, Any] = {
+        "name": name,
+        "label": full_name(result, name),
+        "kind": path.kind,
+        "beyond": beyond,
+        "levels": [state.load_factor for state in states],
+        "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
+        "force": [quantity(to.along(path.applied_force(state)), "N") for state in states],
+        "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
+        "errors": [None if error is None else percent(error) for error in errors],
+        "surface": None,
+    }
+    if rest.shape[1] == 3:
+        return {**values, **path_in_scene(result, name, states, pack, factor)}
+    values["lines"] = pack.pairs(path_lines(path))
+    if path.surface is not None and factor == 1:
+        surface = path.surface
+        values["surface"] = {
+            "level": surface.load_factor,
+            "points": pack.points(surface.points, beyond),
+            "lines": pack.numbers(surface.outline),
+        }
+    return values

@@ -1,0 +1,242 @@
+"""Young's modulus by direction: a curve about the origin in the plane, a surface in space."""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats
+from truespring.models import Moduli
+from truespring.report.quantity import natural_scale, quantity
+from truespring.report.style import _SPRING_STYLES, BLUE, INK, LOAD, figure_style
+from truespring.report.surfaces import VIEW, seen
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap, Normalize
+    from matplotlib.figure import Figure
+
+_TITLE = "Young's modulus by direction"
+_MOST_COLUMNS = 3
+_DPI = 130
+
+# A panel of the figure in space, what stands above and below all of them [inch].
+_PANEL, _CAPTION, _TOP, _FOOT = 2.5, 0.42, 0.36, 0.62
+
+# Light on surfaces comes from above, left of the eye; the least that a facet away from it gets.
+_LIGHT, _DIMMEST = np.array([-0.35, 0.55, 0.76]), 0.62
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Known:
+    """Moduli to be drawn, how they are called, and the colour and dashes of their curve."""
+
+    label: str
+    moduli: Moduli
+    color: str
+    dashes: Any
+
+
+def save_young(several: Mapping[str, Moduli], material: str, folder: FilePath) -> FilePath:
+    """Write the figure of springs by their labels as moduli.png and moduli.svg into `folder`; return the first."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    looks = itertools.cycle(_SPRING_STYLES)
+    known = [Known(label, moduli, *look[:2]) for (label, moduli), look in zip(several.items(), looks, strict=False)]
+    folder.mkdir(parents=True, exist_ok=True)
+    with figure_style():
+        figure = young_figure(known, material)
+        FigureCanvasAgg(figure)
+        figure.savefig(folder / "moduli.png", dpi=_DPI)
+        figure.savefig(folder / "moduli.svg", metadata={"Date": None})
+    return folder / "moduli.png"
+
+
+def young_figure(several: Sequence[Known], material: str) -> "Figure":
+    """Young's modulus in a test along every direction, of springs beside the `material`, as its moduli are called."""
+    return (_surfaces if several[0].moduli.dim == 3 else _polar)(several, material)
+
+
+def _polar(several: Sequence[Known], material: str) -> "Figure":
+    """The springs' curves against the material's circle."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    wanted = several[0].moduli.young_wanted
+    angles = np.radians(np.arange(0.0, 361.0))
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    largest = max(wanted, *(known.moduli.young_range[1] for known in several))
+    scale = natural_scale(largest, "Pa")
+    figure = Figure(figsize=(3.9, 4.25 + 0.18 * len(several)), label=_TITLE)
+    total = figure.get_size_inches()
+    foot = (0.65 + 0.18 * len(several)) / total[1]
+    axes = figure.add_axes((0.12, foot, 0.76, 0.76 * total[0] / total[1]), projection="polar")
+    axes.plot(angles, np.full(angles.shape, wanted / scale.size), color=INK, lw=1.3, ls=(0, (5, 2)))
+    handles = [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))]
+    labels = [f"{material}: {quantity(wanted, 'Pa')}"]
+    for known in several:
+        values = known.moduli.young_along(directions)
+        axes.plot(angles, values / scale.size, color=known.color, lw=2, ls=known.dashes)
+        handles.append(Line2D([], [], color=known.color, lw=2, ls=known.dashes))
+        extremes = dict.fromkeys(quantity(value, "Pa") for value in known.moduli.young_range)
+        labels.append(f"{known.label}: {' to '.join(extremes)}")
+    axes.set_ylim(0, 1.12 * largest / scale.size)
+    axes.set_yticks(_ticks(largest / scale.size))
+    axes.set_rlabel_position(22.5)  # type: ignore[attr-defined]
+    axes.set_thetagrids(np.arange(0, 360, 45))  # type: ignore[attr-defined]
+    axes.tick_params(pad=2)
+    axes.spines["polar"].set_visible(False)
+    figure.text(0.5, 1 - 0.19 / total[1], f"{_TITLE} [{scale.unit}]", weight="bold", size=9, va="center", ha="center")
+    figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 0.02), borderpad=0, fontsize=8)
+    return figure
+
+
+def _ticks(largest: float) -> Floats:
+    """Three or four round numbers from zero on."""
+    from matplotlib.ticker import MaxNLocator
+
+    ticks = np.asarray(MaxNLocator(4).tick_values(0, largest))
+    return ticks[(ticks > 0) & (ticks <= 1.1 * largest)]
+
+
+# --- in space ---------------------------------------------------------------------------------------
+
+
+def _surfaces(several: Sequence[Known], material: str) -> "Figure":
+    """A surface for each springs model, its radius and colour E over the material's, which is the sphere of wires."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
+
+    columns = min(len(several), _MOST_COLUMNS)
+    rows = math.ceil(len(several) / columns)
+    width = max(columns * _PANEL, 3.6)
+    height = _TOP + rows * (_PANEL + _CAPTION) + _FOOT
+    figure = Figure(figsize=(width, height), label=_TITLE, dpi=200)
+    figure.text(0.5, 1 - 0.19 / height, _TITLE, weight="bold", size=9, va="center", ha="center")
+    shares = np.array([known.moduli.young_range for known in several]) / several[0].moduli.young_wanted
+    facets = [_facets(known.moduli) for known in several]
+    extent = max(1.0, *(float(np.abs(corners[..., :2]).max()) for corners, _ in facets))
+    farthest = max(1.1, float(np.exp(np.abs(np.log(shares)).max())))
+    colors, norm = _colors(farthest)
+    left = (width - columns * _PANEL) / 2
+    for place, known in enumerate(several):
+        row, column = divmod(place, columns)
+        bottom = height - _TOP - (row + 1) * (_PANEL + _CAPTION)
+        corner = (left + column * _PANEL, bottom + _CAPTION)
+        axes = figure.add_axes((corner[0] / width, corner[1] / height, _PANEL / width, _PANEL / height))
+        axes.set(xlim=(-1.3 * extent, 1.3 * extent), ylim=(-1.3 * extent, 1.3 * extent), aspect="equal")
+        axes.set_axis_off()
+        _draw_surface(axes, *facets[place], lambda share: colors(norm(share)))
+        _draw_sphere(axes, known.moduli)
+        _draw_axes(axes, known.moduli, extent)
+        middle = (corner[0] + _PANEL / 2) / width
+        extremes = " to ".join(dict.fromkeys(f"{value:.2f}" for value in shares[place]))
+        figure.text(
+            middle, (bottom + 0.3) / height, known.label, color=INK, size=8, weight="bold", va="center", ha="center"
+        )
+        figure.text(middle, (bottom + 0.13) / height, extremes, color=INK, size=8, va="center", ha="center")
+    bar = figure.add_axes((0.5 - 1.2 / width, 0.4 / height, 2.4 / width, 0.09 / height))
+    figure.colorbar(ScalarMappable(norm, colors), cax=bar, orientation="horizontal")
+    marks = _marks(farthest)
+    bar.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    bar.minorticks_off()
+    bar.tick_params(length=2, pad=2, labelsize=7)
+    wanted = quantity(several[0].moduli.young_wanted, "Pa")
+    under = f"times that of the {material}, {wanted} (the sphere)"
+    figure.text(0.5, 0.11 / height, under, size=7.5, va="center", ha="center")
+    return figure
+
+
+def _colors(farthest: float) -> "tuple[Colormap, Normalize]":
+    """Orange where springs are softer than the material, blue where stiffer, on a scale of factors."""
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm
+
+    middle = "#eef0f2"
+    return LinearSegmentedColormap.from_list("young", [LOAD, middle, BLUE]), LogNorm(1 / farthest, farthest)
+
+
+def _marks(farthest: float) -> list[float]:
+    """Round factors below, at and above 1."""
+    above = [factor for factor in (1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0) if factor <= farthest]
+    below = [factor for factor in (0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02) if factor >= 1 / farthest]
+    return [*below[-2:][::-1], 1.0, *above[-2:]]
+
+
+def _draw_surface(axes: "Axes", corners: Floats, share: Floats, color: Callable[[Floats], Any]) -> None:
+    """Facets that face the eye, the ones behind first."""
+    from matplotlib.collections import PolyCollection
+
+    across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    towards = np.flatnonzero(across[:, 2] > 0)
+    order = towards[np.argsort(corners[towards, :, 2].mean(axis=1))]
+    light = across[order] @ (_LIGHT / np.linalg.norm(_LIGHT)) / np.linalg.norm(across[order], axis=1)
+    shade = _DIMMEST + (1 - _DIMMEST) * np.clip(light, 0, 1)
+    shown = np.asarray(color(share[order]))[:, :3] * shade[:, None]
+    surface = PolyCollection(list(corners[order, :, :2]), facecolors=shown, edgecolors=shown, lw=0.4)
+    surface.set_rasterized(True)
+    axes.add_collection(surface)
+
+
+def _draw_axes(axes: "Axes", moduli: Moduli, extent: float) -> None:
+    for axis, name in zip(np.eye(3), "xyz", strict=True):
+        start = max(1.0, float(_share(moduli, axis[None])[0]))
+        end = max(1.06 * start, 1.12 * extent)
+        line = np.linspace(start, end, 40)[:, None] * axis
+        for piece in _visible_pieces(line, moduli):
+            axes.plot(piece[:, 0], piece[:, 1], color=INK, lw=0.9)
+        right, up, _ = seen((end + 0.1 * extent) * axis)
+        axes.text(right, up, name, size=8, ha="center", va="center")
+
+
+def _share(moduli: Moduli, directions: Floats) -> Floats:
+    return moduli.young_along(directions) / moduli.young_wanted
+
+
+def _facets(moduli: Moduli) -> tuple[Floats, Floats]:
+    """Corners of the surface's facets as the eye sees them, anticlockwise, shape (n, 4, 3), and their shares."""
+    polar, around = np.meshgrid(np.linspace(0, np.pi, 91), np.linspace(0, 2 * np.pi, 181), indexing="ij")
+    n = _on_sphere(polar, around)
+    share = _share(moduli, n.reshape(-1, 3)).reshape(polar.shape)
+    points = seen(share[..., None] * n)
+    corners = np.stack([points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2)
+    middle = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]) / 4
+    return corners.reshape(-1, 4, 3), middle.ravel()
+
+
+def _on_sphere(polar: Floats, around: Floats) -> Floats:
+    """Unit vectors by the angle from y and that about it from z on, shape (..., 3)."""
+    polar, around = np.broadcast_arrays(polar, around)
+    return np.stack([np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=-1)
+
+
+def _draw_sphere(axes: "Axes", moduli: Moduli) -> None:
+    """Outline, meridians and parallels of the material's sphere, where neither it nor the surface hides them."""
+    from matplotlib.collections import LineCollection
+
+    turn, every = np.linspace(0, 2 * np.pi, 241), np.radians(np.arange(0, 180, 30))
+    lines = [np.cos(turn)[:, None] * VIEW[0] + np.sin(turn)[:, None] * VIEW[1]]
+    lines += [_on_sphere(turn, angle) for angle in every]
+    lines += [_on_sphere(angle, turn) for angle in every[1:]]
+    pieces = [piece for line in lines for piece in _visible_pieces(line, moduli)]
+    axes.add_collection(LineCollection(pieces, colors=INK, lw=0.5, alpha=0.55))
+
+
+def _visible_pieces(line: Floats, moduli: Moduli) -> list[Floats]:
+    """What the eye sees of a line, each piece as places on paper, shape (n, 2)."""
+    visible = _visible(line, moduli)
+    cuts = np.flatnonzero(visible[1:] != visible[:-1]) + 1
+    runs = zip(np.split(line, cuts), np.split(visible, cuts), strict=True)
+    return [seen(run)[:, :2] for run, shown in runs if shown[0]]
+
+
+def _visible(points: Floats, moduli: Moduli) -> Bools:
+    """Whether the eye sees points on or outside the sphere: on this side of it, and not behind the surface."""
+    far = 1 + moduli.young_range[1] / moduli.young_wanted
+    ray = points[:, None] + np.linspace(0, far, 100)[:, None] * VIEW[2]
+    distance = np.linalg.norm(ray, axis=2)
+    share = _share(moduli, (ray / distance[..., None]).reshape(-1, 3)).reshape(distance.shape)
+    return np.asarray((distance > 0.995 * share).all(axis=1) & (points @ VIEW[2] > -1e-9))
