@@ -6,6 +6,7 @@ from truespring.models.advice import model_warnings as model_warnings
 from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprings
 from truespring.models.fem import ELEMENTS as ELEMENTS
 from truespring.models.fem import Fem as Fem
+from truespring.models.fem import FemPotential as FemPotential
 from truespring.models.laws import LAWS as LAWS
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli

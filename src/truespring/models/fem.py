@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import skfem
@@ -93,7 +93,7 @@ class Fem:
         from truespring.models.mean_dilatation import MeanDilatationPotential
         from truespring.models.quadratic import QuadraticPotential
 
-        kinds = {"linear": FemPotential, "mean-dilatation": MeanDilatationPotential, "quadratic": QuadraticPotential}
+        kinds = {kind.interpolation: kind for kind in (FemPotential, MeanDilatationPotential, QuadraticPotential)}
         return fem_potential(problem, self.law, kinds[self.chosen_element(problem)])
 
 
@@ -140,6 +140,9 @@ class FemPotential:
     law: Law
     constants: Constants
     _last: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    #: One of ELEMENTS.
+    interpolation: ClassVar[str] = "linear"
 
     @property
     def mesh(self) -> Mesh:

@@ -38,6 +38,8 @@ class MeanDilatationPotential(FemPotential):
     linear law it is the trace of the strain that is averaged (Hughes' B-bar).
     """
 
+    interpolation = "mean-dilatation"
+
     def _exchanged(self, positions: Floats) -> tuple[Floats, Floats, Floats]:
         """The true deformation gradient, its J (1 for a linear law), and theta, axes (element, point)."""
         F = self._deformation(positions)

@@ -25,6 +25,8 @@ _CONSISTENT = {2: (1 / 6, 2 / 3), 3: (0.0, 1 / 3), 4: (-1 / 20, 1 / 5)}
 class QuadraticPotential(FemPotential):
     """Elements of second order on the problem's mesh: its nodes first, then the middles of its edges."""
 
+    interpolation = "quadratic"
+
     @cached_property
     def nodes(self) -> Floats:
         """Reference positions [m], shape (n_nodes + n_edges, dim)."""

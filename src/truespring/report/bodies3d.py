@@ -14,7 +14,7 @@ from truespring.comparison import Comparison
 from truespring.report.bodies import magnification, over_title, path_lines, picture_box, spring_lines
 from truespring.report.frame3d import Bar, Picture
 from truespring.report.legend import Entry
-from truespring.report.quantity import Scale, natural_scale, percent, quantity, times
+from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, times
 from truespring.report.render import Layer, rgb
 from truespring.report.result import Result
 from truespring.report.style import BLUE, FAINT, INK, RED, error_colors, full_name
@@ -121,13 +121,18 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
 
 
 def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
-    """The model's surface coloured by the distance of its nodes from the reference, whose outline is black."""
+    """The model's surface coloured by the distance of its nodes from the reference, whose outline is black.
+
+    None where the two are the same but for rounding.
+    """
     pair = _pair(result, comparison)
     mesh = comparison.model.problem.mesh
     facets = facets_of(mesh)
     if pair is None or not len(facets) or not np.isfinite(pair.distance).all():
         return None
     farthest = float(pair.distance.max())
+    if farthest <= ROUNDING * pair.largest:
+        return None
     colors = error_colors(pair.distance / (farthest or 1.0))[facets]
     surface = _solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
     black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)

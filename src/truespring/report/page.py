@@ -15,7 +15,7 @@ import numpy as np
 from truespring.equilibrium import Path, Status
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.mesh import Box, select_elements
-from truespring.models import Moduli
+from truespring.models import FemPotential, Moduli
 from truespring.problem import Problem, Region
 from truespring.report.figures import Drawing, distance_name, over_name, render_figures
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
@@ -140,7 +140,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     """What was asked, in words."""
     problem = result.problem
     mesh = problem.mesh
-    size = " × ".join(given(float(extent), "m") for extent in mesh.upper - mesh.lower)
+    size = " × ".join(given(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
     facts = [
         ("body", size),
         ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.element})"),
@@ -152,9 +152,20 @@ def _facts(result: Result) -> list[tuple[str, str]]:
         kind = "plane stress" if isinstance(problem.section, PlaneStress) else "plane strain"
         facts.append(("section", f"{kind}, {given(problem.section.thickness, 'm')} thick"))
     facts += _drive_facts(problem)
-    at = ", ".join(given(float(value), "m") for value in mesh.nodes[result.probe])
+    facts += _element_facts(result)
+    at = ", ".join(given(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
     facts.append(("probe", f"node {result.probe} at ({at}), the red dot"))
     return facts
+
+
+def _element_facts(result: Result) -> list[tuple[str, str]]:
+    """Elements of FEM that are not linear ones."""
+    used = {path.potential.interpolation for path in result.paths.values() if isinstance(path.potential, FemPotential)}
+    told = {
+        "mean-dilatation": "of mean dilatation, which do not lock where the material is nearly incompressible",
+        "quadratic": "of second order, with nodes in the middle of the edges",
+    }
+    return [("finite elements", words) for name, words in told.items() if name in used]
 
 
 def _material_words(material: Material) -> str:

@@ -9,6 +9,9 @@ _PREFIXES: dict[str, tuple[tuple[float, str], ...]] = {
     "Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa")),
 }
 
+#: Distances below this share of a displacement are rounding: there is nothing to draw or to tell.
+ROUNDING = 1e-6
+
 
 @dataclass(frozen=True, slots=True)
 class Scale:

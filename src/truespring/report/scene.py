@@ -10,7 +10,7 @@ from truespring.equilibrium import Path, State
 from truespring.mesh import Mesh
 from truespring.report.bodies import path_lines, spring_lines
 from truespring.report.packing import Packing
-from truespring.report.quantity import quantity
+from truespring.report.quantity import ROUNDING, quantity
 from truespring.report.result import Result
 from truespring.report.style import error_colors
 from truespring.report.surfaces import edges_of, facets_of, lines_on, outline, triangles_of
@@ -69,7 +69,10 @@ def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Pack
         for mine, state in pairs
     ]
     farthest = max((distance for distance in distances if distance is not None), default=0.0)
+    largest = max((float(np.linalg.norm(state.displacement, axis=1).max()) for state in states), default=0.0)
+    if farthest <= ROUNDING * largest:
+        return values
     values["most"] = [None if distance is None else quantity(distance, "m", 2) for distance in distances]
-    if 0 < farthest < np.inf:
+    if farthest < np.inf:
         values["farthest"] = {"steps": pack.steps(factor * farthest), "words": quantity(farthest, "m", 2)}
     return values

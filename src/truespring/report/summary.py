@@ -6,7 +6,7 @@ from typing import Any
 
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path
-from truespring.models import Moduli
+from truespring.models import FemPotential, Moduli
 from truespring.report.result import Result
 
 
@@ -40,6 +40,8 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),
         "warnings": list(path.warnings),
     }
+    if isinstance(path.potential, FemPotential):
+        values["element"] = path.potential.interpolation
     if path.moduli is not None:
         values["moduli"] = moduli_values(path.moduli)
     return values

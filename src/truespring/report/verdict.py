@@ -10,8 +10,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
-from truespring.models import Moduli
-from truespring.models.fem import FemPotential
+from truespring.models import Fem, FemPotential, Moduli
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 
@@ -85,12 +84,15 @@ def force_sentence(result: Result) -> str | None:
 def mesh_sentence(result: Result) -> str | None:
     """Return how far off the reference's own elements are in bending; None where that is little or not known.
 
-    The springs' moduli hold it for linear elements and bending along x, so it is said of bodies that are
-    driven across x, along y.
+    The springs' moduli hold it for the elements that are the default here and for bending along x, so it is
+    said of bodies that are driven across x, along y.
     """
     known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
-    finite = any(type(one.reference.potential) is FemPotential for one in result.comparisons.values())
-    if known is None or known.depth is None or not finite or drive(result).axis != 1:
+    potentials = [one.reference.potential for one in result.comparisons.values()]
+    used = {potential.interpolation for potential in potentials if isinstance(potential, FemPotential)}
+    if known is None or known.depth is None or drive(result).axis != 1:
+        return None
+    if Fem("linear").chosen_element(result.problem) not in used:
         return None
     excess = known.fem_bending[known.depth] - 1
     if abs(excess) <= 0.01:
