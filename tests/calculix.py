@@ -14,6 +14,8 @@ import pytest
 
 import truespring as ts
 from truespring.arrays import Floats
+from truespring.models.quadratic import QuadraticPotential
+from truespring.potential import Loading
 
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
@@ -24,23 +26,31 @@ _CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7"
 _FORCE_UNIT = 1e-6
 
 
-def continuum_deck(problem: ts.Problem, increments: int | None) -> str:
-    """Write four-node quadrilaterals, CPS4 or CPE4 by the section.
+def continuum_deck(problem: ts.Problem, increments: int | None, element: str = "linear") -> str:
+    """Write the elements of first order CPS4 or CPE4 by the section, C3D8, C3D4, or the quadratic C3D10.
 
     With `increments` equal load increments NLGEOM makes `*ELASTIC` the St. Venant-Kirchhoff law; None solves linearly.
     """
     assert problem.material is not None and problem.section is not None
-    kind = "CPE4" if isinstance(problem.section, ts.PlaneStrain) else "CPS4"
+    if element == "quadratic":  # of the same order of nodes and four points of integration
+        assert problem.mesh.element == "tetrahedron"
+        finer = ts.Fem("linear", element).potential(problem)
+        assert isinstance(finer, QuadraticPotential)
+        kind, nodes, elements, loading = "C3D10", finer.nodes, finer.elements, finer.loading
+    else:
+        plane = "CPE4" if isinstance(problem.section, ts.PlaneStrain) else "CPS4"
+        kind = {"quadrilateral": plane, "hexahedron": "C3D8", "tetrahedron": "C3D4"}[problem.mesh.element]
+        nodes, elements, loading = problem.mesh.nodes, problem.mesh.elements, problem.loading
     lines = [
         f"*ELEMENT, TYPE={kind}, ELSET=BODY",
-        *(f"{number}, {_joined(nodes + 1)}" for number, nodes in enumerate(problem.mesh.elements, 1)),
+        *(f"{number}, {_joined(one + 1)}" for number, one in enumerate(elements, 1)),
         "*MATERIAL, NAME=M",
         "*ELASTIC",
         f"{_real(problem.material.young / _FORCE_UNIT)}, {_real(problem.material.poisson)}",
         "*SOLID SECTION, ELSET=BODY, MATERIAL=M",
-        _real(problem.section.thickness),
+        *([_real(problem.section.thickness)] if problem.mesh.dim == 2 else []),
     ]
-    return _deck(problem, lines, increments)
+    return _deck(nodes, loading, lines, increments)
 
 
 def spring_deck(problem: ts.Problem, network: ts.SpringNetwork, increments: int) -> str:
@@ -57,13 +67,13 @@ def spring_deck(problem: ts.Problem, network: ts.SpringNetwork, increments: int)
         lines.extend(f"{number + 1}, {_joined(network.springs[number] + 1)}" for number in members)
         # The empty line stands for directions; stiffness without a decimal point would be read as one.
         lines.extend([f"*SPRING, ELSET=S{group}", "", _real(stiffness / _FORCE_UNIT)])
-    # CalculiX is three-dimensional: the plane is held in z.
-    lines += ["*BOUNDARY", "NALL, 3, 3"]
-    return _deck(problem, lines, increments)
+    if problem.mesh.dim == 2:  # CalculiX is three-dimensional: the plane is held in z
+        lines += ["*BOUNDARY", "NALL, 3, 3"]
+    return _deck(problem.mesh.nodes, problem.loading, lines, increments)
 
 
 def displacement(deck: str, folder: Path) -> Floats:
-    """Run `deck` in `folder` and return the displacement at the end of its step [m], shape (n_nodes, 2)."""
+    """Run `deck` in `folder` and return the displacement at the end of its step [m], shape (n_nodes, 3)."""
     (folder / "twin.inp").write_text(deck)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     done = subprocess.run(
@@ -75,12 +85,11 @@ def displacement(deck: str, folder: Path) -> Floats:
     return _last_block(printed.read_text())
 
 
-def _deck(problem: ts.Problem, model: list[str], increments: int | None) -> str:
-    mesh, loading = problem.mesh, problem.loading
+def _deck(nodes: Floats, loading: Loading, model: list[str], increments: int | None) -> str:
     return "\n".join(
         [
             "*NODE, NSET=NALL",
-            *(f"{number}, {_joined(map(_real, node))}" for number, node in enumerate(mesh.nodes, 1)),
+            *(f"{number}, {_joined(map(_real, node))}" for number, node in enumerate(nodes, 1)),
             *model,
             "*STEP" if increments is None else f"*STEP, NLGEOM, INC={increments}",
             *(["*STATIC"] if increments is None else [_CONTROLS, "*STATIC, DIRECT", f"{_real(1 / increments)}, 1."]),
@@ -119,4 +128,4 @@ def _last_block(printed: str) -> Floats:
     table = printed[printed.rindex("displacements") :].splitlines()[1:]
     rows = np.array([line.split() for line in table if line.strip()], dtype=float)
     assert (rows[:, 0] == np.arange(1, len(rows) + 1)).all()
-    return rows[:, 1:3]
+    return rows[:, 1:]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, root
+from scipy.optimize import brentq, minimize, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 Floats = NDArray[np.float64]
@@ -15,12 +15,13 @@ Floats = NDArray[np.float64]
 
 
 def lattice_tension(
-    force: float, sides: tuple[float, float], edges: tuple[float, float], diagonal: float
+    force: float, sides: tuple[float, float], edges: tuple[float, float], diagonal: float, kappa: float = 0.0
 ) -> tuple[float, float]:
     """Return the stretches along x and y of a cell pulled along x and free across.
 
     `force` [N] acts on each side of the cell of `sides` [m]; it has two edges of each direction of
-    stiffness `edges` [N/m] and two of `diagonal`: exact for any block of such cells.
+    stiffness `edges` [N/m], two diagonals of `diagonal`, and by its area A an energy kappa/2 A_0 (A/A_0 - 1)^2,
+    `kappa` [N/m]: exact for any block of such cells.
     """
     (a, b), (k_x, k_y) = sides, edges
     rest = math.hypot(a, b)
@@ -30,16 +31,42 @@ def lattice_tension(
 
     def across_of(stretch: float) -> float:
         def lateral(across: float) -> float:
-            return k_y * (across - 1) + diagonal * shortening(stretch, across) * across
+            pressure = kappa * (stretch * across - 1)
+            return k_y * (across - 1) + diagonal * shortening(stretch, across) * across + pressure * stretch * a / b / 2
 
         return float(brentq(lateral, 0.3, 1.7, xtol=1e-15, rtol=1e-15))
 
     def out_of_balance(stretch: float) -> float:
-        diagonals = diagonal * shortening(stretch, across_of(stretch)) * stretch
-        return 2 * a * (k_x * (stretch - 1) + diagonals) - force
+        across = across_of(stretch)
+        diagonals = diagonal * shortening(stretch, across) * stretch
+        return 2 * a * (k_x * (stretch - 1) + diagonals) + kappa * b * (stretch * across - 1) * across - force
 
     stretch = float(brentq(out_of_balance, 0.7, 2.5, xtol=1e-15, rtol=1e-15))
     return stretch, across_of(stretch)
+
+
+def cube_tension(stress: float, links: tuple[float, float, float], kappa: float) -> tuple[float, float]:
+    """Return the stretches along and across of a unit cube of springs pulled by a nominal stress [Pa].
+
+    It has twelve edges, twelve diagonals of faces and four through the body, of stiffness `links` [N/m] each, its
+    share of a block; and by its volume V an energy kappa/2 (V - 1)^2.
+    """
+    edge, face, body = links
+
+    def out_of_balance(stretches: Floats) -> Floats:
+        x, y = stretches  # y is the stretch of both directions across
+        tilted, space = math.hypot(x, y), math.sqrt(x * x + 2 * y * y)
+        pressure = kappa * (x * y * y - 1)
+        tilted_pull = 8 * face * (1 - math.sqrt(2) / tilted)
+        space_pull = 4 * body * (1 - math.sqrt(3) / space)
+        along = 4 * edge * (x - 1) + (tilted_pull + space_pull) * x + pressure * y * y
+        flat_pull = 8 * face * (1 - 1 / y)
+        across = 8 * edge * (y - 1) + (tilted_pull + 2 * space_pull + flat_pull) * y + 2 * pressure * x * y
+        return np.array([along - stress, across])
+
+    found = root(out_of_balance, [1.0, 1.0], tol=1e-15)
+    assert np.abs(found.fun).max() < 1e-12 * (edge + face + body)
+    return float(found.x[0]), float(found.x[1])
 
 
 def square_moduli(edge: float, diagonal: float) -> dict[str, float]:
@@ -70,6 +97,75 @@ def bending_factor(edge: float, diagonal: float, depth: int, single: bool = Fals
     upright = edge if single else 2 * edge
     row = upright * diagonal / (upright + diagonal)
     return float(((shared * levels**2).sum() + row * (middles**2).sum()) / (depth**3 / 12))
+
+
+# --- Any lattice of springs, on its periodic cell --------------------------------------------------------------------
+
+#: Components of a strain in Voigt's order, by dimension.
+VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
+
+
+def periodic_elasticity(ends: Floats, stiffness: Floats, cell: Floats) -> Floats:
+    """Return the elasticity [Pa] (2D: [N/m]) of an unbounded lattice in Voigt's order, its nodes relaxed.
+
+    `ends` [m], shape (n_springs, 2, dim), and `stiffness` [N/m] of the springs of one cell; `cell` has the
+    lattice vectors [m] as rows. Ends that differ by lattice vectors are one node, moved by A e, e a uniform
+    strain, plus what makes the energy least.
+    """
+    dim = ends.shape[2]
+    inside = np.round(np.mod(ends @ np.linalg.inv(cell) + 1e-7, 1.0), 5)
+    _, node = np.unique(inside.reshape(-1, dim), axis=0, return_inverse=True)
+    node = node.reshape(-1, 2)
+    across = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(across, axis=1)
+    unit = across / length[:, None]
+    every = np.arange(len(ends))
+    by_node = np.zeros((len(ends), node.max() + 1, dim))
+    np.add.at(by_node, (every, node[:, 1]), unit)
+    np.add.at(by_node, (every, node[:, 0]), -unit)
+    by_node = by_node.reshape(len(ends), -1)
+    by_strain = np.stack([length * unit[:, i] * unit[:, j] for i, j in VOIGT[dim]], axis=1)
+    K, coupling = by_node.T @ (stiffness[:, None] * by_node), by_node.T @ (stiffness[:, None] * by_strain)
+    settled = -np.linalg.pinv(K, rcond=1e-10, hermitian=True) @ coupling
+    assert np.abs(K @ settled + coupling).max() < 1e-12 * np.abs(stiffness).max() * length.max(), "not in balance"
+    change = by_strain + by_node @ settled
+    return np.asarray(change.T @ (stiffness[:, None] * change) / abs(np.linalg.det(cell)))
+
+
+def tensile_test(elasticity: Floats, along: Sequence[float]) -> tuple[float, float]:
+    """Young's modulus and Poisson's ratio, the mean over all directions across, of a test along a vector."""
+    n = np.asarray(along, dtype=float) / np.linalg.norm(along)
+    dim = len(n)
+    found = np.linalg.solve(elasticity, [n[i] * n[j] for i, j in VOIGT[dim]])
+    strain = np.zeros((dim, dim))
+    for (i, j), component in zip(VOIGT[dim], found, strict=True):
+        strain[i, j] = strain[j, i] = component if i == j else component / 2
+    axial = float(n @ strain @ n)
+    return 1 / axial, -(float(np.trace(strain)) - axial) / (dim - 1) / axial
+
+
+def young_extremes(elasticity: Floats) -> tuple[float, float]:
+    """Smallest and largest Young's modulus in space: a grid over half the sphere, its best points refined."""
+    compliance = np.linalg.inv(elasticity)
+
+    def young(angles: Floats) -> Floats:
+        polar, turn = angles[..., 0], angles[..., 1]
+        n = (np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar))
+        stress = np.stack([n[i] * n[j] for i, j in VOIGT[3]], axis=-1)
+        return np.asarray(1 / ((stress @ compliance) * stress).sum(axis=-1))
+
+    grid = np.stack(np.meshgrid(np.linspace(0.01, 1.57, 60), np.arange(0, 6.28, 0.03)), axis=-1).reshape(-1, 2)
+    found = young(grid)
+
+    def best(sign: float) -> float:
+        starts = grid[np.argsort(sign * found)[[0, 1, 5]]]
+        options = {"xatol": 1e-9, "fatol": 1e-13}
+        return min(
+            minimize(lambda a: sign * float(young(a)), start, method="Nelder-Mead", options=options).fun
+            for start in starts
+        )
+
+    return float(best(1.0)), float(-best(-1.0))
 
 
 # --- Beams -----------------------------------------------------------------------------------------------------------

@@ -88,7 +88,10 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ("models.springs.stiffness.diagonl", "did you mean 'diagonal'"),
     ),
     "sharing unknown": (('rule = "lloyd"', 'rule = "lloyd"\nsharing = "sum"'), ("models.springs.sharing", "'summed'")),
-    "area term": (('rule = "lloyd"', 'rule = "lloyd"\nvolume = true'), ("models.springs", "isotropic lattices", "biquadratic")),
+    "area term": (
+        ('rule = "lloyd"', 'rule = "lloyd"\nvolume = true'),
+        ("models.springs", "isotropic lattices", "biquadratic"),
+    ),
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
     "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
     "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, stl")),

@@ -9,6 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 import truespring as ts
 from tests.closed_forms import bending_factor, elastica_tip, square_moduli
+from truespring.potential import Potential
 
 LLOYD, BULK = (5 / 16, 7 / 16), (3 / 8, 3 / 8)
 RULES = {"lloyd": LLOYD, "isotropic": BULK}
@@ -99,6 +100,115 @@ def test_bending_factor_of_rectangles(aspect: float) -> None:
     problem, springs = strip(9, 4, aspect=aspect), ts.Springs(rule="isotropic")
     bent = bent_factor(problem, springs.potential(problem), 9)
     assert ts.moduli(problem, springs).bending[4] == pytest.approx(bent, rel=1e-4)
+
+
+# --- finite elements, and bodies in space ---------------------------------------------------------
+
+
+def prism(length: int, depth: int, width: int, poisson: float, side: float = 1.0) -> ts.Problem:
+    """A prism of cubes, `length` times as long as deep."""
+    counts = (length * depth, depth, width)
+    return ts.Problem(
+        ts.box([side * count for count in counts], counts),
+        ts.Material(1.0, poisson),
+        None,
+        [ts.Fixed("left")],
+        [ts.Force("right", (0.0, -1.0, 0.0))],
+    )
+
+
+def turned_ends_factor(problem: ts.Problem, potential: Potential, length: int) -> float:
+    """EI over E w H^3 / 12 by linear pure bending: both ends turned as planes, curvature two depths from them."""
+    nodes, upper = problem.mesh.nodes, problem.mesh.upper
+    x, y = nodes[:, 0], nodes[:, 1] - upper[1] / 2
+    depth, width = float(upper[1]), float(upper[2]) if problem.mesh.dim == 3 else 1.0
+    held, displacement = np.zeros(nodes.shape, dtype=bool), np.zeros(nodes.shape)
+    for end, sign in ((0.0, 1.0), (upper[0], -1.0)):
+        at_end = np.isclose(x, end)
+        held[at_end, 0], displacement[at_end, 0] = True, sign * y[at_end]
+    held[0, 1:] = True  # as a rigid body along y, z and about x
+    held[np.flatnonzero((x == 0) & (nodes[:, -1] == upper[-1]))[0], 1] |= problem.mesh.dim == 3
+    K, free = potential.hessian(nodes), np.flatnonzero(~held.ravel())
+    moved = displacement.ravel()
+    moved[free] = spsolve(K[free][:, free].tocsc(), -(K @ moved)[free])
+    force = (K @ moved).reshape(nodes.shape)
+    at_left = np.isclose(x, 0)
+    couple = float((force[at_left, 0] * y[at_left]).sum())
+
+    def turned(column: float) -> float:
+        on = np.isclose(x, column)
+        return float(np.polyfit(y[on], moved.reshape(nodes.shape)[on, 0], 1)[0])
+
+    curvature = (turned(2 * depth) - turned((length - 2) * depth)) / ((length - 4) * depth)
+    return couple / curvature / (width * depth**3 / 12)
+
+
+# EI(n) / EI of four-node quadrilaterals with full integration in plane stress at 1/3: 1 + 1 / 2 n^2.
+SQUARE_ELEMENTS = {1: 1.5, 2: 1.125, 3: 1.0556, 4: 1.0313, 6: 1.0139, 8: 1.0078}
+
+
+def test_bending_factor_of_finite_elements() -> None:
+    told = ts.moduli(strip(4, 2), ts.Springs("lloyd")).fem_bending
+    assert dict(told) == pytest.approx(SQUARE_ELEMENTS, abs=6e-5)
+    for depth, factor in told.items():
+        assert factor == pytest.approx(1 + 1 / (2 * depth**2), rel=1e-9)
+    for depth in (1, 2, 3):
+        problem = strip(8, depth)
+        bent = turned_ends_factor(problem, ts.Fem("linear").potential(problem), 8)
+        assert bent == pytest.approx(told[depth], rel=1e-4)
+
+
+# EI(n) / EI of the isotropic family on n by n cubes, by the stiffness of diagonals through the body.
+FAMILY = {0.0: (1.80, 1.22, 1.10), 0.15: (2.25, 1.31, 1.14), 0.3: (2.40, 1.37, 1.17)}
+
+
+@pytest.mark.parametrize("k_body", FAMILY)
+def test_bending_factor_of_cubes(k_body: float) -> None:
+    springs = ts.Springs("isotropic", k_body=k_body)
+    for depth in (1, 2, 3):
+        problem = prism(6, depth, depth, 0.25)
+        bent = turned_ends_factor(problem, springs.potential(problem), 6)
+        assert bent == pytest.approx(FAMILY[k_body][depth - 1], abs=5.1e-3)
+        if depth == 1:
+            told = ts.moduli(problem, springs).bending
+        assert told[depth] == pytest.approx(bent, rel=1e-5)
+
+
+MODELS_IN_SPACE = {
+    "linear elements": (ts.Fem("linear"), 0.3),
+    "mean dilatation": (ts.Fem("linear"), 0.45),
+    "projected": (ts.Springs("projected"), 0.25),
+    "volume": (ts.Springs("isotropic", volume=True), 0.45),
+    "biquadratic": (ts.Springs("biquadratic"), 0.1),
+    "single": (ts.Springs("isotropic", sharing="single"), 0.25),
+}
+
+
+@pytest.mark.parametrize("name", MODELS_IN_SPACE)
+def test_told_bending_factors_in_space(name: str) -> None:
+    """Three elements deep and two wide, as this body is; and square sections."""
+    model, poisson = MODELS_IN_SPACE[name]
+    problem = prism(6, 3, 2, poisson, side=0.01)
+    told = ts.moduli(problem, ts.Springs("isotropic") if isinstance(model, ts.Fem) else model)
+    bending = told.fem_bending if isinstance(model, ts.Fem) else told.bending
+    assert told.depth == 3
+    bent = turned_ends_factor(problem, model.potential(problem), 6)
+    assert bending[3] == pytest.approx(bent, rel=1e-4)
+    square = prism(6, 2, 2, poisson, side=0.01)
+    assert bending[2] == pytest.approx(turned_ends_factor(square, model.potential(square), 6), rel=1e-4)
+
+
+def test_meshes_that_are_no_lattice_of_bricks_have_no_bending_factor() -> None:
+    for mesh in (ts.rectangle((4.0, 2.0), (4, 2), "triangle"), ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron")):
+        problem = ts.Problem(
+            mesh,
+            ts.Material(1.0, 0.25),
+            ts.PlaneStress(1.0) if mesh.dim == 2 else None,
+            [ts.Fixed("left")],
+            [ts.Force("right", [1.0] * mesh.dim)],
+        )
+        told = ts.moduli(problem, ts.Springs("lloyd"))
+        assert told.depth is None and not told.bending and not told.fem_bending
 
 
 def test_the_formula_of_pure_bending_is_the_one_of_both_sharings() -> None:

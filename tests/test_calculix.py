@@ -46,14 +46,20 @@ def solved(problem: ts.Problem, model: ts.Fem | ts.Springs) -> Floats:
     return path.states[-1].displacement
 
 
-def gap(one: Floats, other: Floats) -> float:
-    """The largest distance of two displacements over the largest displacement."""
-    return float(np.linalg.norm(one - other, axis=1).max() / np.linalg.norm(other, axis=1).max())
+def gap(theirs: Floats, ours: Floats) -> float:
+    """The largest distance of two displacements over the largest displacement, in the directions that ours has."""
+    apart = theirs[:, : ours.shape[1]] - ours
+    return float(np.linalg.norm(apart, axis=1).max() / np.linalg.norm(ours, axis=1).max())
 
 
-def tip_gap(problem: ts.Problem, one: Floats, other: Floats) -> float:
+def tip_gap(problem: ts.Problem, theirs: Floats, ours: Floats) -> float:
     tip = ts.named_point(problem.mesh, "right-middle")
-    return float(np.linalg.norm(one[tip] - other[tip]) / np.linalg.norm(other[tip]))
+    return float(np.linalg.norm(theirs[tip, : ours.shape[1]] - ours[tip]) / np.linalg.norm(ours[tip]))
+
+
+def rms_gap(theirs: Floats, ours: Floats) -> float:
+    """Root mean square of the distance over that of the displacement."""
+    return float(np.linalg.norm(theirs - ours) / np.linalg.norm(ours))
 
 
 def with_moved_nodes(problem: ts.Problem) -> ts.Problem:
@@ -138,6 +144,87 @@ def test_plane_stress_without_poisson_ratio(load: str, law: str, tmp_path: Path)
     assert gap(displacement(continuum_deck(problem, LAWS[law]), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
 
 
+# --- bodies in space ---------------------------------------------------------------------------
+
+SHAPES = ("hexahedron", "tetrahedron", "bcc-tetrahedron")
+BOX = (0.08, 0.02, 0.02)
+
+
+def prism(load: str, element: str, counts: tuple[int, int, int] = (8, 2, 2), poisson: float = 0.3) -> ts.Problem:
+    """A box held at its left end; its right end pulled aside, pulled, turned by 0.6 rad, or turned by forces."""
+    mesh = ts.box(BOX, counts, element)
+    supports, loads = [ts.Fixed("left")], []
+    right = np.flatnonzero(mesh.nodes[:, 0] == mesh.upper[0])
+    arms = mesh.nodes[right, 1:] - mesh.upper[1:] / 2
+    match load:
+        case "bending":
+            loads = [ts.Force("right", (0.0, -0.05, 0.02))]
+        case "tension":
+            loads = [ts.Force("right", (0.8, 0.0, 0.0))]
+        case "torsion":
+            c, s = np.cos(0.6), np.sin(0.6)
+            turned = arms @ np.array([[c, s], [-s, c]]) - arms
+            supports += [
+                ts.Fixed([node], displacement=[0.0, *motion]) for node, motion in zip(right, turned, strict=True)
+            ]
+        case "torsion by forces":
+            force = 1.5 * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+            loads = [ts.Force([node], [0.0, *one]) for node, one in zip(right, force, strict=True) if one.any()]
+    return ts.Problem(mesh, ts.Material(10e3, poisson), None, supports, loads)
+
+
+TURNS = ("bending", "tension", "torsion", "torsion by forces")
+
+
+@laws
+@pytest.mark.parametrize("load", TURNS)
+@pytest.mark.parametrize("element", SHAPES)
+def test_bodies_in_space(element: str, load: str, law: str, tmp_path: Path) -> None:
+    """C3D8, which CalculiX integrates fully (eight points, no incompatible modes), and C3D4."""
+    problem = prism(load, element)
+    ours = solved(problem, ts.Fem(law, "linear"))
+    assert np.linalg.norm(ours, axis=1).max() > 0.09 * BOX[0]
+    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    assert rms_gap(theirs, ours) < PRINTED
+    assert gap(theirs, ours) < 2 * PRINTED
+
+
+@laws
+@pytest.mark.parametrize("poisson", [0.0, 0.49])
+def test_bodies_that_lock_do_so_alike(poisson: float, law: str, tmp_path: Path) -> None:
+    problem = prism("bending", "hexahedron", poisson=poisson)
+    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < PRINTED
+    if poisson > 0.4:
+        assert rms_gap(theirs, solved(problem, ts.Fem(law, "mean-dilatation"))) > 0.1
+
+
+@laws
+@pytest.mark.parametrize("element", ["hexahedron", "tetrahedron"])
+def test_distorted_bodies_in_space(element: str, law: str, tmp_path: Path) -> None:
+    plain = prism("bending", element, (6, 3, 3))
+    mesh = plain.mesh
+    inner = ((mesh.nodes > 0) & (mesh.nodes < mesh.upper)).all(axis=1)
+    moved = mesh.nodes.copy()
+    moved[inner] += np.random.default_rng(4).uniform(-0.25, 0.25, (inner.sum(), 3)) * 0.02 / 3
+    problem = replace(plain, mesh=ts.Mesh(moved, mesh.elements, mesh.element))
+    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < PRINTED
+
+
+@laws
+@pytest.mark.parametrize("load", ["bending", "tension", "torsion"])
+def test_quadratic_tetrahedra(load: str, law: str, tmp_path: Path) -> None:
+    """C3D10: at every node, those in the middle of the edges too."""
+    problem = prism(load, "tetrahedron", (4, 1, 1))
+    path = ts.solve(problem, ts.Fem(law, "quadratic"), ts.Newton(load_steps=4))
+    assert path.status is ts.Status.CONVERGED and path.potential is not None
+    ours = path.states[-1].all_positions - path.potential.nodes
+    theirs = displacement(continuum_deck(problem, LAWS[law], "quadratic"), tmp_path)
+    assert len(ours) > 3 * problem.mesh.n_nodes
+    assert rms_gap(theirs, ours) < PRINTED
+
+
 # --- springs -----------------------------------------------------------------------------------
 
 
@@ -163,6 +250,27 @@ def test_springs(name: str, load: str, tmp_path: Path) -> None:
     ours = solved(problem, model)
     assert np.linalg.norm(ours, axis=1).max() > (0.15 if load == "stretching" else 0.45) * LENGTH
     assert gap(displacement(spring_deck(problem, model.potential(problem), 10), tmp_path), ours) < PRINTED
+
+
+SPRINGS_IN_SPACE = {
+    "isotropic cubes": (ts.Springs("isotropic"), "hexahedron"),
+    "projected cubes": (ts.Springs("projected"), "hexahedron"),
+    "lloyd, body-centred": (ts.Springs("lloyd"), "bcc-tetrahedron"),
+    "van-gelder, body-centred": (ts.Springs("van-gelder"), "bcc-tetrahedron"),
+}
+
+
+@pytest.mark.parametrize("load", ["bending", "tension", "torsion"])
+@pytest.mark.parametrize("name", SPRINGS_IN_SPACE)
+def test_springs_in_space(name: str, load: str, tmp_path: Path) -> None:
+    model, element = SPRINGS_IN_SPACE[name]
+    problem = prism(load, element, poisson=0.25)
+    network = model.potential(problem)
+    assert isinstance(network, ts.SpringNetwork)
+    ours = solved(problem, model)
+    assert np.linalg.norm(ours, axis=1).max() > 0.09 * BOX[0]
+    theirs = displacement(spring_deck(problem, network, 10), tmp_path)
+    assert rms_gap(theirs, ours) < PRINTED
 
 
 # --- the checks themselves can fail -------------------------------------------------------------

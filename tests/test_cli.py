@@ -76,6 +76,7 @@ def test_summary(out: Path) -> None:
     assert springs["moduli"]["anisotropy"] == pytest.approx(7 / 5)
     # What the springs realise differs from the material (nu 0.3): both numbers are named.
     assert "0.4118" in springs["warnings"][0] and "0.3" in springs["warnings"][0]
+    assert springs["moduli"]["young_max"] == pytest.approx(21 / 19 * 10e3)
     assert "moduli" not in linear and linear["warnings"] == []
     assert summary["closest"] == "linear"
     errors = summary["comparison"]["linear"]
@@ -142,7 +143,8 @@ def test_quiet_prints_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 def test_solve_writes_no_comparison(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["solve", str(written(tmp_path)), "--out", str(tmp_path / "out")]) == 0
-    assert "springs (lloyd)" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "springs (lloyd)" in shown and "Not fit for this material" in shown
     names = {path.name for path in (tmp_path / "out" / "study").iterdir()}
     assert "curves.csv" in names and not names & {"report.html", "figures"}
     assert json.loads((tmp_path / "out" / "study" / "summary.json").read_text("utf-8"))["comparison"] == {}
@@ -154,8 +156,10 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     shown = capsys.readouterr().out
     for text in ("27 nodes", "16 elements", "48 unknowns", "Zener", "1.4000", "bending factor EI, 2 elements deep"):
         assert text in shown
+    assert "Not fit for this material" in shown
     assert main(["check", str(file), "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
+    assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
     assert plan["total_force"] == pytest.approx([0, -0.01])
     assert plan["models"]["springs"]["n_springs"] == 8 * 3 + 2 * 9 + 2 * 16
     assert {path.name for path in tmp_path.iterdir()} == {"study.toml"}
@@ -164,7 +168,7 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
 def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert set(schema["required"]) == {"mesh", "material", "section", "support", "models"}
+    assert set(schema["required"]) == {"mesh", "material", "support", "models"}  # a body in 3D has no section
     assert schema["$defs"]["SpringsTable"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
 
 
@@ -265,5 +269,5 @@ def test_the_command_is_installed_and_answers() -> None:
         text=True,
         check=True,
     )
-    for verb in ("verify", "solve", "check", "schema"):
+    for verb in ("verify", "solve", "moduli", "rules", "check", "schema"):
         assert verb in shown.stdout

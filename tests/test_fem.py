@@ -7,28 +7,53 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm, logm
+from scipy.optimize import brentq
 
 import truespring as ts
 from tests.closed_forms import lame, principal_state
+from truespring.arrays import Floats
+from truespring.models.fem import FemPotential
+from truespring.models.quadratic import QuadraticPotential
 
 LAWS = ("linear", "saint-venant-kirchhoff", "neo-hookean", "hencky")
 SECTIONS = {"plane-stress": ts.PlaneStress, "plane-strain": ts.PlaneStrain}
 TIGHT = ts.Newton(load_steps=2, tolerance=1e-13)
 
+# Kind of the mesh, interpolation.
+PLANE = [
+    (kind, e)
+    for kind, finer in (("triangle", "quadratic"), ("quadrilateral", "mean-dilatation"))
+    for e in ("linear", finer)
+]
+SOLID = [
+    (kind, e)
+    for kind, finer in (("tetrahedron", "quadratic"), ("hexahedron", "mean-dilatation"))
+    for e in ("linear", finer)
+]
 
-def distorted(elements: tuple[int, int] = (4, 3), share: float = 0.25) -> ts.Mesh:
+
+def distorted(kind: str = "quadrilateral", share: float = 0.25) -> ts.Mesh:
     """A block whose inner nodes are moved by up to `share` of an element."""
-    regular = ts.rectangle((float(elements[0]), float(elements[1])), elements)
+    if kind in ("triangle", "quadrilateral"):
+        regular = ts.rectangle((4.0, 3.0), (4, 3), kind)
+    else:
+        regular = ts.box((3.0, 2.0, 2.0), (3, 2, 2), kind)
     inner = ((regular.nodes > 0) & (regular.nodes < regular.upper)).all(axis=1)
+    assert inner.sum() >= 2
     jitter = np.random.default_rng(1721).uniform(-share, share, regular.nodes.shape)
-    return ts.Mesh(regular.nodes + jitter * inner[:, None], regular.elements)
+    return ts.Mesh(regular.nodes + jitter * inner[:, None], regular.elements, regular.element)
 
 
-def patch(gradient: np.ndarray, section: ts.PlaneStress | ts.PlaneStrain, poisson: float) -> ts.Problem:
-    """A distorted block whose boundary moves by a uniform displacement gradient, shape (2, 2)."""
-    mesh = distorted()
+def in_section(mesh: ts.Mesh, name: str, thickness: float) -> ts.PlaneStress | ts.PlaneStrain | None:
+    return SECTIONS[name](thickness) if mesh.dim == 2 else None
+
+
+def patch(
+    mesh: ts.Mesh, gradient: Floats, section: ts.PlaneStress | ts.PlaneStrain | None, poisson: float
+) -> ts.Problem:
+    """A body whose boundary moves by a uniform displacement gradient, shape (dim, dim)."""
     rim = np.unique(mesh.boundary)
-    assert mesh.n_nodes - len(rim) == 6, "there must be nodes left to follow"
+    assert mesh.n_nodes - len(rim) >= 2, "there must be nodes left to follow"
     motion = mesh.nodes @ gradient.T
     return ts.Problem(
         mesh=mesh,
@@ -38,79 +63,108 @@ def patch(gradient: np.ndarray, section: ts.PlaneStress | ts.PlaneStrain, poisso
     )
 
 
-def true_stress(law: str, gradient: np.ndarray, poisson: float, plane_stress: bool) -> np.ndarray:
+def true_stress(law: str, gradient: Floats, poisson: float, plane_stress: bool) -> Floats:
     """Cauchy stress [Pa] of a uniform displacement gradient; in principal axes, of the linear law the stress."""
-    young = 3e3
+    young, dim = 3e3, len(gradient)
     if law == "linear":
         strain = (gradient + gradient.T) / 2
         lam, mu = lame(young, poisson)
         lam = 2 * lam * mu / (lam + 2 * mu) if plane_stress else lam
-        return lam * np.trace(strain) * np.eye(2) + 2 * mu * strain
-    F = np.eye(2) + gradient
+        return np.asarray(lam * np.trace(strain) * np.eye(dim) + 2 * mu * strain)
+    F = np.eye(dim) + gradient
     squared, axes = np.linalg.eigh(F @ F.T)
-    stretch, nominal = principal_state(law, young, poisson, [*np.sqrt(squared), None if plane_stress else 1.0])
-    cauchy = (nominal * stretch / stretch.prod())[:2]
-    return (axes * cauchy) @ axes.T
+    third = [] if dim == 3 else [None if plane_stress else 1.0]
+    stretch, nominal = principal_state(law, young, poisson, [*np.sqrt(squared), *third])
+    cauchy = (nominal * stretch / stretch.prod())[:dim]
+    return np.asarray((axes * cauchy) @ axes.T)
 
 
 GRADIENTS = {
-    "small": np.array([[1e-3, 4e-4], [-2e-4, -7e-4]]),
-    "large": np.array([[0.35, 0.25], [-0.15, -0.2]]),
-    "turned": expm(np.array([[0.0, -0.9], [0.9, 0.0]])) @ np.diag([1.2, 0.9]) - np.eye(2),
+    "small": np.array([[1e-3, 4e-4, 2e-4], [-2e-4, -7e-4, 6e-4], [5e-4, -1e-4, 8e-4]]),
+    "large": np.array([[0.35, 0.25, 0.1], [-0.15, -0.2, 0.12], [0.05, -0.1, 0.15]]),
+    "turned": expm(np.array([[0.0, -0.9, 0.0], [0.9, 0.0, 0.0], [0.0, 0.0, 0.0]])) @ np.diag([1.2, 0.9, 1.1])
+    - np.eye(3),
 }
 
 
 @pytest.mark.parametrize("gradient", GRADIENTS)
 @pytest.mark.parametrize("section", SECTIONS)
 @pytest.mark.parametrize("law", LAWS)
-def test_patch(law: str, section: str, gradient: str) -> None:
-    displacement_gradient = GRADIENTS[gradient]
-    problem = patch(displacement_gradient, SECTIONS[section](0.5), poisson=0.3)
-    path = ts.solve(problem, ts.Fem(law=law), TIGHT)
+@pytest.mark.parametrize(("kind", "element"), PLANE)
+def test_patch(kind: str, element: str, law: str, section: str, gradient: str) -> None:
+    check_patch(distorted(kind), element, law, section, GRADIENTS[gradient][:2, :2])
+
+
+@pytest.mark.parametrize("gradient", ["large", "turned"])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("kind", "element"), SOLID)
+def test_patch_in_space(kind: str, element: str, law: str, gradient: str) -> None:
+    check_patch(distorted(kind), element, law, "solid", GRADIENTS[gradient])
+
+
+def check_patch(mesh: ts.Mesh, element: str, law: str, section: str, gradient: Floats) -> None:
+    """Inner nodes follow, and every element has the stress of the closed form."""
+    problem = patch(mesh, gradient, in_section(mesh, section, 0.5), poisson=0.3)
+    path = ts.solve(problem, ts.Fem(law, element), TIGHT)
     assert path.load_factor == 1.0
-    state = path.states[-1]
-    exact = problem.mesh.nodes @ displacement_gradient.T
-    assert np.abs(state.displacement - exact).max() <= 1e-12 * problem.mesh.diameter
-    expected = true_stress(law, displacement_gradient, 0.3, section == "plane-stress")
-    stress = ts.Fem(law=law).potential(problem).cauchy_stress(state.positions)[:, :2, :2]
-    assert stress == pytest.approx(np.tile(expected, (12, 1, 1)), rel=1e-10, abs=1e-10 * np.abs(expected).max())
+    state, potential = path.states[-1], path.potential
+    assert isinstance(potential, FemPotential)
+    exact = potential.nodes @ gradient.T
+    assert np.abs(state.all_positions - potential.nodes - exact).max() <= 1e-12 * mesh.diameter
+    expected = true_stress(law, gradient, 0.3, section == "plane-stress")
+    stress = potential.cauchy_stress(state.all_positions)[:, : mesh.dim, : mesh.dim]
+    everywhere = np.tile(expected, (len(mesh.elements), 1, 1))
+    assert stress == pytest.approx(everywhere, rel=1e-10, abs=1e-10 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize("section", [*SECTIONS, "solid"])
 def test_second_piola_kirchhoff_stress_of_the_patch(section: str) -> None:
     """Each law's own formula in C = F^T F and its inverse, with the Green strain, with ln J, with ln U."""
-    problem = patch(GRADIENTS["large"], SECTIONS[section](0.5), poisson=0.3)
-    F = np.eye(2) + GRADIENTS["large"]
-    positions = problem.mesh.nodes @ F.T
+    mesh = distorted("hexahedron" if section == "solid" else "quadrilateral")
+    dim = mesh.dim
+    gradient = GRADIENTS["large"][:dim, :dim]
+    problem = patch(mesh, gradient, in_section(mesh, section, 0.5), poisson=0.3)
+    F, eye = np.eye(dim) + gradient, np.eye(dim)
+    positions = mesh.nodes @ F.T
     lam, mu = lame(3e3, 0.3)
     C = F.T @ F
     stretches = np.sqrt(np.linalg.eigvalsh(C))
     free = section == "plane-stress"
     reduced = 2 * lam * mu / (lam + 2 * mu) if free else lam
-    third = principal_state("neo-hookean", 3e3, 0.3, [*stretches, None if free else 1.0])[0][2]
+    across = [] if dim == 3 else [None if free else 1.0]
+    third = principal_state("neo-hookean", 3e3, 0.3, [*stretches, *across])[0][2] if across else 1.0
     inverse, logarithm = np.linalg.inv(C), logm(C).real / 2
-    green = (C - np.eye(2)) / 2
+    green = (C - eye) / 2
     expected = {
-        "saint-venant-kirchhoff": reduced * np.trace(green) * np.eye(2) + 2 * mu * green,
-        "neo-hookean": mu * (np.eye(2) - inverse) + lam * math.log(np.linalg.det(F) * third) * inverse,
-        "hencky": (reduced * np.trace(logarithm) * np.eye(2) + 2 * mu * logarithm) @ inverse,
+        "saint-venant-kirchhoff": reduced * np.trace(green) * eye + 2 * mu * green,
+        "neo-hookean": mu * (eye - inverse) + lam * math.log(np.linalg.det(F) * third) * inverse,
+        "hencky": (reduced * np.trace(logarithm) * eye + 2 * mu * logarithm) @ inverse,
     }
     for law, stress in expected.items():
-        found = ts.Fem(law=law).potential(problem).stress(positions)
+        found = ts.Fem(law, "linear").potential(problem).stress(positions)
         assert found == pytest.approx(np.broadcast_to(stress[:, :, None, None], found.shape), rel=1e-10)
 
 
-def uniaxial(section: ts.PlaneStress | ts.PlaneStrain, stretch: float, young: float, poisson: float) -> ts.Problem:
+def uniaxial(
+    section: ts.PlaneStress | ts.PlaneStrain | None,
+    stretch: float,
+    young: float,
+    poisson: float,
+    kind: str = "quadrilateral",
+) -> ts.Problem:
     """A distorted block pulled to a stretch along x, free to contract."""
-    mesh = distorted()
+    mesh = distorted(kind)
+    motion = [(stretch - 1) * mesh.upper[0]] + [0.0] * (mesh.dim - 1)
     return ts.Problem(
         mesh=mesh,
         material=ts.Material(young=young, poisson=poisson),
         section=section,
         supports=[
-            ts.Fixed(on="left", fix="x"),
-            ts.Fixed(on="bottom", fix="y"),
-            ts.Fixed(on="right", fix="x", displacement=((stretch - 1) * mesh.upper[0], 0.0)),
+            *(
+                ts.Fixed(side, fix=axis)
+                for side, axis in list(zip(("left", "bottom", "back"), "xyz", strict=True))[: mesh.dim]
+            ),
+            ts.Fixed(on="right", fix="x", displacement=motion),
         ],
     )
 
@@ -118,22 +172,28 @@ def uniaxial(section: ts.PlaneStress | ts.PlaneStrain, stretch: float, young: fl
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(
     law=st.sampled_from(LAWS),
+    case=st.sampled_from([*PLANE, *SOLID, *SOLID]),
     section=st.sampled_from(sorted(SECTIONS)),
     stretch=st.floats(0.75, 1.6).filter(lambda stretch: abs(stretch - 1) > 1e-2),
     young=st.floats(1e2, 1e11),
     poisson=st.floats(0.0, 0.45),
 )
-def test_uniaxial_tension(law: str, section: str, stretch: float, young: float, poisson: float) -> None:
-    problem = uniaxial(SECTIONS[section](0.2), stretch, young, poisson)
-    path = ts.solve(problem, ts.Fem(law=law), TIGHT)
+def test_uniaxial_tension(
+    law: str, case: tuple[str, str], section: str, stretch: float, young: float, poisson: float
+) -> None:
+    kind, element = case
+    solid = case in SOLID
+    problem = uniaxial(None if solid else SECTIONS[section](0.2), stretch, young, poisson, kind)
+    mesh = problem.mesh
+    path = ts.solve(problem, ts.Fem(law, element), TIGHT)
     state = path.states[-1]
     assert state.load_factor == 1.0
-    stretches, nominal = principal_state(
-        law, young, poisson, [stretch, None, None if section == "plane-stress" else 1.0]
-    )
-    exact = problem.mesh.nodes * (stretches[:2] - 1)
+    free = solid or section == "plane-stress"
+    stretches, nominal = principal_state(law, young, poisson, [stretch, None, None if free else 1.0])
+    exact = mesh.nodes * (stretches[: mesh.dim] - 1)
     assert np.abs(state.displacement - exact).max() <= 1e-8 * np.abs(exact).max()
-    assert path.applied_force(state)[0] == pytest.approx(nominal[0] * 0.2 * 3, rel=1e-8)
+    area = 4.0 if solid else 0.2 * 3
+    assert path.applied_force(state)[0] == pytest.approx(nominal[0] * area, rel=1e-8)
 
 
 # P / E at Poisson's ratio 1/3: of the neo-Hookean law, and of Hencky's, which is ln(l) / l.
@@ -166,32 +226,41 @@ def test_uniaxial_plane_stress_in_closed_form(stretch: float) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_dead_load_gives_the_stretch_of_the_closed_form(law: str) -> None:
-    mesh = distorted()
+@pytest.mark.parametrize(("kind", "element"), [*PLANE, *SOLID])
+def test_dead_load_gives_the_stretch_of_the_closed_form(kind: str, element: str, law: str) -> None:
+    """The load is shared so that a uniform stress is in balance exactly, at every node of every element."""
+    mesh = distorted(kind)
+    area = 0.6 if mesh.dim == 2 else 4.0
+    rollers = [ts.Fixed(side, fix=axis) for side, axis in zip(("left", "bottom", "back"), "xyz", strict=True)]
     problem = ts.Problem(
         mesh,
         ts.Material(young=1.0, poisson=1 / 3),
-        ts.PlaneStress(0.2),
-        [ts.Fixed(on="left", fix="x"), ts.Fixed(on="bottom", fix="y")],
-        [ts.Force(on="right", total=(0.3 * 0.6, 0.0))],
+        in_section(mesh, "plane-stress", 0.2),
+        rollers[: mesh.dim],
+        [ts.Force(on="right", total=[0.3 * area] + [0.0] * (mesh.dim - 1))],
     )
-    state = ts.solve(problem, ts.Fem(law=law), ts.Newton(load_steps=4, tolerance=1e-13)).states[-1]
+    path = ts.solve(problem, ts.Fem(law, element), ts.Newton(load_steps=4, tolerance=1e-13))
+    state = path.states[-1]
     stretch = 1 + state.displacement[mesh.nodes[:, 0] == mesh.upper[0], 0] / mesh.upper[0]
     assert np.ptp(stretch) < 1e-11
     stretches, nominal = principal_state(law, 1.0, 1 / 3, [float(stretch[0]), None, None])
     assert nominal[0] == pytest.approx(0.3, rel=1e-10)
-    assert state.displacement[:, 1] == pytest.approx(mesh.nodes[:, 1] * (stretches[1] - 1), abs=1e-10)
+    assert path.potential is not None
+    uniform = path.potential.nodes * stretches[: mesh.dim]
+    assert state.all_positions == pytest.approx(uniform, abs=1e-10)
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_all_laws_are_one_at_small_strain(law: str) -> None:
-    for section in SECTIONS.values():
-        problem = patch(GRADIENTS["small"], section(0.5), poisson=0.3)
-        nodes = problem.mesh.nodes
-        linear = ts.Fem(law="linear").potential(problem).hessian(nodes).toarray()
-        assert ts.Fem(law=law).potential(problem).hessian(nodes).toarray() == pytest.approx(
-            linear, rel=1e-9, abs=1e-12 * np.abs(linear).max()
-        )
+    for kind, element in (*PLANE, *SOLID):
+        for section in SECTIONS:
+            mesh = distorted(kind)
+            problem = patch(
+                mesh, GRADIENTS["small"][: mesh.dim, : mesh.dim], in_section(mesh, section, 0.5), poisson=0.3
+            )
+            linear, other = (ts.Fem(name, element).potential(problem) for name in ("linear", law))
+            expected = linear.hessian(linear.nodes)
+            assert abs(other.hessian(other.nodes) - expected).max() <= 1e-9 * abs(expected).max()
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
@@ -211,35 +280,6 @@ def test_one_element_in_bending_is_as_stiff_as_published(aspect: float, poisson:
     # The couple is 1e-3 N on an arm of 1 m, EI is 1/12.
     locked = (1 / (1 - poisson) + aspect**2 / 2) / (1 + poisson)
     assert 1e-3 / curvature / (1 / 12) == pytest.approx(locked, rel=1e-9)
-
-
-def cook(n: int) -> ts.Problem:
-    """Cook's membrane, plane stress, nu = 1/3, a unit shear force on its right side; n by n elements."""
-    share = np.linspace(0, 1, n + 1)
-    along, up = np.meshgrid(share, share)
-    bottom, top = 44 * along, 44 + 16 * along
-    nodes = np.stack([48 * along, bottom + up * (top - bottom)], axis=-1).reshape(-1, 2)
-    return ts.Problem(
-        ts.Mesh(nodes, ts.rectangle((1.0, 1.0), (n, n)).elements),
-        ts.Material(young=1.0, poisson=1 / 3),
-        ts.PlaneStress(1.0),
-        [ts.Fixed(on="left")],
-        [ts.Force(on="right", total=(0.0, 1.0))],
-    )
-
-
-def test_cook_membrane() -> None:
-    """Four-node quadrilaterals with full integration; the converged deflection at (48, 52) is 23.97."""
-    deflections = []
-    for n in (8, 16, 32, 64):
-        problem = cook(n)
-        state = ts.solve(problem, ts.Fem(law="linear"), ts.Newton(load_steps=1)).states[-1]
-        watched = ts.nearest_node(problem.mesh, (48.0, 52.0))
-        assert problem.mesh.nodes[watched] == pytest.approx([48, 52])
-        deflections.append(state.displacement[watched, 1])
-    assert deflections == pytest.approx([22.0792, 23.4304, 23.8176, 23.9245], abs=6e-5)
-    assert deflections == sorted(deflections)
-    assert deflections[-1] < 23.97 < deflections[-1] + 0.06
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -309,3 +349,216 @@ def test_stress_across_the_plane(law: str, section: type[ts.PlaneStress] | type[
         stretches, nominal = principal_state(law, 1.0, poisson, (1.3, 0.9, 1.0))
         true = nominal if law == "linear" else nominal * stretches / stretches.prod()
         assert np.diag(stress(1.3, 0.9)) == pytest.approx(true, rel=1e-12)
+
+
+# --- elements that do not lock --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", ["quadrilateral", "hexahedron"])
+def test_mean_dilatation_is_the_linear_element_where_strain_is_uniform(kind: str, law: str) -> None:
+    mesh = distorted(kind)
+    gradient = GRADIENTS["large"][: mesh.dim, : mesh.dim]
+    problem = patch(mesh, gradient, in_section(mesh, "plane-strain", 0.5), poisson=0.45)
+    mean, full = (ts.Fem(law, element).potential(problem) for element in ("mean-dilatation", "linear"))
+    positions = mesh.nodes + mesh.nodes @ gradient.T
+    assert mean.energy(positions) == pytest.approx(full.energy(positions), rel=1e-12)
+    force = full.gradient(positions)
+    assert mean.gradient(positions) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
+    # Elsewhere it is softer, at rest by no more than what resists a change of volume within an element.
+    difference = full.hessian(mesh.nodes) - mean.hessian(mesh.nodes)
+    values = np.linalg.eigvalsh(difference.toarray())
+    assert values[0] >= -1e-12 * values[-1]
+    assert values[-1] > 0.1 * abs(full.hessian(mesh.nodes)).max()
+
+
+def test_mean_dilatation_of_one_square_in_closed_form() -> None:
+    """u = (x y, 0) in plane strain: tr e = y has no mean; what is left is 2 mu (e : e - (tr e)^2 / 2)."""
+    square = ts.rectangle((1.0, 1.0), (1, 1))
+    centred = ts.Mesh(square.nodes - 0.5, square.elements)
+    problem = ts.Problem(
+        centred,
+        ts.Material(1.0, 0.49),
+        ts.PlaneStrain(1.0),
+        [ts.Fixed([0, 1, 2])],
+        [ts.Force([3], (1.0, 0.0))],
+    )
+    x, y = centred.nodes.T
+    bent = centred.nodes + np.stack([x * y, 0 * x], axis=1)
+    lam, mu = lame(1.0, 0.49)
+    square_mean = 1 / 12  # of x^2, y^2 over the square
+    full = (lam / 2 + mu) * square_mean + mu * square_mean / 2
+    deviatoric = mu * (square_mean - square_mean / 2) + mu * square_mean / 2
+    assert ts.Fem("linear", "linear").potential(problem).energy(bent) == pytest.approx(full, rel=1e-12)
+    assert ts.Fem("linear", "mean-dilatation").potential(problem).energy(bent) == pytest.approx(deviatoric, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["triangle", "tetrahedron"])
+def test_quadratic_elements_bend_exactly(kind: str) -> None:
+    """Pure bending is a quadratic displacement: in balance at every inner node, its energy E/2 the integral of y^2."""
+    mesh, poisson, young = distorted(kind), 0.3, 3e3
+    problem = patch(mesh, GRADIENTS["small"][: mesh.dim, : mesh.dim], in_section(mesh, "plane-stress", 1.0), poisson)
+    potential = ts.Fem("linear", "quadratic").potential(problem)
+    x, y, z = np.pad(potential.nodes, ((0, 0), (0, 3 - mesh.dim))).T
+    y = y - 1.0
+    bent = np.stack([-x * y, x**2 / 2 + poisson * (y**2 - z**2) / 2, poisson * y * z], axis=1)[:, : mesh.dim]
+    force = potential.gradient(potential.nodes + bent)
+    inside = (potential.nodes > 1e-9) & (potential.nodes < mesh.upper - 1e-9)
+    inner = inside.all(axis=1)
+    assert inner.sum() > 10
+    size = np.abs(force).max()
+    assert np.abs(force[inner]).max() <= 1e-12 * size
+    # Free sides stay free: along x only the two ends are pulled and pushed.
+    free = inside[:, 0]
+    assert np.abs(force[free]).max() <= 1e-12 * size
+    length, height, width = (*mesh.upper, 1.0)[:3]
+    integral = length * width * (((height - 1) ** 3 + 1) / 3)
+    assert potential.energy(potential.nodes + bent) == pytest.approx(young / 2 * integral, rel=1e-12)
+    linear = ts.Fem("linear", "linear").potential(problem)
+    stiff = linear.energy(linear.nodes + bent[: mesh.n_nodes])
+    assert stiff > 1.02 * young / 2 * integral
+
+
+@pytest.mark.parametrize("on", ["right", "all", "right-top edge"])
+@pytest.mark.parametrize("kind", ["triangle", "tetrahedron"])
+def test_loads_on_quadratic_elements_are_consistent(kind: str, on: str) -> None:
+    """A uniform load does the work on any quadratic displacement that its integral does: on a side, an edge, a body."""
+    mesh = distorted(kind)
+    top, right = mesh.nodes[:, 1] == mesh.upper[1], mesh.nodes[:, 0] == mesh.upper[0]
+    nodes = np.flatnonzero(
+        {"right": right, "all": np.ones(mesh.n_nodes, dtype=bool), "right-top edge": right & top}[on]
+    )
+    fixed = {"right": [0], "all": [], "right-top edge": [0, 1]}[on]  # directions in which the loaded part is flat
+    problem = ts.Problem(
+        mesh,
+        ts.Material(1.0, 0.3),
+        in_section(mesh, "plane-stress", 1.0),
+        [ts.Fixed("left")],
+        [ts.Force(nodes, [3.0] + [0.0] * (mesh.dim - 1))],
+    )
+    potential = ts.Fem("linear", "quadratic").potential(problem)
+    assert isinstance(potential, QuadraticPotential)
+    share = potential.loading.external_force[:, 0] / 3
+    assert share.sum() == pytest.approx(1.0, rel=1e-12)
+
+    def mean(*powers: int) -> float:
+        """Of a product of powers of coordinates, over the loaded part of the block."""
+        axes = zip(powers, mesh.upper, range(mesh.dim), strict=True)
+        return math.prod(end**power / (1 if axis in fixed else power + 1) for power, end, axis in axes)
+
+    for powers in np.ndindex(*(3,) * mesh.dim):
+        if sum(powers) <= 2:
+            work = float(share @ np.prod(potential.nodes ** np.array(powers), axis=1))
+            assert work == pytest.approx(mean(*powers), rel=1e-12), powers
+
+
+def test_an_edge_through_the_body_is_free() -> None:
+    """Between two supports one element apart only their own sides are held, not what joins them through the body."""
+    mesh = ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron")
+    supports = [ts.Fixed("left"), ts.Fixed("right", displacement=(1e-3, 0.0, 0.0))]
+    problem = ts.Problem(mesh, ts.Material(1.0, 0.45), None, supports)
+    potential = ts.Fem("linear", "quadratic").potential(problem)
+    assert isinstance(potential, QuadraticPotential)
+    on_a_side = (potential.nodes[:, 0] == 0) | (potential.nodes[:, 0] == 1)
+    assert (potential.loading.held.all(axis=1) == on_a_side).all()
+
+
+def loaded_at_its_end(element: str, poisson: float, cells: int = 5) -> ts.Problem:
+    """A cantilever four times as long as deep, of a light load, `cells` cubes deep."""
+    return ts.Problem(
+        ts.box((0.2, 0.05, 0.05), (4 * cells, cells, cells), element),
+        ts.Material(1e4, poisson),
+        None,
+        [ts.Fixed("left")],
+        [ts.Force("right", (0.0, -1e-6, 0.0))],
+    )
+
+
+def sunk(problem: ts.Problem, element: str | None) -> float:
+    """Deflection of the middle of the end over P L^3 / 3 E I."""
+    path = ts.solve(problem, ts.Fem("linear", element), ts.Newton(load_steps=1))
+    assert path.status is ts.Status.CONVERGED
+    tip = ts.named_point(problem.mesh, "right-middle")
+    return float(-path.states[-1].displacement[tip, 1] / (1e-6 * 0.2**3 / (3 * 1e4 * 0.05**4 / 12)))
+
+
+# Deflection of that cantilever over P L^3 / 3 E I as the mesh is refined, see the extrapolation below.
+TRUE_DEFLECTION = {0.45: 1.0135, 0.49: 1.0066}
+
+
+@pytest.mark.parametrize(("poisson", "locked"), [(0.45, 0.922), (0.49, 0.791)])
+def test_no_locking_in_bending(poisson: float, locked: float) -> None:
+    """20 by 5 by 5 hexahedra: full integration is far too stiff, mean dilatation within 2 %, and the default."""
+    problem, true = loaded_at_its_end("hexahedron", poisson), TRUE_DEFLECTION[poisson]
+    assert sunk(problem, "linear") / true == pytest.approx(locked, abs=0.01)
+    assert sunk(problem, None) / true == pytest.approx(1.0, abs=0.02)
+    assert ts.Fem("linear").chosen_element(problem) == "mean-dilatation"
+
+
+def test_no_locking_of_quadratic_tetrahedra() -> None:
+    problem = loaded_at_its_end("tetrahedron", 0.45, cells=4)
+    assert sunk(problem, None) / TRUE_DEFLECTION[0.45] == pytest.approx(1.0, abs=0.02)
+    assert sunk(problem, "linear") / TRUE_DEFLECTION[0.45] < 0.8
+
+
+@pytest.mark.verification
+@pytest.mark.parametrize("poisson", TRUE_DEFLECTION)
+def test_true_deflection_of_the_cantilever(poisson: float) -> None:
+    """Two families of elements, each extrapolated by its own observed order, meet within 0.3 %."""
+    extrapolated = []
+    for kind, cells in (("hexahedron", (5, 7, 10)), ("tetrahedron", (3, 4, 6))):
+        found = [sunk(loaded_at_its_end(kind, poisson, count), None) for count in cells]
+        assert found == sorted(found)
+        if kind == "tetrahedron":
+            assert found[-1] / TRUE_DEFLECTION[poisson] == pytest.approx(1.0, abs=0.02)
+
+        def gap(order: float, found: list[float] = found, cells: tuple[int, ...] = cells) -> float:
+            h = np.array([count**-order for count in cells])
+            return float((found[1] - found[0]) / (found[2] - found[1]) - (h[0] - h[1]) / (h[1] - h[2]))
+
+        order = brentq(gap, 0.5, 4.0)
+        h = np.array([count**-order for count in cells])
+        extrapolated.append(found[2] + (found[2] - found[1]) / (h[1] - h[2]) * h[2])
+    assert extrapolated == pytest.approx([TRUE_DEFLECTION[poisson]] * 2, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "section", "finer"),
+    [
+        (ts.box((2.0, 1.0, 1.0), (2, 1, 1)), None, "mean-dilatation"),
+        (ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron"), None, "quadratic"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStrain(1.0), "mean-dilatation"),
+        (ts.rectangle((2.0, 1.0), (2, 1), "triangle"), ts.PlaneStrain(1.0), "quadratic"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStress(1.0), "mean-dilatation"),
+    ],
+)
+def test_the_default_and_the_warning(
+    mesh: ts.Mesh, section: ts.PlaneStress | ts.PlaneStrain | None, finer: str
+) -> None:
+    def problem(poisson: float, region: float | None = None) -> ts.Problem:
+        regions = [] if region is None else [ts.Region([0], ts.Material(1.0, region))]
+        pull = [1e-6] + [0.0] * (mesh.dim - 1)
+        return ts.Problem(
+            mesh, ts.Material(1.0, poisson), section, [ts.Fixed("left")], [ts.Force("right", pull)], regions
+        )
+
+    plain, tight, mixed = problem(0.4), problem(0.41), problem(0.3, region=0.45)
+    locks = not isinstance(section, ts.PlaneStress)
+    for law in LAWS:
+        assert ts.Fem(law).chosen_element(plain) == "linear"
+        for stiff in (tight, mixed):
+            assert ts.Fem(law).chosen_element(stiff) == (finer if mesh.dim == 3 else "linear")
+            assert ts.Fem(law, finer).chosen_element(stiff) == finer
+            assert not ts.Fem(law, finer).warnings(stiff)
+            assert any("lock" in said and finer in said for said in ts.Fem(law, "linear").warnings(stiff)) == locks
+        assert not ts.Fem(law, "linear").warnings(plain)
+    asked = ts.solve(tight, ts.Fem("linear", "linear"), ts.Newton(load_steps=1))
+    assert any("lock at a Poisson's ratio of 0.41" in said for said in asked.warnings) == locks
+    other = {"quadratic": "mean-dilatation", "mean-dilatation": "quadratic"}[finer]
+    with pytest.raises(ts.TruespringError, match=f"element = '{other}' is not for a mesh of {mesh.element}"):
+        ts.Fem("linear", other).potential(plain)
+
+
+def test_an_unknown_element_is_refused() -> None:
+    with pytest.raises(ts.TruespringError, match=r"element = 'quadratc' is unknown.*quadratic"):
+        ts.Fem("linear", "quadratc")

@@ -17,14 +17,17 @@ from .mesh import Plane as Plane
 from .mesh import box as box
 from .mesh import named_point as named_point
 from .mesh import nearest_node as nearest_node
+from .mesh import read_mesh as read_mesh
 from .mesh import rectangle as rectangle
 from .models import LAWS as LAWS
 from .models import RULES as RULES
 from .models import Fem as Fem
+from .models import Fitness as Fitness
 from .models import Moduli as Moduli
 from .models import SpringNetwork as SpringNetwork
 from .models import Springs as Springs
 from .models import UserStiffness as UserStiffness
+from .models import judge as judge
 from .models import moduli as moduli
 from .problem import Fixed as Fixed
 from .problem import Force as Force

@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from truespring.report.result import Result
+    from truespring.study import Realised, Study
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -59,10 +60,12 @@ def _parser() -> argparse.ArgumentParser:
     for name, run, summary in (
         ("verify", _verify, "solve every model of a study, compare them, write curves, pictures and a report"),
         ("solve", _solve, "the same without comparison, figures and report"),
+        ("moduli", _moduli, "tell and draw what the springs of a study realise, and which rule is better, unsolved"),
     ):
         verb = add(name, run, summary)
         verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     add("check", _check, "check a study and show what would be run, solving nothing")
+    add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
 
@@ -94,18 +97,16 @@ def _solve(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.report.summary import summary
-    from truespring.report.tables import moduli_table, result_tables
+    from truespring.report.tables import result_tables
     from truespring.study import read_studies, realised_moduli, run, write, write_overview
 
     studies = read_studies(options.study)
-    with _writing(options.out):  # before anything is solved
-        for study in studies:
-            (options.out / study.stem).mkdir(parents=True, exist_ok=True)
+    _make_folders(options.out, studies)
     console = _console(options)
     results = []
     for study in studies:
-        for title, moduli in realised_moduli(study):
-            console.print(moduli_table(title, moduli))
+        if not console.quiet:
+            _print_realised(console, study.stem, realised_moduli(study))
         with _progress(options) as progress:
             result = run(study, progress, comparing)
         results.append(result)
@@ -123,6 +124,13 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     for result in results:
         _say_failures(result, options.out, shown=not console.quiet)
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
+
+
+def _make_folders(out: Path, studies: "Sequence[Study]") -> None:
+    """Where nothing can be written, say so before anything is solved."""
+    with _writing(out):
+        for study in studies:
+            (out / study.stem).mkdir(parents=True, exist_ok=True)
 
 
 @contextmanager
@@ -147,8 +155,47 @@ def _say_failures(result: "Result", out: Path, shown: bool) -> None:
             )
 
 
-def _check(options: argparse.Namespace) -> int:
+def _moduli(options: argparse.Namespace) -> int:
+    from truespring.study import read_studies, realised_moduli, realised_values, write_moduli
+
+    studies = read_studies(options.study)
+    _make_folders(options.out, studies)
+    console = _console(options)
+    values = {}
+    for study in studies:
+        found = list(realised_moduli(study))
+        values[study.stem] = {one.name: realised_values(one) for one in found}
+        _print_realised(console, study.stem, found)
+        with _writing(options.out):
+            picture = write_moduli(study, found, options.out)
+        console.print(f"picture: {picture}" if picture else f"{study.stem}: no model of springs", soft_wrap=True)
+    if options.json:
+        _print_json(values if len(values) > 1 else values[studies[0].stem])
+    return CONVERGED
+
+
+def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:
+    """What springs realise beside each material, and whether they are fit for all of them."""
     from truespring.report.tables import moduli_table
+
+    for one in several:
+        for title, (_, moduli) in zip(one.titles, one.by_material, strict=True):
+            console.print(moduli_table(f"{stem}: {title}", moduli))
+        console.print(f"{one.fitness.sentence}\n")
+
+
+def _rules(options: argparse.Namespace) -> int:
+    from truespring.report.tables import rules_table
+    from truespring.study import rule_values
+
+    rules = rule_values()
+    _console(options).print(rules_table(rules))
+    if options.json:
+        _print_json(rules)
+    return CONVERGED
+
+
+def _check(options: argparse.Namespace) -> int:
     from truespring.study import plan, read_studies, realised_moduli
 
     studies = read_studies(options.study)
@@ -156,8 +203,8 @@ def _check(options: argparse.Namespace) -> int:
     console = _console(options)
     for study in studies:
         _print_plan(console, plans[study.stem])
-        for title, moduli in realised_moduli(study):
-            console.print(moduli_table(title, moduli))
+        if not console.quiet:
+            _print_realised(console, study.stem, realised_moduli(study))
     if options.json:
         _print_json(plans if len(plans) > 1 else plans[studies[0].stem])
     return CONVERGED
@@ -204,8 +251,11 @@ def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
     material, section = plan["material"], plan["section"]
     size = " by ".join(f"{extent:g} m" for extent in plan["size"])
-    console.print(f"{plan['title']}\n{size}, {section['kind']}, thickness {section['thickness']:g} m")
+    across = f", {section['kind']}, thickness {section['thickness']:g} m" if section else ""
+    console.print(f"{plan['title']}\n{size}{across}")
     console.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
+    for region in plan["regions"]:
+        console.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
     console.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
     console.print(f"held nodes: {held}")
     force = ", ".join(f"{component:g}" for component in plan["total_force"])

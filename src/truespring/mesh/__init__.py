@@ -1,5 +1,6 @@
 """Geometry that knows no physics: nodes, elements, named sides, selections."""
 
+from truespring.mesh.files import read_mesh as read_mesh
 from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.mesh import Mesh as Mesh

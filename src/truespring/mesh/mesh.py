@@ -76,7 +76,9 @@ class Mesh:
         centres = self.nodes[self.elements].mean(axis=1)
         smallest = self._rest_jacobians.min(axis=1)
         self._refuse(smallest <= -self._degenerate, "elements", "inverted: their corner Jacobian is negative", centres)
-        self._refuse(smallest <= self._degenerate, "elements", "degenerate: flat or with nodes that coincide", centres)
+        self._refuse(
+            ~(smallest > self._degenerate), "elements", "degenerate: flat or with nodes that coincide", centres
+        )
         if self.element != "line":  # springs may be parallel
             _, first = np.unique(np.sort(self.elements, axis=1), axis=0, return_index=True)
             twice = np.ones(len(self.elements), dtype=bool)

@@ -7,6 +7,9 @@ from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprin
 from truespring.models.fem import ELEMENTS as ELEMENTS
 from truespring.models.fem import Fem as Fem
 from truespring.models.fem import FemPotential as FemPotential
+from truespring.models.fitness import Fitness as Fitness
+from truespring.models.fitness import follows_poisson as follows_poisson
+from truespring.models.fitness import judge as judge
 from truespring.models.laws import LAWS as LAWS
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli

@@ -51,7 +51,7 @@ def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> I
     material = problem.material
     assert material is not None  # springs have asked for it
     kappa = float(springs.kappa(problem)[0])
-    if kappa < 0:
+    if kappa < -1e-9 * material.young:  # not of rounding
         yield (
             f"the volume term has a negative modulus ({kappa:.4g} Pa, Poisson's ratio below "
             f"{'1/3' if problem.mesh.dim == 2 else '1/4'}): at large stretch nothing bounds the energy from below; "

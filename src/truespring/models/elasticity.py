@@ -33,7 +33,7 @@ def lattice_classes(mesh: Mesh) -> Ints | None:
     """Return the class of each element, -1 for those at the boundary that the inside does not have; None if no lattice.
 
     Two elements are of one class where a translation carries one into the other, whatever the order of
-    their nodes. A lattice has few, each equally often; at its boundary there may be others.
+    their nodes. A lattice has few, each all over the body; at its boundary there may be others.
     """
     at = mesh.nodes[mesh.elements]
     size = np.ptp(at, axis=1).max(axis=1)
@@ -45,8 +45,12 @@ def lattice_classes(mesh: Mesh) -> Ints | None:
     classes = classes.ravel()
     inner = ~_at_boundary(mesh)
     kept = np.unique(classes[inner]) if inner.any() else np.arange(len(count))
-    if len(kept) > _MOST_CLASSES or (len(kept) > 1 and len(kept) > len(at) / 2):
+    if len(kept) > _MOST_CLASSES:
         return None
+    centres, reach = at.mean(axis=1), np.ptp(at, axis=1).max(axis=0)
+    for one in kept:  # graded meshes have classes that fill a part of the body only
+        if (np.ptp(centres[classes == one], axis=0) < np.ptp(centres, axis=0) - 2.5 * reach).any():
+            return None
     return np.where(np.isin(classes, kept), classes, -1)
 
 

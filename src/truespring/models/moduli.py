@@ -225,7 +225,7 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
         young_wanted=young,
         poisson_wanted=poisson,
         bending=_bending(alone, springs, sizes),
-        fem_bending=_bending(alone, None, sizes),
+        fem_bending=_fem_bending(alone, tuple(sizes.items())),
         depth=depth,
         lattice=classes is not None,
         patch_score=patch_score,
@@ -327,6 +327,12 @@ def _bending(
     return MappingProxyType({depth: _bending_factor(one, springs, sizes[depth]) for depth in sorted(sizes)})
 
 
+@lru_cache(maxsize=8)
+def _fem_bending(problem: Problem, sizes: tuple[tuple[int, tuple[int, ...]], ...]) -> MappingProxyType[int, float]:
+    """The bending factors of the elements that are the default; the same for all springs on a body."""
+    return _bending(problem, None, dict(sizes))
+
+
 def _first_element(problem: Problem) -> Problem:
     """The mesh's first element as a problem of its own, held and loaded in some way."""
     mesh = problem.mesh
@@ -351,28 +357,28 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
     dim, corners = mesh.dim, CORNERS[: mesh.kind.n_nodes, : mesh.dim]
     sides = mesh.nodes[mesh.elements[0, -2 if dim == 3 else 2]] - mesh.nodes[mesh.elements[0, 0]]
     grid = np.array([count + 1 for count in counts])
+    # Both ends of a cell along x are one place of the section.
+    section_corners, place = np.unique(corners[:, 1:], axis=0, return_inverse=True)
+    gather = np.kron(np.eye(len(section_corners))[place.ravel()], np.eye(dim))
     n_free = dim * int(np.prod(grid))
-    energy = np.zeros((n_free + 1, n_free + 1))
+    stiffness, force, energy = np.zeros((n_free, n_free)), np.zeros(n_free), 0.0
     single = springs is not None and springs.sharing == "single"
     matrix = _element_matrix(problem, springs)
     for cell in np.ndindex(*counts):
-        places = corners[:, 1:] + np.array(cell)
         if single:
             matrix = _element_matrix(problem, springs, _shares_of_links(problem, cell, counts))
-        numbers = np.ravel_multi_index(tuple(places.T), tuple(grid))
-        moved = np.zeros((len(corners), dim, n_free + 1))
-        for axis in range(dim):
-            moved[np.arange(len(corners)), axis, dim * numbers + axis] = 1
-        height = (places[:, 0] - counts[0] / 2) * sides[1]
-        moved[:, 0, -1] = -corners[:, 0] * sides[0] * height
-        moved[:, 1, -1] = corners[:, 0] * sides[0] ** 2 / 2
-        flat = moved.reshape(-1, n_free + 1)
-        energy += flat.T @ matrix @ flat
-    free = -np.linalg.pinv(energy[:-1, :-1], rcond=1e-10, hermitian=True) @ energy[:-1, -1]
-    unit = np.append(free, 1.0)
+        numbers = np.ravel_multi_index(tuple((section_corners + np.array(cell)).T), tuple(grid))
+        dofs = (dim * numbers[:, None] + np.arange(dim)).ravel()
+        bent = np.zeros((len(corners), dim))
+        bent[:, 0] = -corners[:, 0] * sides[0] * (corners[:, 1] + cell[0] - counts[0] / 2) * sides[1]
+        bent[:, 1] = corners[:, 0] * sides[0] ** 2 / 2
+        stiffness[np.ix_(dofs, dofs)] += gather.T @ matrix @ gather
+        force[dofs] += gather.T @ matrix @ bent.ravel()
+        energy += float(bent.ravel() @ matrix @ bent.ravel())
+    energy -= float(force @ np.linalg.lstsq(stiffness, force, rcond=1e-10)[0])
     young, _ = section.apparent_moduli(material)
     width = section.thickness if dim == 2 else counts[1] * sides[2]
-    return float(unit @ energy @ unit / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
+    return float(energy / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
 
 
 def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:

@@ -16,7 +16,7 @@ INK, BLUE, RED, LOAD, MOTION, FAINT = "#16191d", "#0072b2", "#d3222a", "#b84a00"
 #: How far two paths are apart, from nothing to the largest distance: matplotlib's magma from its light end on.
 _ERROR_RANGE = (0.97, 0.27)
 
-_SPRING_STYLES = ((BLUE, "-", "o"), ("#3a9bdc", "--", "s"), ("#00476f", "-.", "^"), ("#5c7fb8", ":", "D"))
+SPRING_STYLES = ((BLUE, "-", "o"), ("#3a9bdc", "--", "s"), ("#00476f", "-.", "^"), ("#5c7fb8", ":", "D"))
 _REFERENCE_STYLES = (
     ("#000000", (0, ()), "s"),
     ("#3d4248", (0, (6, 2)), "^"),
@@ -77,7 +77,7 @@ def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
     springs = [name for name in result.paths if is_strong(result, name)]
     others = [name for name in result.paths if name not in springs]
     return {
-        **{name: _SPRING_STYLES[place % len(_SPRING_STYLES)] for place, name in enumerate(springs)},
+        **{name: SPRING_STYLES[place % len(SPRING_STYLES)] for place, name in enumerate(springs)},
         **{name: _REFERENCE_STYLES[place % len(_REFERENCE_STYLES)] for place, name in enumerate(others)},
     }
 

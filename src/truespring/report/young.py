@@ -12,7 +12,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats
 from truespring.models import Moduli
 from truespring.report.quantity import natural_scale, quantity
-from truespring.report.style import _SPRING_STYLES, BLUE, INK, LOAD, figure_style
+from truespring.report.style import BLUE, INK, LOAD, SPRING_STYLES, figure_style
 from truespring.report.surfaces import VIEW, seen
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def save_young(several: Mapping[str, Moduli], material: str, folder: FilePath) -
     """Write the figure of springs by their labels as moduli.png and moduli.svg into `folder`; return the first."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    looks = itertools.cycle(_SPRING_STYLES)
+    looks = itertools.cycle(SPRING_STYLES)
     known = [Known(label, moduli, *look[:2]) for (label, moduli), look in zip(several.items(), looks, strict=False)]
     folder.mkdir(parents=True, exist_ok=True)
     with figure_style():

@@ -2,9 +2,13 @@
 
 from truespring.study.read import Study as Study
 from truespring.study.read import read_study as read_study
+from truespring.study.run import Realised as Realised
 from truespring.study.run import plan as plan
 from truespring.study.run import read_studies as read_studies
 from truespring.study.run import realised_moduli as realised_moduli
+from truespring.study.run import realised_values as realised_values
+from truespring.study.run import rule_values as rule_values
 from truespring.study.run import run as run
 from truespring.study.run import write as write
+from truespring.study.run import write_moduli as write_moduli
 from truespring.study.run import write_overview as write_overview

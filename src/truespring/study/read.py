@@ -19,6 +19,7 @@ from truespring.mesh import (
     box,
     named_point,
     nearest_node,
+    read_mesh,
     rectangle,
     select,
     select_elements,
@@ -157,8 +158,6 @@ class _Builder:
             case table:
                 with self.at("mesh", "unit"):
                     scale = to_si(f"1 {table.unit}", "length")
-                from truespring.mesh.files import read_mesh
-
                 return read_mesh(self.file.parent / table.file, scale)
 
     def section(self, mesh: Mesh) -> Section | None:

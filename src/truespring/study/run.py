@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -13,9 +14,9 @@ import numpy as np
 from truespring.comparison import compare, most_moved
 from truespring.equilibrium import Path, solve
 from truespring.errors import StudyError
-from truespring.material import PlaneStress, Solid
+from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, Moduli, Springs, model_warnings, moduli
+from truespring.models import RULES, Fem, Fitness, Moduli, Springs, follows_poisson, judge, model_warnings, moduli
 from truespring.problem import Problem
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
@@ -77,11 +78,102 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
     )
 
 
-def realised_moduli(study: Study) -> Iterator[tuple[str, Moduli]]:
-    """Yield a title and what they realise for each springs model of a study, solving nothing."""
+@dataclass(frozen=True, eq=False)
+class Realised:
+    """What the springs of a model realise, known without solving.
+
+    Attributes:
+        name: of the model in the study.
+        springs: the model.
+        by_material: the moduli beside each material, that of the body first, then those of its regions.
+        fitness: whether the springs are fit for all of them, and which are better.
+    """
+
+    name: str
+    springs: Springs
+    by_material: tuple[tuple[Material, Moduli], ...]
+    fitness: Fitness
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """What the moduli beside each material are called: by the material where there are several."""
+        what = f"what '{self.name}' realises, {self.springs.label}"
+        if len(self.by_material) == 1:
+            return (what,)
+        return tuple(
+            f"{what}, where E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}"
+            for material, _ in self.by_material
+        )
+
+
+def realised_moduli(study: Study) -> Iterator[Realised]:
+    """Yield what each springs model of a study realises, solving nothing."""
     for name, entry in study.entries.items():
         if isinstance(entry, Springs):
-            yield f"{study.stem}: what '{name}' realises, {entry.label}", moduli(study.problem, entry)
+            found = []
+            for twin in study.problem.homogeneous:
+                assert twin.material is not None  # a study has one
+                found.append((twin.material, moduli(twin, entry)))
+            yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance))
+
+
+def realised_values(realised: Realised) -> dict[str, Any]:
+    """Return what springs realise as values that JSON can hold: of the body's own material, then of its regions'."""
+    (material, first), *others = realised.by_material
+    fitness, better = realised.fitness, realised.fitness.better
+    return {
+        "label": realised.springs.label,
+        "material": _material(material),
+        **moduli_values(first),
+        **(
+            {"regions": [{"material": _material(one), **moduli_values(found)} for one, found in others]}
+            if others
+            else {}
+        ),
+        "fit": fitness.fit,
+        "reasons": list(fitness.reasons),
+        "better": None if better is None else {"rule": better.rule, "volume": better.volume},
+        "sentence": fitness.sentence,
+    }
+
+
+def _material(material: Material) -> dict[str, float]:
+    return {"young": material.young, "poisson": material.poisson}
+
+
+def write_moduli(study: Study, realised: Sequence[Realised], out: FilePath) -> FilePath | None:
+    """Write moduli.json and a picture of Young's modulus by direction into out/STEM; return the picture, if any."""
+    folder = out / study.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    values = {one.name: realised_values(one) for one in realised}
+    (folder / "moduli.json").write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    if not realised:
+        return None
+    from truespring.report.young import save_young
+
+    labels = [one.springs.label for one in realised]
+    several = {
+        one.springs.label if labels.count(one.springs.label) == 1 else f"{one.springs.label} ({one.name})": moduli
+        for one in realised
+        for moduli in [one.by_material[0][1]]
+    }
+    within = " in plane strain" if isinstance(study.problem.section, PlaneStrain) else ""
+    return save_young(several, f"material{within}", folder / "figures")
+
+
+def rule_values() -> dict[str, dict[str, Any]]:
+    """Return the stiffness rules with what they realise and their source, as values that JSON can hold."""
+    return {
+        name: {
+            "elements": list(rule.elements),
+            "realises": rule.realises,
+            "follows_poisson": follows_poisson(name),
+            "coupled": rule.coupled,
+            "parameters": list(rule.parameters),
+            "source": rule.source,
+        }
+        for name, rule in RULES.items()
+    }
 
 
 def write(result: Result, out: FilePath, report: bool = True) -> None:
@@ -110,7 +202,7 @@ def _clear(folder: FilePath) -> None:
         names = [name for name in former if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)]
     except (OSError, ValueError, KeyError, TypeError):
         return
-    figures = [*_FIGURES, *(f"{model}_over_{reference}" for model in names for reference in names)]
+    figures = [*_FIGURES, *(f"{one}_{what}_{other}" for one in names for other in names for what in ("over", "error"))]
     left = [folder / "report.html"]
     left += [folder / "figures" / f"{figure}.{kind}" for figure in figures for kind in ("png", "svg")]
     for name in names:
@@ -146,6 +238,10 @@ def plan(study: Study) -> dict[str, Any]:
         "n_nodes": mesh.n_nodes,
         "n_elements": len(mesh.elements),
         "material": dataclasses.asdict(problem.material) if problem.material else None,
+        "regions": [
+            {**dataclasses.asdict(material), "n_elements": int((problem.material_numbers == number).sum())}
+            for number, material in enumerate(problem.materials[1:], start=1)
+        ],
         "section": _section(problem),
         "n_unknowns": int((~loading.held).sum()),
         "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
@@ -170,11 +266,14 @@ def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
         known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
         law = {"law": entry.law, "element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
         return {"kind": entry.kind, "label": entry.label, **law, "warnings": list(known)}
-    realised = moduli(study.problem, entry)
+    realised = moduli(study.problem.homogeneous[0], entry)
+    fitness = judge(study.problem, entry, study.tolerance)
     return {
         "kind": entry.kind,
         "label": entry.label,
         "n_springs": realised.n_springs,
         "moduli": moduli_values(realised),
+        "fit": fitness.fit,
+        "sentence": fitness.sentence,
         "warnings": list(model_warnings(study.problem, entry)),
     }

@@ -1,0 +1,319 @@
+"""What a mesh file holds, whatever its format, and the mesh that follows from it."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import MeshError
+from truespring.mesh.kinds import ELEMENT_KINDS
+from truespring.mesh.mesh import Mesh
+
+#: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
+#: fixed number of corners are here to be refused by name.
+CELL_KINDS: dict[str, tuple[int, int]] = {
+    "vertex": (0, 1),
+    "line": (1, 2),
+    "triangle": (2, 3),
+    "quadrilateral": (2, 4),
+    "tetrahedron": (3, 4),
+    "hexahedron": (3, 8),
+    "wedge": (3, 6),
+    "pyramid": (3, 5),
+    "polygon": (2, 0),
+    "triangle strip": (2, 0),
+    "prism": (3, 0),
+    "polyhedron": (3, 0),
+}
+
+# The nodes of an element in the order of its mirror image.
+_MIRRORED = {
+    "triangle": (0, 2, 1),
+    "quadrilateral": (0, 3, 2, 1),
+    "tetrahedron": (0, 2, 1, 3),
+    "hexahedron": (0, 3, 2, 1, 4, 7, 6, 5),
+}
+
+_PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
+_SUPPORTED = "a body is made of triangles, quadrilaterals, tetrahedra or hexahedra"
+
+# A coordinate beyond this was damaged, whatever the unit; its square still is a number.
+_FAR = 1e30
+
+# Shares of the body's diameter.
+_SAME_PLACE = 1e-9  # nodes this near are at one place
+_FLAT = 1e-6  # a body this thin lies in a plane: files carry six digits or more
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of one kind.
+
+    Attributes:
+        kind: a key of CELL_KINDS.
+        nodes: the file's node numbers, corners first, shape (n_cells, nodes of a cell).
+        numbers: the file's cell numbers, shape (n_cells,).
+        lines: where they stand in a text file, shape (n_cells,).
+    """
+
+    kind: str
+    nodes: Ints
+    numbers: Ints
+    lines: Ints | None = None
+
+    @property
+    def dim(self) -> int:
+        """The dimensions that the cells fill."""
+        return CELL_KINDS[self.kind][0]
+
+    @property
+    def corners(self) -> Ints:
+        """The nodes at the corners; all nodes of a kind without a fixed number of corners."""
+        return self.nodes[:, : CELL_KINDS[self.kind][1] or None]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The contents of a mesh file, by the file's own numbers of nodes and cells.
+
+    Attributes:
+        node_numbers, points: shapes (n,) and (n, 3) [the file's unit of length].
+        cells: each block in the file's order.
+        node_groups, cell_groups: numbers of nodes and of cells by name.
+        node_lines: where the nodes stand in a text file, shape (n,).
+        notes: what should be known of the file, in words.
+    """
+
+    node_numbers: Ints
+    points: Floats
+    cells: Sequence[Cells]
+    node_groups: Mapping[str, Ints] = field(default_factory=dict)
+    cell_groups: Mapping[str, Ints] = field(default_factory=dict)
+    node_lines: Ints | None = None
+    notes: tuple[str, ...] = ()
+
+    def mesh(self, scale: float) -> Mesh:
+        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none."""
+        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
+            return self._mesh(scale)
+
+    def _mesh(self, scale: float) -> Mesh:
+        self._check_nodes()
+        cells = _by_kind(self.cells)
+        body = _body(cells)
+        for block in cells:
+            self._check_cells(block)
+        kind = body[0].kind
+        corners = self._rows(np.concatenate([block.corners for block in body]))
+        nodes = np.unique(corners)
+        positions = _in_their_dimensions(self.points[nodes] * scale, kind)
+        elements = np.searchsorted(nodes, corners)
+        is_inverted = _is_inverted(positions, elements, kind)
+        element_groups, node_groups = self._groups(cells, body, nodes)
+        notes = [
+            *self.notes,
+            *self._second_order(body, nodes),
+            *self._unreferenced(body, scale),
+            *_coincident(positions, self.node_numbers[nodes]),
+            *([f"all {len(elements)} elements are inverted in the file and were mirrored"] if is_inverted else []),
+            *(
+                f"group '{name}' has no node of the body and was left out"
+                for name in node_groups
+                if not node_groups[name].size
+            ),
+        ]
+        try:
+            return Mesh(
+                positions,
+                elements[:, _MIRRORED[kind]] if is_inverted else elements,
+                kind,
+                node_groups=_not_empty(node_groups),
+                element_groups=_not_empty(element_groups),
+                notes=tuple(notes),
+            )
+        except MeshError as error:
+            raise MeshError(f"{error}; elements are counted from 0 in the file's order") from None
+
+    def _rows(self, node_numbers: Ints) -> Ints:
+        return places(self.node_numbers, node_numbers)
+
+    def _check_nodes(self) -> None:
+        twice = _repeated(self.node_numbers)
+        if twice is not None:
+            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice")
+        lost = ~np.asarray((np.abs(self.points) < _FAR).all(axis=1))
+        if lost.any():
+            row = int(lost.argmax())
+            raise MeshError(
+                f"{_at(self.node_lines, row)}{lost.sum()} of {len(lost)} nodes have a coordinate that is not finite "
+                f"or beyond {_FAR:g}, the first is node {self.node_numbers[row]}"
+            )
+
+    def _check_cells(self, cells: Cells) -> None:
+        unknown = (self._rows(cells.nodes) < 0).any(axis=1)
+        if unknown.any():
+            row = int(unknown.argmax())
+            node = next(node for node in cells.nodes[row] if self._rows(np.array([node]))[0] < 0)
+            raise MeshError(
+                f"{_at(cells.lines, row)}element {cells.numbers[row]} ({cells.kind}) names node {node}, "
+                "which is not in the file"
+            )
+
+    def _groups(
+        self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints
+    ) -> tuple[dict[str, Ints], dict[str, Ints]]:
+        """Return groups of elements and of nodes by the body's own numbers; some may be empty."""
+        elements = np.concatenate([block.numbers for block in body])
+        element_groups: dict[str, Ints] = {}
+        members = {name: [group] for name, group in self.node_groups.items()}
+        for name, group in self.cell_groups.items():
+            element_groups[name] = _found(elements, group)
+            members.setdefault(name, []).extend(block.corners[_found(block.numbers, group)].ravel() for block in cells)
+        return element_groups, {
+            name: _found(self.node_numbers[nodes], np.unique(np.concatenate(group))) for name, group in members.items()
+        }
+
+    def _second_order(self, body: Sequence[Cells], nodes: Ints) -> list[str]:
+        high = [block for block in body if block.nodes.shape[1] > block.corners.shape[1]]
+        if not high:
+            return []
+        between = np.setdiff1d(np.concatenate([block.nodes.ravel() for block in high]), self.node_numbers[nodes])
+        return [
+            f"{sum(len(block.nodes) for block in high)} elements of second order became their corners; "
+            f"{len(between)} nodes between the corners were left out"
+        ]
+
+    def _unreferenced(self, body: Sequence[Cells], scale: float) -> list[str]:
+        has_element = np.zeros(len(self.points), dtype=bool)
+        for block in body:
+            has_element[self._rows(block.nodes)] = True
+        if has_element.all():
+            return []
+        first = int(has_element.argmin())
+        return [
+            f"{(~has_element).sum()} of {len(has_element)} nodes are unreferenced (no element has them) and were left "
+            f"out; the first is node {self.node_numbers[first]} at {_place(self.points[first] * scale)} m"
+        ]
+
+
+def places(numbers: Ints, wanted: Ints) -> Ints:
+    """Return where each of `wanted` stands among `numbers`, -1 where it does not; shape of `wanted`."""
+    if not len(numbers):
+        return np.full(wanted.shape, -1, dtype=np.int64)
+    order = np.argsort(numbers, kind="stable")
+    found = order[np.searchsorted(numbers, wanted, sorter=order).clip(max=len(numbers) - 1)]
+    return np.where(numbers[found] == wanted, found, -1)
+
+
+def _found(numbers: Ints, wanted: Ints) -> Ints:
+    """Return where those of `wanted` stand that are among `numbers`."""
+    where = places(numbers, wanted)
+    return np.asarray(where[where >= 0])
+
+
+def _repeated(numbers: Ints) -> int | None:
+    """Return where the first number stands that was there before, None where there is none."""
+    first = np.zeros(len(numbers), dtype=bool)
+    first[np.unique(numbers, return_index=True)[1]] = True
+    return None if first.all() else int(first.argmin())
+
+
+def _at(lines: Ints | None, row: int) -> str:
+    """Say in which line a row stands, if that is known."""
+    return "" if lines is None else f"line {lines[row]}: "
+
+
+def _not_empty(groups: Mapping[str, Ints]) -> dict[str, Ints]:
+    return {name: members for name, members in groups.items() if members.size}
+
+
+def _by_kind(cells: Sequence[Cells]) -> list[Cells]:
+    """Join the blocks of one kind and number of nodes; raise MeshError where a cell's number is there twice."""
+    blocks: dict[tuple[str, int], list[Cells]] = {}
+    for block in cells:
+        if len(block.nodes):
+            blocks.setdefault((block.kind, block.nodes.shape[1]), []).append(block)
+    joined = [
+        Cells(
+            kind,
+            np.concatenate([block.nodes for block in same]),
+            np.concatenate([block.numbers for block in same]),
+            _lines(same),
+        )
+        for (kind, _), same in blocks.items()
+    ]
+    numbers = np.concatenate([block.numbers for block in joined] or [np.zeros(0, dtype=np.int64)])
+    twice = _repeated(numbers)
+    if twice is not None:
+        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice")
+    return joined
+
+
+def _lines(cells: Sequence[Cells]) -> Ints | None:
+    lines = [block.lines for block in cells if block.lines is not None]
+    return np.concatenate(lines) if len(lines) == len(cells) else None
+
+
+def _body(cells: Sequence[Cells]) -> list[Cells]:
+    """Return the blocks of the highest dimension; raise MeshError where they are no body of one kind of element."""
+    counts = Counter[str]()
+    for block in cells:
+        counts[block.kind] += len(block.nodes)
+    dim = max((block.dim for block in cells), default=0)
+    if dim < 2:
+        raise MeshError(f"{f'there are only {listed(counts)}' if counts else 'there are no elements'}: {_SUPPORTED}")
+    body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
+    unread = {kind: count for kind, count in body.items() if kind not in _MIRRORED}
+    if unread:
+        raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}")
+    if len(body) > 1:
+        raise MeshError(f"{listed(body)}: {_SUPPORTED}, of one kind only")
+    return [block for block in cells if block.dim == dim]
+
+
+def _in_their_dimensions(positions: Floats, kind: str) -> Floats:
+    if ELEMENT_KINDS[kind].dim == 3:
+        return positions
+    z = positions[:, 2]
+    if np.ptp(z) > _FLAT * np.linalg.norm(np.ptp(positions, axis=0)):
+        raise MeshError(
+            f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
+            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra"
+        )
+    return positions[:, :2]
+
+
+def _is_inverted(positions: Floats, elements: Ints, kind: str) -> bool:
+    """Tell whether no element has a positive corner; where only some have none, the mesh refuses them."""
+    corners = np.array(ELEMENT_KINDS[kind].corners)
+    at = positions[elements]
+    jacobians = np.linalg.det(at[:, corners[:, 1:]] - at[:, corners[:, :1]])
+    return bool((jacobians <= 0).all() and (jacobians < 0).any())
+
+
+def _coincident(positions: Floats, numbers: Ints) -> list[str]:
+    from scipy.spatial import KDTree
+
+    near = _SAME_PLACE * float(np.linalg.norm(np.ptp(positions, axis=0)))
+    apart, nearest = map(np.asarray, KDTree(positions).query(positions, k=2, distance_upper_bound=near))
+    twins = np.flatnonzero(np.isfinite(apart[:, 1]))
+    if not twins.size:
+        return []
+    first = twins[0]
+    other = next(node for node in nearest[first] if node != first)
+    return [
+        f"{len(twins)} of {len(positions)} nodes share their place with another one, the first are nodes "
+        f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there"
+    ]
+
+
+def listed(counts: Mapping[str, int]) -> str:
+    """List kinds of cells with their counts."""
+    words = [f"{count} {kind if count == 1 else _PLURALS.get(kind, f'{kind}s')}" for kind, count in counts.items()]
+    return " and ".join([*([", ".join(words[:-1])] if words[1:] else []), *words[-1:]])
+
+
+def _place(position: Floats) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in position) + ")"

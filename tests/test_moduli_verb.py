@@ -1,0 +1,411 @@
+"""Springs judged before anything is solved, and the verbs that tell it: moduli and rules."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from tests.studies import changed, written
+from truespring.cli import main
+from truespring.models.fitness import follows_poisson, judge
+from truespring.report.page import _moduli_rows
+from truespring.report.style import figure_style
+from truespring.report.verdict import moduli_sentence
+from truespring.report.young import Known, _facets, _visible, young_figure
+
+THIRD = 1 / 3
+
+
+def body(mesh: ts.Mesh, poisson: float, section: Any = None, regions: Any = (), force: float = 1e-4) -> ts.Problem:
+    """A body of Young's modulus 1 Pa, held on its left and loaded on its right across x; plane stress in 2D."""
+    left, right = (np.flatnonzero(np.isclose(mesh.nodes[:, 0], end)) for end in (mesh.lower[0], mesh.upper[0]))
+    total = [0.0, force, 0.0][: mesh.dim]
+    section = section or (ts.PlaneStress(1.0) if mesh.dim == 2 else None)
+    return ts.Problem(mesh, ts.Material(1.0, poisson), section, [ts.Fixed(left)], [ts.Force(right, total)], regions)
+
+
+def cook(n: int, diagonal: tuple[int, ...]) -> ts.Mesh:
+    """Cook's membrane of n by n mapped quadrilaterals, each halved; the corners of the halves in `diagonal`."""
+    s, t = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1)))
+    weights = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
+    column, row = (axis.ravel() for axis in np.meshgrid(np.arange(n), np.arange(n)))
+    first = column + (n + 1) * row
+    cells = np.stack([first, first + 1, first + n + 2, first + n + 1], axis=1)
+    nodes = weights @ np.array([[0, 0], [48, 44], [48, 60], [0, 44.0]])
+    return ts.Mesh(nodes, cells[:, diagonal].reshape(-1, 3), "triangle")
+
+
+FIRST_TO_THIRD, SECOND_TO_FOURTH = (0, 1, 2, 0, 2, 3), (0, 1, 3, 1, 2, 3)
+
+
+def equilateral(n: int, moved: Callable[[np.ndarray], np.ndarray] = lambda nodes: nodes) -> ts.Mesh:
+    """A lattice of equilateral triangles of side 1, n by n rhombi in rows that lean right and left in turn."""
+    nodes = np.array([[i + 0.5 * (row % 2), row * math.sqrt(3) / 2] for row in range(n + 1) for i in range(n + 1)])
+    triangles = []
+    for row in range(n):
+        for i in range(n):
+            a, b, c, d = (row * (n + 1) + i + step for step in (0, 1, n + 1, n + 2))
+            triangles += [[a, b, c], [b, d, c]] if row % 2 == 0 else [[a, d, c], [a, b, d]]
+    return ts.Mesh(moved(nodes), np.array(triangles), "triangle")
+
+
+def loaded_upwards(mesh: ts.Mesh) -> ts.Problem:
+    """Triangles of Young's modulus 1 Pa and Poisson's ratio 1/3, held below and sheared above."""
+    low, high = (np.flatnonzero(np.isclose(mesh.nodes[:, 1], end)) for end in (mesh.lower[1], mesh.upper[1]))
+    load = ts.Force(high, (1e-4, 0.0))
+    return ts.Problem(mesh, ts.Material(1.0, THIRD), ts.PlaneStress(1.0), [ts.Fixed(low)], [load])
+
+
+# Bodies of the same mesh and material are one, whose moduli are found once.
+SQUARES = body(ts.rectangle((4.0, 4.0), (4, 4)), THIRD)
+CUBES, SOFT_CUBES = (body(ts.box((2.0, 2.0, 2.0), (2, 2, 2)), poisson) for poisson in (0.25, 0.45))
+SIX = body(ts.box((2.0, 2.0, 2.0), (2, 2, 2), "tetrahedron"), 0.25)
+BCC, SOFT_BCC = (body(ts.box((3.0, 3.0, 3.0), (3, 3, 3), "bcc-tetrahedron"), poisson) for poisson in (0.25, 0.45))
+
+
+def solved_error(problem: ts.Problem, springs: ts.Springs) -> float:
+    """Rms distance from linear FEM on the same mesh, under a small load."""
+    once = ts.Newton(load_steps=1)
+    error = ts.compare(ts.solve(problem, springs, once), ts.solve(problem, ts.Fem("linear"), once)).rms_error
+    assert error is not None
+    return error
+
+
+# --- fit or not, and what is better ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("diagonal", [FIRST_TO_THIRD, SECOND_TO_FOURTH])
+@pytest.mark.parametrize("rule", ["lloyd", "van-gelder", "projected"])
+def test_cooks_membrane_of_triangles_is_predicted_unfit(rule: str, diagonal: tuple[int, ...]) -> None:
+    """Its wrong answers are foretold: E runs by far more than a factor of 3 over the directions."""
+    problem, springs = body(cook(6, diagonal), THIRD), ts.Springs(rule, allow_negative=True)
+    found = judge(problem, springs)
+    assert not found.fit and found.reasons[0].startswith("Young's modulus runs from 0.")
+    assert found.better == ts.Springs("biquadratic")
+    assert "Not fit" in found.sentence and 'rule = "biquadratic"' in found.sentence
+    assert ("negative stiffness" in found.sentence) == (rule == "projected")
+    if rule != "projected":  # which is refused, or goes on with an indefinite matrix
+        assert solved_error(problem, springs) > 0.2
+    assert solved_error(problem, found.better) < 1e-3
+    assert judge(problem, found.better).fit
+
+
+@pytest.mark.parametrize("rule", ["lloyd", "van-gelder", "projected", "least-squares"])
+def test_six_tetrahedra_to_a_cube_are_unfit_for_plain_springs(rule: str) -> None:
+    found = judge(SIX, ts.Springs(rule))
+    assert not found.fit and found.better == ts.Springs("biquadratic")
+    assert "bcc-tetrahedron" in found.sentence
+    if rule == "lloyd":
+        assert "runs from 0.39 to 2.86 times the material's" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("problem", "springs"),
+    [
+        (SQUARES, ts.Springs("isotropic")),
+        (body(SQUARES.mesh, 0.3), ts.Springs("isotropic")),
+        (SOFT_CUBES, ts.Springs("isotropic", volume=True)),
+        (BCC, ts.Springs("lloyd")),
+        (body(SIX.mesh, 0.1), ts.Springs("biquadratic")),
+        (loaded_upwards(equilateral(4)), ts.Springs("lloyd")),
+        (body(cook(4, FIRST_TO_THIRD), 0.2), ts.Springs("biquadratic")),
+    ],
+)
+def test_fit_springs(problem: ts.Problem, springs: ts.Springs) -> None:
+    found = judge(problem, springs)
+    assert found.fit and found.reasons == () and found.better is None
+    assert found.sentence.startswith("Fit for this material: Young's modulus is 1.0")
+
+
+@pytest.mark.parametrize(
+    ("problem", "rule", "better"),
+    [
+        (SQUARES, "lloyd", ts.Springs("isotropic")),
+        (body(SQUARES.mesh, 0.45), "isotropic", ts.Springs("isotropic", volume=True)),
+        # Below Cauchy's ratio the volume term would be negative, its energy without a bound.
+        (body(SQUARES.mesh, 0.1), "isotropic", ts.Springs("biquadratic")),
+        (SOFT_CUBES, "isotropic", ts.Springs("isotropic", volume=True)),
+        (BCC, "van-gelder", ts.Springs("lloyd")),
+        (SOFT_BCC, "lloyd", ts.Springs("lloyd", volume=True)),
+        # Right triangles in turn: a lattice that springs of one stiffness make isotropic, at 2/sqrt(3) E.
+        (
+            body(ts.rectangle((8.0, 8.0), (8, 8), "triangle", "alternating"), THIRD),
+            "lloyd",
+            ts.Springs("lloyd", volume=True),
+        ),
+    ],
+)
+def test_the_simplest_springs_that_are_fit_are_proposed(problem: ts.Problem, rule: str, better: ts.Springs) -> None:
+    found = judge(problem, ts.Springs(rule))
+    assert not found.fit and found.better == better
+    assert judge(problem, better).fit
+
+
+def test_of_springs_that_are_fit_the_nearest_are_proposed() -> None:
+    """Within 15 % Lloyd's summed springs on squares are fit too; the isotropic ones are exact."""
+    assert judge(SQUARES, ts.Springs("lloyd"), 0.15).fit
+    assert judge(SQUARES, ts.Springs("lloyd", sharing="single"), 0.15).better == ts.Springs("isotropic")
+
+
+def test_regions_that_are_too_stiff_and_too_soft_fail_the_patch_test() -> None:
+    """Moduli within 2 % do not help where sizes of elements change along x: loaded, the body is 20 % off."""
+
+    def graded(nodes: np.ndarray) -> np.ndarray:
+        return nodes + np.stack([0.5 * np.sin(2 * np.pi * nodes[:, 0] / 12.5), 0 * nodes[:, 0]], axis=1)
+
+    problem, springs = loaded_upwards(equilateral(12, graded)), ts.Springs("van-gelder")
+    realised = ts.moduli(problem, springs)
+    assert np.abs(np.array(realised.young_range) - 1).max() < 0.03
+    assert np.abs(np.array(realised.poisson_range) - THIRD).max() < 0.02
+    found = judge(problem, springs)
+    assert not found.fit and len(found.reasons) == 1 and "patch test" in found.reasons[0]
+    assert solved_error(problem, springs) > 0.1
+
+
+@pytest.mark.parametrize(("jitter", "fit"), [(0.1, True), (0.3, False)])
+def test_disorder_from_element_to_element_averages_out(jitter: float, fit: bool) -> None:
+    rng = np.random.default_rng(7321)
+
+    def disordered(nodes: np.ndarray) -> np.ndarray:
+        inner = ((nodes > nodes.min(axis=0) + 0.6) & (nodes < nodes.max(axis=0) - 0.6)).all(axis=1)
+        return nodes + np.where(inner[:, None], rng.uniform(-jitter, jitter, nodes.shape), 0.0)
+
+    problem, springs = loaded_upwards(equilateral(12, disordered)), ts.Springs("lloyd")
+    assert ts.moduli(problem, springs).patch_score > 0
+    assert judge(problem, springs).fit == fit
+    if fit:
+        assert solved_error(problem, springs) < 0.02
+
+
+def test_the_outer_elements_of_a_lattice_are_remarked_upon() -> None:
+    """Lloyd's springs of halved tetrahedra are not half as stiff: a coarse body is not what its lattice is."""
+    found = judge(BCC, ts.Springs("lloyd"))
+    assert found.fit and "outer elements are not those of the lattice" in found.sentence
+    whole = judge(CUBES, ts.Springs("isotropic"))
+    assert whole.fit and "outer elements" not in whole.sentence
+
+
+def test_bending_is_remarked_upon_and_decides_nothing() -> None:
+    """Isotropic squares, two deep: 1 - 1/4 + 6 (3/8) / 4 of the material's EI, 1 + 1/8 of four-node elements."""
+    problem = body(ts.rectangle((8.0, 2.0), (8, 2)), THIRD)
+    found = judge(problem, ts.Springs("isotropic"))
+    assert found.fit and "1.312 times the material's EI, FEM on this mesh 1.125" in found.sentence
+    both = judge(problem, ts.Springs("lloyd")).sentence
+    assert "1.131 times the material's EI, the better ones 1.312" in both
+    assert "Bent" not in judge(body(ts.rectangle((8.0, 8.0), (8, 8)), THIRD), ts.Springs("isotropic")).sentence
+
+
+def test_the_tolerance_decides_and_is_named() -> None:
+    """Lloyd's squares: 15/17 to 21/19 E, Poisson's ratio 5/19 to 7/17."""
+    assert judge(SQUARES, ts.Springs("lloyd"), 0.12).fit
+    for tolerance, said in ((0.1, "within 10 %"), (0.05, "within 5 %")):
+        assert said in judge(SQUARES, ts.Springs("lloyd"), tolerance).sentence
+
+
+def test_every_material_of_a_body_is_judged() -> None:
+    soft = ts.Material(0.1, 0.45)
+    problem = body(ts.rectangle((4.0, 2.0), (8, 4)), THIRD, regions=[ts.Region(range(8), soft)])
+    found = judge(problem, ts.Springs("isotropic"))
+    assert not found.fit and found.better == ts.Springs("isotropic", volume=True)
+    assert found.reasons == (
+        "where E is 0.1 Pa and nu 0.45, Poisson's ratio is 0.33 where 0.45 is wanted (within 0.05)",
+    )
+    assert "where E is 1 Pa and nu 0.333333, they are fit" in found.sentence
+    assert judge(problem, found.better).fit
+
+
+def test_what_rules_follow_is_found_out() -> None:
+    follow = {rule for rule in ts.RULES if follows_poisson(rule)}
+    assert follow == {"least-squares", "projected", "biquadratic"}
+
+
+# --- words and pictures ------------------------------------------------------------------------------
+
+
+def said_of(problem: ts.Problem, springs: ts.Springs) -> str:
+    path = ts.Path(problem, springs.label, "springs", (), ts.Status.CONVERGED, moduli=ts.moduli(problem, springs))
+    sentence = moduli_sentence(path)
+    assert sentence is not None
+    return sentence
+
+
+def test_moduli_in_words() -> None:
+    cubes = said_of(CUBES, ts.Springs("isotropic"))
+    assert "realise the material, in every direction" in cubes
+    assert "linear eight-node FEM on this mesh has" in cubes
+    six = said_of(SIX, ts.Springs("lloyd"))
+    assert "of 0.390 Pa to 2.86 Pa and a Poisson's ratio of 0.07 to 0.8" in six and "Bent" not in six
+    # One diagonal: E along x and along it, a third of that across it, which two directions alone would not tell.
+    triangles = said_of(body(ts.rectangle((4.0, 4.0), (4, 4), "triangle"), THIRD), ts.Springs("van-gelder"))
+    assert "of 0.333 Pa to 1.33 Pa" in triangles and "over all directions" in triangles
+    regions = body(SQUARES.mesh, THIRD, regions=[ts.Region([0], ts.Material(2.0, 0.3))])
+    assert "outside its regions" in said_of(regions, ts.Springs("lloyd"))
+
+
+def test_the_rows_of_the_report() -> None:
+    six = ts.moduli(SIX, ts.Springs("lloyd"))
+    rows = {what: found for what, found, _ in _moduli_rows(six)}
+    assert rows["Young’s modulus largest of all directions"] == "2.86 Pa"
+    assert rows["largest over smallest Young’s modulus"] == f"{six.anisotropy:.3f}"
+    squares = ts.moduli(SQUARES, ts.Springs("lloyd"))
+    assert [what for what, _, _ in _moduli_rows(squares)][-1] == "Zener ratio (1 is isotropic)"
+    assert len(_moduli_rows(squares)) == 5
+
+
+def test_the_surface_in_space_is_youngs_modulus() -> None:
+    """Cubes by the projected rule: 5/6 E along an edge, larger along the diagonals."""
+    realised = ts.moduli(CUBES, ts.Springs("projected"))
+    corners, share = _facets(realised)
+    radius = np.linalg.norm(corners, axis=2)
+    assert (radius.min(), radius.max()) == pytest.approx(realised.young_range, rel=1e-3)
+    assert radius.min() == pytest.approx(5 / 6, rel=1e-3)
+    assert np.abs(radius.mean(axis=1) - share).max() < 1e-9
+    # Facets turn their front outwards: the volume that they enclose is positive, near that of the mean radius.
+    centre, (p, q) = corners.mean(axis=1), (corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    volume = (centre * np.cross(p, q)).sum() / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * radius.mean() ** 3, rel=0.1)
+
+
+def test_the_sphere_is_hidden_where_springs_are_stiffer() -> None:
+    directions = np.random.default_rng(7321).normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    realised = ts.moduli(CUBES, ts.Springs("isotropic"))
+    for factor, seen in ((2.0, 0.0), (1.0, 0.5), (0.5, 0.5)):
+        visible = _visible(directions, replace(realised, elasticity=factor * realised.elasticity))
+        assert visible.mean() == pytest.approx(seen, abs=0.08)
+
+
+def test_a_panel_for_each_model() -> None:
+    realised = ts.moduli(CUBES, ts.Springs("projected"))
+    with figure_style():
+        for count in (1, 4):
+            figure = young_figure([Known(f"springs {n}", realised, "b", "-") for n in range(count)], "material")
+            assert len(figure.axes) == count + 1
+            assert figure.get_figwidth() == pytest.approx(7.5 if count > 2 else 3.6)
+
+
+# --- the verbs ---------------------------------------------------------------------------------------
+
+BOX = """\
+[mesh]
+shape = "box"
+size = ["20 mm", "10 mm", "10 mm"]
+elements = [4, 2, 2]
+element = "tetrahedron"
+
+[material]
+young = "10 kPa"
+poisson = 0.25
+
+[[region]]
+on = { box = [["0 mm", "0 mm", "0 mm"], ["5 mm", "10 mm", "10 mm"]] }
+young = "20 kPa"
+poisson = 0.25
+
+[[support]]
+on = "left"
+
+[[load]]
+on = "right"
+force = ["0 N", "-0.001 N", "0 N"]
+
+[models.springs]
+kind = "springs"
+rule = "lloyd"
+
+[models.coupled]
+kind = "springs"
+rule = "biquadratic"
+
+[models.linear]
+kind = "fem"
+law = "linear"
+"""
+
+
+def test_moduli_of_a_plane_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["moduli", str(written(tmp_path)), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == ["springs"]
+    springs = told["springs"]
+    assert [springs["young"], springs["young_min"]] == pytest.approx([15 / 17 * 10e3] * 2)
+    assert [springs["young_45"], springs["young_max"]] == pytest.approx([21 / 19 * 10e3] * 2)
+    assert springs["poisson"] == pytest.approx(7 / 17) and springs["anisotropy"] == pytest.approx(7 / 5)
+    assert springs["bending_factor"]["2"] == pytest.approx(15 / 17 * 3 / 4 + 6 * 5 / 16 / 4)
+    assert springs["depth"] == 2 and springs["lattice"] and springs["patch_score"] == 0
+    assert (springs["n_springs"], springs["n_negative"], springs["n_zero"]) == (74, 0, 0)
+    assert not springs["fit"] and springs["better"] == {"rule": "isotropic", "volume": False}
+    assert springs["sentence"].startswith("Not fit for this material") and "regions" not in springs
+    assert json.loads((out / "study" / "moduli.json").read_text("utf-8")) == told
+    assert {path.name for path in (out / "study").iterdir()} == {"moduli.json", "figures"}
+    assert {path.name for path in (out / "study" / "figures").iterdir()} == {"moduli.png", "moduli.svg"}
+
+
+def test_moduli_of_a_body_of_two_materials_in_space(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = written(tmp_path, BOX, "cubes.toml"), tmp_path / "out"
+    assert main(["moduli", str(file), str(written(tmp_path)), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == ["cubes", "study"] and list(told["cubes"]) == ["springs", "coupled"]
+    springs, coupled = told["cubes"].values()
+    assert (
+        springs["anisotropy"] == pytest.approx(springs["young_max"] / springs["young_min"])
+        and "young_45" not in springs
+    )
+    assert springs["material"] == {"young": 10e3, "poisson": 0.25}
+    (region,) = springs["regions"]
+    assert region["material"] == {"young": 20e3, "poisson": 0.25}
+    assert region["young_max"] == pytest.approx(2 * springs["young_max"])
+    assert springs["bending_factor"] == {} and springs["depth"] is None
+    assert not springs["fit"] and springs["better"] == {"rule": "biquadratic", "volume": False}
+    assert coupled["fit"] and coupled["better"] is None
+    assert (out / "cubes" / "figures" / "moduli.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_moduli_are_shown_and_the_picture_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["moduli", str(written(tmp_path, BOX)), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    shown = " ".join(printed.split())
+    for text in ("along x + y + z", "where E is 20000 Pa", "patch test", "springs of negative stiffness", "Not fit"):
+        assert text in shown
+    assert "bending factor" not in shown and f"picture: {out / 'study' / 'figures' / 'moduli.png'}" in printed
+    assert main(["moduli", str(written(tmp_path, BOX)), "--out", str(out), "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_moduli_of_a_study_without_springs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = changed(('[models.springs]\nkind = "springs"\nrule = "lloyd"\n', ""))
+    assert main(["moduli", str(written(tmp_path, text)), "--out", str(tmp_path / "out"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {}
+    assert main(["moduli", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 2
+
+
+def test_check_says_it_too_and_knows_bodies_in_space(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path, BOX)
+    assert main(["check", str(file)]) == 0
+    shown = capsys.readouterr().out
+    assert "in 24 elements 20000 Pa and 0.25" in shown and "Not fit for these materials" in " ".join(shown.split())
+    assert main(["check", str(file), "--json"]) == 0
+    models = json.loads(capsys.readouterr().out)["models"]
+    assert (models["springs"]["fit"], models["coupled"]["fit"]) == (False, True)
+    assert models["springs"]["sentence"].startswith("Not fit")
+
+
+def test_rules_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rules", "--json"]) == 0
+    rules = json.loads(capsys.readouterr().out)
+    assert list(rules) == list(ts.RULES)
+    assert rules["lloyd"]["source"] == ts.RULES["lloyd"].source and not rules["lloyd"]["follows_poisson"]
+    assert rules["biquadratic"]["coupled"] and "hexahedron" in rules["biquadratic"]["elements"]
+    assert main(["rules"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for name in ts.RULES:
+        assert name in shown
+    assert "Van Gelder" in shown and "Delingette" in shown
