@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 import truespring as ts
 from tests.closed_forms import periodic_elasticity, square_moduli, tensile_test, young_extremes
 from truespring.arrays import Floats
+from truespring.models import model_warnings
 
 THIRD = 1 / 3
 LLOYD, BULK, FULL = (5 / 16, 7 / 16), (3 / 8, 3 / 8), (17 / 56, 23 / 56)
@@ -410,6 +411,25 @@ def test_irregular_springs_are_told_as_they_pull() -> None:
     assert (exact.young(), exact.poisson(), exact.patch_score) == pytest.approx((1.0, THIRD, 0.0))
 
 
+def shaken(mesh: ts.Mesh) -> ts.Mesh:
+    """The mesh with its inner nodes moved by up to a fifth."""
+    inner = ((mesh.nodes > 0) & (mesh.nodes < mesh.upper)).all(axis=1)
+    moved = np.random.default_rng(5).uniform(-0.2, 0.2, mesh.nodes.shape) * inner[:, None]
+    return ts.Mesh(mesh.nodes + moved, mesh.elements, mesh.element)
+
+
+@pytest.mark.parametrize("counts", [(3, 2), (4, 3), (6, 6)])
+@pytest.mark.parametrize("element", ["quadrilateral", "triangle"])
+def test_a_small_irregular_mesh_is_no_lattice(element: str, counts: tuple[int, int]) -> None:
+    """However few its elements are: no two of them are alike, and the patch test is told."""
+    mesh = shaken(ts.rectangle([float(count) for count in counts], counts, element, "right"))
+    problem, springs = held(mesh, THIRD), ts.Springs("least-squares", allow_negative=True)
+    told = ts.moduli(problem, springs)
+    assert not told.lattice
+    assert told.patch_score > 1e-3
+    assert any("patch test" in said for said in model_warnings(problem, springs))
+
+
 def patch_error(mesh: ts.Mesh, model: ts.Springs | ts.Fem, poisson: float) -> float:
     """How far inner nodes are from a uniform strain put on the boundary, over the largest displacement."""
     gradient = 1e-7 * np.array([[1.0, 0.4, 0.2], [-0.3, -0.8, 0.5], [0.1, 0.6, 0.7]])[: mesh.dim, : mesh.dim]
@@ -423,14 +443,11 @@ def patch_error(mesh: ts.Mesh, model: ts.Springs | ts.Fem, poisson: float) -> fl
     return float(np.abs(state.displacement - motion).max() / np.abs(motion).max())
 
 
-def shaken_cubes() -> ts.Mesh:
-    mesh = ts.box((3.0, 3.0, 3.0), (3, 3, 3), "tetrahedron")
-    inner = ((mesh.nodes > 0) & (mesh.nodes < 3)).all(axis=1)
-    moved = np.random.default_rng(5).uniform(-0.2, 0.2, mesh.nodes.shape) * inner[:, None]
-    return ts.Mesh(mesh.nodes + moved, mesh.elements, "tetrahedron")
-
-
-@pytest.mark.parametrize("mesh", [triangulated(0.25, 7, 6, 6), shaken_cubes()], ids=["triangles", "tetrahedra"])
+@pytest.mark.parametrize(
+    "mesh",
+    [triangulated(0.25, 7, 6, 6), shaken(ts.box((3.0,) * 3, (3, 3, 3), "tetrahedron"))],
+    ids=["triangles", "tetrahedra"],
+)
 def test_irregular_springs_fail_the_patch_test_that_coupled_ones_pass(mesh: ts.Mesh) -> None:
     poisson = THIRD if mesh.dim == 2 else 0.25
     for rule in ("lloyd", "van-gelder", "projected", "least-squares"):

@@ -81,6 +81,7 @@ class Problem:
             raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.element} elements")
         if self.regions and self.material is None:
             raise ProblemError("regions of another material need a material for the rest")
+        _ = self.material_numbers  # a region that selects nothing is refused here
         loading = self.loading
         if not loading.external_force[~loading.held].any() and not loading.displacement.any():
             held = " in a direction that is free" if loading.external_force.any() else ""
@@ -134,19 +135,8 @@ class Problem:
         displacement = np.zeros(self.mesh.nodes.shape)
         axes = AXES[: self.mesh.dim]
         for support in self.supports:
-            directions = list(axes) if support.fix is None else list(support.fix)
-            if not directions or any(direction not in axes for direction in directions):
-                raise ProblemError(f"fix = {directions}: allowed are the directions {', '.join(axes)}")
-            given = [0.0] * self.mesh.dim if support.displacement is None else support.displacement
-            motion = _components(given, self.mesh.dim, "displacement", "m")
-            idle = [axis for axis, part in zip(axes, motion, strict=True) if part and axis not in directions]
-            if idle:
-                raise ProblemError(
-                    f"displacement = {list(given)} [m] moves along {', '.join(idle)}, "
-                    f"which fix = {directions} leaves free"
-                )
-            nodes = select(self.mesh, support.on)
-            for axis in (axes.index(direction) for direction in directions):
+            nodes, directions, motion = self.held_by(support)
+            for axis in directions:
                 clash = nodes[held[nodes, axis] & (displacement[nodes, axis] != motion[axis])]
                 if clash.size:
                     raise ProblemError(
@@ -157,6 +147,21 @@ class Problem:
                 held[nodes, axis] = True
                 displacement[nodes, axis] = motion[axis]
         return held, displacement
+
+    def held_by(self, support: Fixed) -> tuple[Ints, list[int], Floats]:
+        """Return the nodes that a support holds, the numbers of the directions, and its displacement [m]."""
+        axes = AXES[: self.mesh.dim]
+        directions = list(axes) if support.fix is None else list(support.fix)
+        if not directions or any(direction not in axes for direction in directions):
+            raise ProblemError(f"fix = {directions}: allowed are the directions {', '.join(axes)}")
+        given = [0.0] * self.mesh.dim if support.displacement is None else support.displacement
+        motion = _components(given, self.mesh.dim, "displacement", "m")
+        idle = [axis for axis, part in zip(axes, motion, strict=True) if part and axis not in directions]
+        if idle:
+            raise ProblemError(
+                f"displacement = {list(given)} [m] moves along {', '.join(idle)}, which fix = {directions} leaves free"
+            )
+        return select(self.mesh, support.on), [axes.index(direction) for direction in directions], motion
 
     def _refuse_rigid_motion(self) -> None:
         """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""

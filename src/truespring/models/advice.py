@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from truespring.material import PlaneStrain
 from truespring.models.fem import LOCKING_POISSON, Fem
 from truespring.models.moduli import Moduli, moduli
@@ -40,6 +42,13 @@ def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> I
             f"{realised.patch_score:.2g} E h unbalanced at inner nodes): they distort where the material would not; "
             "the rule biquadratic does not"
         )
+    elif realised.patch_score:
+        apart = float(np.linalg.norm(realised.body - realised.elasticity) / np.linalg.norm(realised.elasticity))
+        if apart > _SAME_MODULI:
+            yield (
+                "this body is so thin that its outer elements count, which are not those of the lattice: its "
+                f"elasticity is {apart:.1%} off that of the lattice, for which the moduli are told"
+            )
     if realised.n_negative:
         yield f"{realised.n_negative} of {realised.n_springs} springs have a negative stiffness"
     factor = realised.bending[realised.depth] if realised.depth else 1.0

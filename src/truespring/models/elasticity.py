@@ -45,7 +45,8 @@ def lattice_classes(mesh: Mesh) -> Ints | None:
     classes = classes.ravel()
     inner = ~_at_boundary(mesh)
     kept = np.unique(classes[inner]) if inner.any() else np.arange(len(count))
-    if len(kept) > _MOST_CLASSES:
+    n_inner = int(inner.sum()) or len(at)
+    if len(kept) > _MOST_CLASSES or (len(kept) > 1 and 2 * len(kept) > n_inner):
         return None
     centres, reach = at.mean(axis=1), np.ptp(at, axis=1).max(axis=0)
     for one in kept:  # graded meshes have classes that fill a part of the body only

@@ -47,6 +47,8 @@ class Moduli:
             rectangles or bricks along the axes, or one so fine that its bending factor is that of the bulk; in
             3D `bending[depth]` has this mesh's width (z).
         lattice: whether the mesh is a lattice, whose moduli are exact.
+        body: the elasticity of this very body, its boundary strained uniformly: of a lattice that is cut off at the
+            outside, as body-centred-cubic tetrahedra are, other than the lattice's [Pa], as `elasticity`.
         patch_score: the patch test under unit uniform strains: root-mean-square unbalanced force at inner nodes
             over E h^(d-1) [-], h the size of an element; 0 where uniform strain is an equilibrium.
         n_springs, n_negative, n_zero: springs of the mesh, and those of negative and of no stiffness.
@@ -60,6 +62,7 @@ class Moduli:
     fem_bending: MappingProxyType[int, float]
     depth: int | None
     lattice: bool
+    body: Floats
     patch_score: float
     n_springs: int
     n_negative: int
@@ -208,10 +211,10 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
         elasticity = lattice_elasticity(alone, affine_energies(alone, shared), classes)
         elasticity[: mesh.dim, : mesh.dim] += springs.kappa(alone)[0]
     _require_resistance(elasticity)
-    patch_score, stable = 0.0, True
+    whole, patch_score, stable = elasticity, 0.0, True
     if not springs.coupled:
-        relaxed, patch_score, stable = _relaxed(alone, springs, elasticity)
-        elasticity = relaxed if classes is None else elasticity
+        whole, patch_score, stable = _relaxed(alone, springs, elasticity)
+        elasticity = whole if classes is None else elasticity
     _require_resistance(elasticity)
     young, poisson = section.apparent_moduli(material)
     counts = _cells(mesh)
@@ -228,6 +231,7 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
         fem_bending=_fem_bending(alone, tuple(sizes.items())),
         depth=depth,
         lattice=classes is not None,
+        body=whole,
         patch_score=patch_score,
         n_springs=len(per_spring),
         n_negative=int((per_spring < 0).sum()),

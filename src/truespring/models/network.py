@@ -107,15 +107,17 @@ class SpringNetwork:
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` are the tensions [N] of the geometric part, by default the true ones."""
+        return self._tangent(positions, self.stiffness, self.stress(positions) if stress is None else stress)
+
+    def _tangent(self, positions: Floats, stiffness: Floats, tension: Floats) -> SparseMatrix:
         direction, length = self._lengths(positions)
-        tension = self.stiffness * (length - self.rest_length) if stress is None else stress
         along = direction[:, :, None] * direction[:, None, :]
         across = np.eye(positions.shape[1]) - along
         # A collapsed spring has no direction: its geometric part is left out rather than infinite.
         sideways = np.divide(tension, length, out=np.zeros_like(length), where=length > 0)
-        block = self.stiffness[:, None, None] * along + sideways[:, None, None] * across
+        block = stiffness[:, None, None] * along + sideways[:, None, None] * across
         return self._pattern.matrix(np.block([[block, -block], [-block, block]]))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Each spring's Hessian with its negative eigenvalues cut off: compression bears no geometric part [N/m]."""
-        return self.hessian(positions, np.maximum(self.stress(positions), 0.0))
+        return self._tangent(positions, np.maximum(self.stiffness, 0.0), np.maximum(self.stress(positions), 0.0))

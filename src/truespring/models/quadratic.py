@@ -53,10 +53,22 @@ class QuadraticPotential(FemPotential):
 
     @cached_property
     def loading(self) -> Loading:
-        """The problem's loading, consistent with quadratic elements; an edge is held where both its ends are."""
-        given = self.problem.loading
-        ends = self.mesh.edges
-        held = np.concatenate([given.held, given.held[ends].all(axis=1)])
+        """The problem's loading, consistent with quadratic elements.
+
+        An edge is held where one support holds both its ends, or where both ends have one of their own, as
+        nodes with a motion each do. Edges that run from one support to another through the body are free.
+        """
+        given, ends = self.problem.loading, self.mesh.edges
+        by_edge = np.zeros((len(ends), self.mesh.dim), dtype=bool)
+        alone = np.zeros_like(given.held)
+        for support in self.problem.supports:
+            nodes, directions, _ = self.problem.held_by(support)
+            inside = np.zeros_like(given.held)
+            inside[np.ix_(nodes, np.array(directions))] = True
+            by_edge |= inside[ends].all(axis=1)
+            alone |= inside & (len(nodes) == 1)
+        by_edge |= alone[ends].all(axis=1)
+        held = np.concatenate([given.held, by_edge])
         displacement = np.concatenate([given.displacement, given.displacement[ends].mean(axis=1)])
         force = np.zeros(self.nodes.shape)
         for load in self.problem.loads:

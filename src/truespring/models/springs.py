@@ -114,7 +114,9 @@ class Springs:
         mu = float(found[-1, -1])
         if classes is None or np.abs(found - hooke(mu, mu, problem.mesh.dim)).max() > _ISOTROPIC * abs(mu):
             this = "none" if classes is None else "anisotropic"
-            other = "lloyd on body-centred-cubic tetrahedra" if problem.mesh.element == "tetrahedron" else "isotropic"
+            other = "isotropic"
+            if problem.mesh.element == "tetrahedron":
+                other = "lloyd on body-centred-cubic tetrahedra, three cells deep or more"
             raise ModelError(
                 f"volume = true is for isotropic lattices, this one is {this}: take the rule {other}, "
                 "or the rule biquadratic, which realises any Poisson's ratio on any mesh"
