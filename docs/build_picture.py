@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from truespring.arrays import Floats, Ints
 from truespring.report.bodies import path_lines
+from truespring.report.figures import render_figures
 from truespring.report.style import BLUE, FAINT, INK, RED, figure_style
 from truespring.study import read_study, run
 
@@ -63,3 +64,5 @@ if __name__ == "__main__":
         drawn = picture()
         FigureCanvasAgg(drawn)
         drawn.savefig(ROOT / "docs" / "images" / "springs_over_fem.png", dpi=130)
+    block = render_figures(run(read_study(ROOT / "examples" / "soft_block.toml")))
+    (ROOT / "docs" / "images" / "soft_block.png").write_bytes(block["springs_error_neo-hookean"].png)

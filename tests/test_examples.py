@@ -94,3 +94,11 @@ def test_biquadratic_springs_on_an_imported_mesh_are_saint_venant_kirchhoff(resu
     assert result.comparisons["neo-hookean"].rms_error > 0.1
     assert result.paths["springs"].warnings == ()
     assert any("patch test" in warning for warning in result.paths["lloyd"].warnings)
+
+
+def test_the_readme_tells_what_the_studies_in_space_give(results: dict[str, Result]) -> None:
+    readme = " ".join((EXAMPLES.parent / "README.md").read_text(encoding="utf-8").split())
+    block, tissue = results["soft_block"].comparisons, results["tissue"].comparisons
+    assert f"within {100 * block['neo-hookean'].rms_error:.1f} % of neo-Hookean" in readme
+    assert f"{100 * block['linear'].rms_error:.0f} % off linear" in readme
+    assert f"Lloyd's springs are {100 * tissue['lloyd'].rms_error:.0f} % off them" in readme
