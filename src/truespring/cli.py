@@ -257,6 +257,8 @@ def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     for region in plan["regions"]:
         console.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
     console.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
+    for note in plan["mesh_notes"]:
+        console.print(f"the mesh: {note}")
     console.print(f"held nodes: {held}")
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
     motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""

@@ -171,6 +171,7 @@ def solve(
     """
     if not isinstance(model, Potential) and not hasattr(model, "potential"):
         raise ModelError(f"{model!r} is no model: give Springs(rule=...), Fem(law=...) or a SpringNetwork")
+    realised = moduli(problem.homogeneous[0], model) if isinstance(model, Springs) else None
     started = time.perf_counter()
     potential = model if isinstance(model, Potential) else model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
@@ -185,7 +186,6 @@ def solve(
 
     found = list((solver or Newton()).follow(potential, loading, report, upright))
     seconds = time.perf_counter() - started
-    realised = moduli(problem, model) if isinstance(model, Springs) else None
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)

@@ -92,18 +92,24 @@ class Problem:
 
     @cached_property
     def materials(self) -> tuple[Material, ...]:
-        """Each material once: that of the body, then those of the regions; empty without a material."""
-        if self.material is None:
-            return ()
-        return tuple(dict.fromkeys([self.material, *(region.material for region in self.regions)]))
+        """Each material that an element has, once: that of the body, then those of the regions; empty without one."""
+        return tuple(self._materials[0])
 
     @cached_property
     def material_numbers(self) -> Ints:
         """The place in `materials` of each element's own, shape (n_elements,)."""
+        return self._materials[1]
+
+    @cached_property
+    def _materials(self) -> tuple[list[Material], Ints]:
+        if self.material is None:
+            return [], np.zeros(len(self.mesh.elements), dtype=np.int64)
+        named = list(dict.fromkeys([self.material, *(region.material for region in self.regions)]))
         numbers = np.zeros(len(self.mesh.elements), dtype=np.int64)
         for region in self.regions:
-            numbers[select_elements(self.mesh, region.on)] = self.materials.index(region.material)
-        return numbers
+            numbers[select_elements(self.mesh, region.on)] = named.index(region.material)
+        used, numbers = np.unique(numbers, return_inverse=True)
+        return [named[number] for number in used], numbers.ravel()
 
     @cached_property
     def homogeneous(self) -> "tuple[Problem, ...]":
@@ -187,7 +193,9 @@ class Problem:
         """How `nodes` may move as a rigid body in spite of their supports, None where they can't."""
         modes = rigid_body_modes(self.mesh.nodes[nodes])
         hindered = modes[self.loading.held[nodes].ravel()]
-        if hindered.size and np.linalg.matrix_rank(hindered, tol=1e-9 * np.sqrt(len(modes))) == modes.shape[1]:
+        tolerance = 1e-9 * np.sqrt(len(modes))  # nodes on a line have a turn that moves nothing
+        wanted = np.linalg.matrix_rank(modes, tol=tolerance)
+        if hindered.size and np.linalg.matrix_rank(hindered, tol=tolerance) == wanted:
             return None
         free = [axis for axis, mode in zip(AXES[: self.mesh.dim], hindered.T, strict=False) if not mode.any()]
         return f"along {', '.join(free)}" if free else "by turning"

@@ -19,6 +19,7 @@ from truespring.mesh.shapes import PLANE_ELEMENTS as PLANE_ELEMENTS
 from truespring.mesh.shapes import SOLID_ELEMENTS as SOLID_ELEMENTS
 from truespring.mesh.shapes import box as box
 from truespring.mesh.shapes import rectangle as rectangle
+from truespring.mesh.shapes import refuse_too_large as refuse_too_large
 from truespring.mesh.surface import Surface as Surface
 from truespring.mesh.surface import SurfaceDistance as SurfaceDistance
 from truespring.mesh.surface import surface_distance as surface_distance

@@ -170,7 +170,10 @@ class Mesh:
         return _determinants(at, self.kind.corners)
 
     def smallest_area_ratio(self, positions: Floats) -> float:
-        """Return the smallest corner Jacobian over its rest value: not positive where an element is inverted."""
+        """Return the smallest corner Jacobian over its rest value: not positive where an element is inverted.
+
+        In space it is a ratio of volumes.
+        """
         return float((self.corner_jacobians(positions) / self._rest_jacobians).min())
 
     @cached_property
@@ -208,9 +211,12 @@ def _groups(groups: Mapping[str, Ints], n_there: int, what: str) -> Mapping[str,
     """Freeze groups: numbers ascending and each once; raise MeshError for one that is empty or does not exist."""
     frozen = {}
     for name, numbers in groups.items():
-        members = np.unique(np.asarray(numbers, dtype=np.int64))
+        given = np.asarray(numbers)
+        if given.ndim != 1 or not np.issubdtype(given.dtype, np.integer):
+            raise MeshError(f"{what} group '{name}' = {numbers!r}: a list of {what} numbers is wanted")
+        members = np.unique(given.astype(np.int64))
         if not members.size or members[0] < 0 or members[-1] >= n_there:
-            raise MeshError(f"{what} group '{name}' is empty or names a {what} that does not exist")
+            raise MeshError(f"{what} group '{name}' is empty or has a number that no {what} has: 0 to {n_there - 1}")
         members.setflags(write=False)
         frozen[name] = members
     return MappingProxyType(frozen)

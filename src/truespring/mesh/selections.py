@@ -180,8 +180,8 @@ def named_point(mesh: Mesh, name: str) -> int:
 def shares(mesh: Mesh, nodes: Ints) -> Floats:
     """Return the share of a uniform total that each of `nodes` takes, shape (n,), sum 1.
 
-    Consistent with linear elements: elements that lie wholly in the selection share by their
-    measure, else facets that do, else edges; nodes that none covers share equally.
+    Consistent with linear elements: the cells that carry the load (`covering`) share by their measure;
+    nodes that none covers share equally.
     """
     covered = covering(mesh, nodes)
     if covered is None:
@@ -195,19 +195,17 @@ def shares(mesh: Mesh, nodes: Ints) -> Floats:
 def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
     """Return the cells that carry a load on `nodes`, and their measures [m^k]; None where nodes stand alone.
 
-    These are the elements that lie wholly in the selection, where there are none the facets, else the
-    edges; all nodes must belong to one.
+    These are the elements that lie wholly in the selection, else the facets of the boundary that do, else
+    those inside, else the edges: the first of them that reach all nodes.
     """
     if mesh.element == "line":
         return None
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[nodes] = True
-    for cells in (mesh.elements, mesh.facets, mesh.edges):
+    for cells in (mesh.elements, mesh.boundary, mesh.facets, mesh.edges):
         within = inside[cells].all(axis=1)
-        if within.any():
-            found = cells[within]
-            if len(np.unique(found)) < len(nodes):
-                return None
+        found = cells[within]
+        if len(np.unique(found)) == len(nodes):
             return found, mesh.measures[within] if cells is mesh.elements else facet_measures(mesh.nodes[found])
     return None
 

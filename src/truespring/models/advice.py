@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from truespring.material import PlaneStrain
-from truespring.models.fem import LOCKING_POISSON, Fem
+from truespring.models.fem import Fem
+from truespring.models.fitness import springs_lock
 from truespring.models.moduli import Moduli, moduli
-from truespring.models.rules import RULES
 from truespring.models.springs import Springs
 from truespring.problem import Problem
 
@@ -66,13 +66,10 @@ def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> I
             f"{'1/3' if problem.mesh.dim == 2 else '1/4'}): at large stretch nothing bounds the energy from below; "
             "the rule biquadratic has no such limit"
         )
-    locking = material.poisson > LOCKING_POISSON and problem.mesh.element in ("triangle", "tetrahedron")
-    if locking and (springs.volume or springs.coupled):
-        yield f"at a Poisson's ratio of {material.poisson:g} {problem.mesh.element} elements lock, as those of FEM do"
-    elif springs.coupled and material.poisson > LOCKING_POISSON and problem.mesh.dim == 3:
+    if springs_lock(problem, springs):
         yield (
-            f"at a Poisson's ratio of {material.poisson:g} {RULES['biquadratic'].elements[-1]} elements of full "
-            "integration lock, and these springs are just that: springs with volume = true lock less"
+            f"at a Poisson's ratio of {material.poisson:g} {problem.mesh.element} elements lock with these springs, "
+            "as linear ones of FEM do: they are too stiff in bending"
         )
 
 

@@ -76,3 +76,11 @@ def lattice_elasticity(problem: Problem, energies: Floats, classes: Ints | None)
     _, first = np.unique(classes, return_index=True)
     first = first[classes[first] >= 0]
     return np.asarray(energies[first].sum(axis=0) / volumes[first].sum())
+
+
+def hooke(lam: float, mu: float, dim: int) -> Floats:
+    """Return the isotropic elasticity of Lamé's constants [Pa] in Voigt's order, shape (3, 3) or (6, 6)."""
+    n_shear = dim * (dim - 1) // 2
+    elasticity = np.zeros((dim + n_shear, dim + n_shear))
+    elasticity[:dim, :dim] = lam
+    return elasticity + np.diag([2 * mu] * dim + [mu] * n_shear)

@@ -70,7 +70,7 @@ class Fem:
         """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
         finer = _finer(problem)
         if self.element is None:
-            return finer if problem.mesh.dim == 3 and _locks(problem) else "linear"
+            return finer if problem.mesh.dim == 3 and locks(problem) else "linear"
         if self.element not in ("linear", finer):
             raise ModelError(
                 f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements; "
@@ -80,7 +80,7 @@ class Fem:
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
         """Return what should be known before the model is solved: elements that lock."""
-        if self.chosen_element(problem) != "linear" or not _locks(problem):
+        if self.chosen_element(problem) != "linear" or not locks(problem):
             return ()
         largest = max(material.poisson for material in problem.materials)
         return (
@@ -102,8 +102,8 @@ def _finer(problem: Problem) -> str:
     return "quadratic" if problem.mesh.element in ("triangle", "tetrahedron") else "mean-dilatation"
 
 
-def _locks(problem: Problem) -> bool:
-    """Whether linear elements are known to lock: nearly incompressible, and not free to change thickness."""
+def locks(problem: Problem) -> bool:
+    """Return whether linear elements are known to lock: nearly incompressible, and not free to change thickness."""
     incompressible = any(material.poisson > LOCKING_POISSON for material in problem.materials)
     return incompressible and not isinstance(problem.section, PlaneStress)
 

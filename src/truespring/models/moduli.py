@@ -8,17 +8,17 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy import optimize, sparse
-from scipy.sparse.linalg import cg
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
-from truespring.models.elasticity import affine_energies, lattice_classes, lattice_elasticity
+from truespring.models.elasticity import affine_energies, hooke, lattice_classes, lattice_elasticity
 from truespring.models.fem import Fem, element_matrices
 from truespring.models.links import CORNERS, link_vectors
+from truespring.models.relaxation import relaxed
 from truespring.models.rules import require_body
-from truespring.models.springs import Springs, hooke
-from truespring.models.strain import voigt_pairs
+from truespring.models.springs import Springs
+from truespring.models.strain import uniform_strain, voigt_pairs
 from truespring.models.volume import VolumeTerm
 from truespring.problem import Fixed, Force, Problem
 
@@ -102,7 +102,8 @@ class Moduli:
         return axial, (float(strain[: self.dim].sum()) - axial) / (self.dim - 1)
 
     def _unit(self, along: float | Sequence[float]) -> Floats:
-        if isinstance(along, int | float):
+        if np.ndim(along) == 0:
+            along = float(along)  # type: ignore[arg-type]
             turned = np.array([np.cos(np.radians(along)), np.sin(np.radians(along)), 0.0])[: self.dim]
             return np.asarray(turned)
         vector = np.asarray(along, dtype=float)
@@ -150,8 +151,12 @@ class Moduli:
     @cached_property
     def poisson_range(self) -> tuple[float, float]:
         """Smallest and largest Poisson's ratio over the directions of the test [-]."""
-        found = [self.poisson(list(direction)) for direction in _directions(self.dim)[:: 1 if self.dim == 2 else 4]]
-        return min(found), max(found)
+        directions = _directions(self.dim)
+        stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
+        strain = stress @ self._compliance
+        axial = (strain * stress).sum(axis=1)
+        found = -(strain[:, : self.dim].sum(axis=1) - axial) / (self.dim - 1) / axial
+        return float(found.min()), float(found.max())
 
     @property
     def deviation(self) -> float:
@@ -188,7 +193,7 @@ def _directions(dim: int) -> Floats:
     return np.concatenate([signs / np.linalg.norm(signs, axis=1, keepdims=True), lattice])
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=16)
 def moduli(problem: Problem, springs: Springs) -> Moduli:
     """Return what `springs` realise on the problem's mesh, were it all of the problem's own material.
 
@@ -267,41 +272,24 @@ def _relaxed(problem: Problem, springs: Springs, affine: Floats) -> tuple[Floats
     """The elasticity of the body, its boundary strained uniformly [Pa], the patch score, and whether it is stable."""
     mesh = problem.mesh
     material, section = require_body(problem)
-    K = replace(springs, allow_negative=True).potential(problem).hessian(mesh.nodes)
-    strains = np.stack([_uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
-    force = K @ strains
     outside = np.zeros(mesh.n_nodes, dtype=bool)
     outside[mesh.boundary] = True
     inner = np.flatnonzero(np.repeat(~outside, mesh.dim))
-    volume = section.thickness * mesh.measures.sum()
-    stable = bool((K.diagonal() > 0).all())
     if not inner.size:
-        return affine, 0.0, stable
+        return affine, 0.0, True
+    K = replace(springs, allow_negative=True).potential(problem).hessian(mesh.nodes)
+    strains = np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
+    force = K @ strains
     size = (mesh.measures.sum() / len(mesh.elements)) ** ((mesh.dim - 1) / mesh.dim)
     unbalanced = force[inner] / (material.young * section.thickness * size)
     score = float(np.sqrt((unbalanced**2).mean(axis=0)).max() * np.sqrt(mesh.dim))
     if score <= _BALANCED:
-        return affine, 0.0, stable
-    block = sparse.csr_array(K[inner][:, inner])
-    diagonal = block.diagonal()
-    if not stable:
+        return affine, 0.0, True
+    relaxing = relaxed(sparse.csr_array(K[inner][:, inner]), -force[inner], mesh.dim)
+    if relaxing is None:
         return affine, score, False
-    relaxing = np.zeros((inner.size, len(affine)))
-    for column in range(len(affine)):
-        inverse = sparse.diags_array(1 / diagonal)
-        relaxing[:, column], failed = cg(block, -force[inner, column], rtol=1e-9, maxiter=2000, M=inverse)
-        stable &= not failed
     energy = strains.T @ force + force[inner].T @ relaxing
-    return (np.asarray((energy + energy.T) / 2 / volume) if stable else affine), score, stable
-
-
-def _uniform_strain(nodes: Floats, i: int, j: int) -> Floats:
-    """Displacement of a unit strain ij, engineering shear where i and j differ [m]."""
-    moved = np.zeros_like(nodes)
-    moved[:, i] += nodes[:, j] / (1 if i == j else 2)
-    if i != j:
-        moved[:, j] += nodes[:, i] / 2
-    return moved
+    return np.asarray((energy + energy.T) / 2 / (section.thickness * mesh.measures.sum())), score, True
 
 
 # --- bending ----------------------------------------------------------------------------------------
@@ -318,7 +306,8 @@ def _cells(mesh: Mesh) -> tuple[int, ...] | None:
     sides = at[-2 if mesh.dim == 3 else 2]
     if (sides <= 0).any() or np.abs(at - CORNERS[: len(at), : mesh.dim] * sides).max() > 1e-6 * sides.max():
         return None
-    return tuple(round(float(count)) for count in (mesh.upper - mesh.lower) / sides)
+    counts = tuple(round(float(count)) for count in (mesh.upper - mesh.lower) / sides)
+    return counts if math.prod(counts) == len(mesh.elements) else None
 
 
 def _bending(

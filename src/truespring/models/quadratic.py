@@ -55,8 +55,9 @@ class QuadraticPotential(FemPotential):
     def loading(self) -> Loading:
         """The problem's loading, consistent with quadratic elements.
 
-        An edge is held where one support holds both its ends, or where both ends have one of their own, as
-        nodes with a motion each do. Edges that run from one support to another through the body are free.
+        An edge is held where one support holds both its ends, where both ends have a support of their own, as
+        nodes with a motion each do, and on a boundary facet whose corners all are held alike, as where several
+        supports make up one. Edges that run from one support to another through the body are free.
         """
         given, ends = self.problem.loading, self.mesh.edges
         by_edge = np.zeros((len(ends), self.mesh.dim), dtype=bool)
@@ -68,6 +69,12 @@ class QuadraticPotential(FemPotential):
             by_edge |= inside[ends].all(axis=1)
             alone |= inside & (len(nodes) == 1)
         by_edge |= alone[ends].all(axis=1)
+        facets = self.mesh.boundary
+        alike = (given.held[facets] == given.held[facets[:, :1]]).all(axis=(1, 2))
+        alike &= (given.displacement[facets] == given.displacement[facets[:, :1]]).all(axis=(1, 2))
+        local = np.array([(i, j) for j in range(facets.shape[1]) for i in range(j)])
+        edges = _edge_numbers(self.mesh, facets[alike][:, local]).ravel()
+        by_edge[edges] |= given.held[ends[edges, 0]]
         held = np.concatenate([given.held, by_edge])
         displacement = np.concatenate([given.displacement, given.displacement[ends].mean(axis=1)])
         force = np.zeros(self.nodes.shape)

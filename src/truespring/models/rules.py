@@ -73,6 +73,12 @@ def require_body(problem: Problem) -> tuple[Material, Section]:
 
 def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
     """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links)."""
+    check_rule(problem, rule, parameters)
+    return RULES[rule].stiffness(problem, **parameters)
+
+
+def check_rule(problem: Problem, rule: str, parameters: dict[str, float]) -> None:
+    """Raise ModelError where a rule is not for the problem's elements or does not take the parameters."""
     require_body(problem)
     entry = RULES[rule]
     if problem.mesh.element not in entry.elements:
@@ -85,13 +91,17 @@ def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) ->
     if idle:
         owners = [name for name, other in RULES.items() if set(idle) & set(other.parameters)]
         raise ModelError(f"rule = '{rule}' takes no {', '.join(idle)}; that is for {', '.join(owners)}")
-    return entry.stiffness(problem, **parameters)
+    if "k_body" in parameters and not problem.mesh.kind.body_diagonals:
+        raise ModelError("k_body is for cubes: there are no diagonals through the body of a plane element")
 
 
 def user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
     """Return stiffness of the user's own for each element's springs [N/m], shape (n_elements, links)."""
     require_body(problem)
     kind = problem.mesh.kind
+    for name, value, pairs in (("diagonal", own.diagonal, kind.diagonals), ("body", own.body, kind.body_diagonals)):
+        if value and not pairs:
+            raise ModelError(f"stiffness: {name} = {value:g}, but a {problem.mesh.element} has no such diagonals")
     values = [own.edge] * len(kind.edges) + [own.diagonal] * len(kind.diagonals) + [own.body] * len(kind.body_diagonals)
     return np.asarray(_scale(problem)[:, None] * np.array(values))
 

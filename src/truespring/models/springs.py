@@ -8,9 +8,9 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.elasticity import affine_energies, lattice_classes, lattice_elasticity
+from truespring.models.elasticity import affine_energies, hooke, lattice_classes, lattice_elasticity
 from truespring.models.network import SpringNetwork
-from truespring.models.rules import RULES, UserStiffness, require_body, rule_stiffness, user_stiffness
+from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
 from truespring.models.volume import VolumeSprings, VolumeTerm
 from truespring.problem import Problem
 
@@ -87,7 +87,12 @@ class Springs:
         """What the rule or the user gives, before a volume term rescales it."""
         if self.stiffness is not None:
             return user_stiffness(problem, self.stiffness)
-        return rule_stiffness(problem, str(self.rule), {} if self.k_body is None else {"k_body": self.k_body})
+        return rule_stiffness(problem, str(self.rule), self._parameters)
+
+    @property
+    def _parameters(self) -> dict[str, float]:
+        """What was given of the rule's parameters."""
+        return {} if self.k_body is None else {"k_body": self.k_body}
 
     def kappa(self, problem: Problem) -> Floats:
         """Modulus of the area or volume term of each element [Pa], shape (n_elements,); zero without one."""
@@ -114,11 +119,12 @@ class Springs:
         mu = float(found[-1, -1])
         if classes is None or np.abs(found - hooke(mu, mu, problem.mesh.dim)).max() > _ISOTROPIC * abs(mu):
             this = "none" if classes is None else "anisotropic"
-            other = "isotropic"
-            if problem.mesh.element == "tetrahedron":
-                other = "lloyd on body-centred-cubic tetrahedra, three cells deep or more"
+            other = {
+                "triangle": "rule lloyd on equilateral triangles",
+                "tetrahedron": "rule lloyd on body-centred-cubic tetrahedra, three cells deep or more",
+            }.get(problem.mesh.element, "rule isotropic")
             raise ModelError(
-                f"volume = true is for isotropic lattices, this one is {this}: take the rule {other}, "
+                f"volume = true is for isotropic lattices, this one is {this}: take the {other}, "
                 "or the rule biquadratic, which realises any Poisson's ratio on any mesh"
             )
         wanted = section.lame_within(material)
@@ -126,10 +132,10 @@ class Springs:
 
     def potential(self, problem: Problem) -> SpringNetwork | BiquadraticSprings | VolumeSprings:
         """Return the springs on the problem's mesh; raise ModelError for a negative one unless allowed."""
-        per_element = self.element_stiffness(problem)
         if self.coupled:
+            check_rule(problem, str(self.rule), self._parameters)
             return BiquadraticSprings(problem)
-        network = self._network(problem, per_element)
+        network = self._network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
     def _network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
@@ -151,11 +157,3 @@ class Springs:
                 f"N/m at {middle.tolist()} m: take elements nearer to squares, another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)
-
-
-def hooke(lam: float, mu: float, dim: int) -> Floats:
-    """Return the isotropic elasticity of Lamé's constants [Pa] in Voigt's order, shape (3, 3) or (6, 6)."""
-    n_shear = dim * (dim - 1) // 2
-    elasticity = np.zeros((dim + n_shear, dim + n_shear))
-    elasticity[:dim, :dim] = lam
-    return elasticity + np.diag([2 * mu] * dim + [mu] * n_shear)

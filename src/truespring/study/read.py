@@ -15,12 +15,12 @@ from truespring.errors import NoLoadError, StudyError, TruespringError, close_wo
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
 from truespring.mesh import (
     Mesh,
-    Near,
     box,
     named_point,
     nearest_node,
     read_mesh,
     rectangle,
+    refuse_too_large,
     select,
     select_elements,
 )
@@ -138,10 +138,14 @@ class _Builder:
         for number, support in enumerate(table.support):
             with self.at("support", number, "on"):
                 select(mesh, support.on)
+            with self.at("support", number, "displacement"):
+                _one_a_direction(support.displacement, mesh)
             supports.append(Fixed(support.on, support.fix, support.displacement))
         for number, load in enumerate(table.load):
             with self.at("load", number, "on"):
                 select(mesh, load.on)
+            with self.at("load", number, "force"):
+                _one_a_direction(load.force, mesh)
             loads.append(Force(load.on, load.force))
         try:
             return Problem(mesh, material, section, supports, loads, regions)
@@ -158,7 +162,9 @@ class _Builder:
             case table:
                 with self.at("mesh", "unit"):
                     scale = to_si(f"1 {table.unit}", "length")
-                return read_mesh(self.file.parent / table.file, scale)
+                mesh = read_mesh(self.file.parent / table.file, scale)
+                refuse_too_large(mesh.n_nodes, mesh.dim)
+                return mesh
 
     def section(self, mesh: Mesh) -> Section | None:
         table = self.table.section
@@ -182,7 +188,7 @@ class _Builder:
                 case schema.FemTable():
                     model: Model = Fem(table.law, table.element)
                 case _:
-                    own = table.stiffness and UserStiffness(*table.stiffness.model_dump().values())
+                    own = table.stiffness and UserStiffness(**table.stiffness.model_dump())
                     model = Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
@@ -210,6 +216,11 @@ class _Builder:
                 raise StudyError(f"'{name}' is not among the models{nearest(name, entries)}: {', '.join(entries)}")
 
 
+def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
+    if values is not None and len(values) != mesh.dim:
+        raise StudyError(f"{values} has {len(values)} values, the body has {mesh.dim} directions")
+
+
 def _material(table: schema.MaterialTable) -> Material:
     return Material(table.young, table.poisson, table.density)
 
@@ -220,7 +231,7 @@ _SECTIONS: dict[str, type[Section]] = {"plane-stress": PlaneStress, "plane-strai
 def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None:
     if probe is None:
         return None
-    return named_point(mesh, probe) if isinstance(probe, str) else nearest_node(mesh, Near(probe).point)
+    return named_point(mesh, probe) if isinstance(probe, str) else nearest_node(mesh, probe)
 
 
 def _messages(file: FilePath, error: ValidationError, lines: Mapping[tuple[str | int, ...], int]) -> list[str]:

@@ -237,6 +237,7 @@ def plan(study: Study) -> dict[str, Any]:
         "size": (mesh.upper - mesh.lower).tolist(),
         "n_nodes": mesh.n_nodes,
         "n_elements": len(mesh.elements),
+        "mesh_notes": list(mesh.notes),
         "material": dataclasses.asdict(problem.material) if problem.material else None,
         "regions": [
             {**dataclasses.asdict(material), "n_elements": int((problem.material_numbers == number).sum())}
