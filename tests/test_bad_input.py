@@ -66,7 +66,11 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "force zero": (('["0 N", "-0.01 N"]', '["0 N", "0 N"]'), ("nothing loads", "load")),
     "force in metres": (('["0 N", "-0.01 N"]', '["0 N", "-0.01 m"]'), ("load.1.force.2", "-0.01 m", "force")),
     "force of one": (('["0 N", "-0.01 N"]', '["-0.01 N"]'), ("load.1.force", "2")),
-    "force of three": (('["0 N", "-0.01 N"]', '[0, 0, "-0.01 N"]'), ("3 values", "2 directions")),
+    "force of three": (('["0 N", "-0.01 N"]', '[0, 0, "-0.01 N"]'), ("load.1.force", "3 values", "2 directions")),
+    "displacement of three": (
+        ("[[load]]", '[[support]]\non = "right"\ndisplacement = [0, 0, "1 mm"]\n\n[[load]]'),
+        ("support.2.displacement", "3 values", "2 directions"),
+    ),
     "load steps zero": (("load_steps = 2", "load_steps = 0"), ("solver.load_steps", "0", "1")),
     "control unknown": (("load_steps = 2", 'control = "lod"'), ("solver.control", "did you mean 'load'")),
     "rule unknown": (('rule = "lloyd"', 'rule = "loyd"'), ("models.springs.rule", "did you mean 'lloyd'")),

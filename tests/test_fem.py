@@ -562,3 +562,19 @@ def test_the_default_and_the_warning(
 def test_an_unknown_element_is_refused() -> None:
     with pytest.raises(ts.TruespringError, match=r"element = 'quadratc' is unknown.*quadratic"):
         ts.Fem("linear", "quadratc")
+
+
+def test_a_side_held_in_pieces_is_held_as_a_whole() -> None:
+    mesh = ts.box((2.0, 1.0, 1.0), (4, 2, 2), "tetrahedron")
+    left = np.flatnonzero(mesh.nodes[:, 0] == 0)
+    upper = mesh.nodes[left, 1] > 0.4
+    load = ts.Force("right", (0.0, -1e-3, 0.0))
+
+    def loading(*supports: ts.Fixed) -> np.ndarray:
+        problem = ts.Problem(mesh, ts.Material(1.0, 0.45), None, supports, [load])
+        potential = ts.Fem("linear", "quadratic").potential(problem)
+        assert isinstance(potential, QuadraticPotential)
+        return potential.loading.held
+
+    whole = loading(ts.Fixed("left"))
+    assert np.array_equal(loading(ts.Fixed(left[upper].tolist()), ts.Fixed(left[~upper].tolist())), whole)

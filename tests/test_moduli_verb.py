@@ -409,3 +409,17 @@ def test_rules_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str])
     for name in ts.RULES:
         assert name in shown
     assert "Van Gelder" in shown and "Delingette" in shown
+
+
+def test_no_number_is_infinite_in_what_is_said_of_a_slender_strip() -> None:
+    mesh = ts.rectangle((100.0, 1.0), (400, 4))
+    shaken = mesh.nodes + 0.005 * np.random.default_rng(2).uniform(-1, 1, mesh.nodes.shape)
+    problem = ts.Problem(
+        ts.Mesh(shaken, mesh.elements),
+        ts.Material(1.0, 1 / 3),
+        ts.PlaneStress(1.0),
+        [ts.Fixed([0, 401, 802])],
+        [ts.Force([400], (0.0, 1e-9))],
+    )
+    found = ts.judge(problem, ts.Springs(stiffness=ts.UserStiffness(0.375, 0.375)))
+    assert "inf" not in found.sentence

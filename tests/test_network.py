@@ -244,3 +244,11 @@ def test_a_spring_pushed_to_nothing_is_solved() -> None:
         assert path.states[-1].stretch is not None
         assert path.states[-1].stretch[0] == 0
         assert np.isfinite(path.states[-1].reaction).all()
+
+
+def test_a_rod_in_space_has_no_turn_about_itself() -> None:
+    network = ts.SpringNetwork([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], [2.0, 3.0])
+    problem = ts.Problem(
+        network.mesh, supports=[ts.Fixed([0]), ts.Fixed([1, 2], "yz")], loads=[ts.Force([2], (6, 0, 0))]
+    )
+    assert ts.solve(problem, network).states[-1].displacement[:, 0] == pytest.approx([0, 3, 5])

@@ -410,3 +410,18 @@ def test_a_slender_body_follows_a_load_that_nearly_drowns(model: ts.Springs | ts
     shares = np.array(moved[1:]) / moved[-1]
     assert shares == pytest.approx([0.25, 0.5, 0.75, 1.0], rel=3e-3)
     assert 0.5 * tip < moved[-1] < 1.1 * tip
+
+
+def test_no_state_of_a_runaway_counts_as_balanced() -> None:
+    """Where iterates run away, their own size excuses no residual, and no overflow reaches the user."""
+    problem = ts.Problem(
+        ts.box((3.0, 3.0, 3.0), (3, 3, 3), "bcc-tetrahedron"),
+        ts.Material(2e3, 0.1),
+        None,
+        [ts.Fixed("left")],
+        [ts.Force("right", (1500.0, -300.0, 100.0))],
+    )
+    path = ts.solve(problem, ts.Springs("lloyd", volume=True), ts.Newton(load_steps=4))
+    assert path.status is not ts.Status.CONVERGED
+    assert len(path.states) > 2
+    assert max(state.residual for state in path.states) < 1e-8

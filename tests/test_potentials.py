@@ -16,7 +16,7 @@ import truespring as ts
 from tests.closed_forms import difference_errors, observed_orders
 from truespring.arrays import Floats
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, BiquadraticSprings, VolumeSprings
+from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings
 from truespring.potential import Potential, Projectable, Refined, Stressed, Stretched
 
 THIN, LONG = ts.PlaneStress(0.4), ts.PlaneStrain(0.4)
@@ -479,4 +479,4 @@ def test_cells_carry_the_energy(name: str) -> None:
     assert fields["strain_energy"].sum() == pytest.approx(energy, rel=1e-12)
     kind, cells = potential.cells
     assert all(len(values) == len(cells) for values in fields.values())
-    assert (kind == "line") == (CASES[name].springs and not isinstance(potential, BiquadraticSprings))
+    assert (kind == "line") == CASES[name].springs

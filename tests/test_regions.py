@@ -266,3 +266,18 @@ def test_lames_constants_of_a_region_are_its_own() -> None:
         lam, mu = lame(material.young, material.poisson)
         reduced = 2 * lam * mu / (lam + 2 * mu)
         assert stress[1, 1, element] == pytest.approx(np.full(4, 0.01 * (reduced + 2 * mu)), rel=1e-12)
+
+
+def test_a_material_that_no_element_has_does_not_count() -> None:
+    """Imported bodies often are regions from end to end."""
+    mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1))
+    everywhere = ts.Region([0, 1], ts.Material(2.0, 0.25))
+    supports, loads = [ts.Fixed("left")], [ts.Force("right", (1e-3, 0.0, 0.0))]
+    named = ts.Problem(mesh, ts.Material(1.0, 0.49), None, supports, loads, [everywhere])
+    plain = ts.Problem(mesh, ts.Material(2.0, 0.25), None, supports, loads)
+    assert named.materials == plain.materials
+    for model in (ts.Springs("isotropic", volume=True), ts.Fem("linear")):
+        mine, other = (ts.solve(problem, model, ts.Newton(load_steps=1)) for problem in (named, plain))
+        assert mine.states[-1].displacement == pytest.approx(other.states[-1].displacement, rel=1e-12)
+        assert mine.warnings == other.warnings
+    assert ts.judge(named, ts.Springs("isotropic")).fit

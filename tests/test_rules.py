@@ -373,3 +373,19 @@ def test_each_element_has_springs_of_its_own_material() -> None:
     network = ts.Springs("lloyd").potential(problem)
     between = np.flatnonzero((network.springs == [1, 4]).all(axis=1))
     assert network.stiffness[between] == pytest.approx([(1 + 9) * 5 / 16], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "springs", "said"),
+    [
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("isotropic", k_body=0.2), "k_body is for cubes"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs(stiffness=ts.UserStiffness(0.4, 0.4, 0.1)), "body = 0.1"),
+        (ts.rectangle((2.0, 1.0), (2, 1), "triangle"), ts.Springs(stiffness=ts.UserStiffness(0.4, 0.4)), "diagonal"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("lloyd", k_body=0.2), "takes no k_body; that is for isotropic"),
+    ],
+)
+def test_what_a_mesh_has_no_use_for_is_refused(mesh: ts.Mesh, springs: ts.Springs, said: str) -> None:
+    load = ts.Force("right", (1.0, 0.0))
+    problem = ts.Problem(mesh, ts.Material(1.0, 0.3), ts.PlaneStress(1.0), [ts.Fixed("left")], load)
+    with pytest.raises(ts.TruespringError, match=said):
+        springs.potential(problem)

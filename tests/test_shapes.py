@@ -362,11 +362,12 @@ def test_a_total_is_consistent_with_a_uniform_traction() -> None:
         mesh = ts.Mesh(moved, regular.elements, regular.element)
         nodes = np.flatnonzero(on)
         share = shares(mesh, nodes)
-        if element != "hexahedron":  # of a bent quadrilateral a quarter each is no integral of a linear field
-            assert share @ mesh.nodes[nodes, 1:] == pytest.approx([1.0, 1.0], rel=1e-12)
+        assert share @ mesh.nodes[nodes, 1:] == pytest.approx([1.0, 1.0], rel=1e-12)
         facets = mesh.boundary[np.isin(mesh.boundary, nodes).all(axis=1)]
         areas = facet_measures(mesh.nodes[facets])
         assert areas.sum() == pytest.approx(4.0, rel=1e-12)
+        if element == "hexahedron":  # of a quadrilateral corners carry unlike parts
+            continue
         expected = np.bincount(facets.ravel(), np.repeat(areas, facets.shape[1]) / facets.shape[1] / 4, mesh.n_nodes)
         assert share == pytest.approx(expected[nodes], rel=1e-12)
 
@@ -424,3 +425,24 @@ def test_parts_that_share_less_than_a_facet_may_turn() -> None:
     problem = ts.Problem(mesh, ts.Material(1.0, 0.25), None, [ts.Fixed("left")], [ts.Force([14], (1e-3, 0.0, 0.0))])
     path = ts.solve(problem, ts.Fem("linear"), ts.Newton(load_steps=1))
     assert path.status is not ts.Status.CONVERGED
+
+
+@pytest.mark.parametrize("element", ["hexahedron", "tetrahedron", "bcc-tetrahedron"])
+def test_a_load_on_two_sides_is_shared_by_area(element: str) -> None:
+    """Though a tetrahedron at their common edge has all its nodes on them."""
+    mesh = ts.box((3.0, 2.0, 1.0), (3, 2, 1), element)
+    nodes = np.flatnonzero((mesh.nodes[:, 0] == 0) | (mesh.nodes[:, 1] == 0))
+    force = shares(mesh, nodes)
+    assert force.sum() == pytest.approx(1.0, rel=1e-12)
+    left, bottom = mesh.nodes[nodes, 0] == 0, mesh.nodes[nodes, 1] == 0
+    # Areas 2 and 3; nodes of the common edge carry a share of both.
+    assert force[left & ~bottom].sum() < 0.4 < force[left].sum()
+    moment = (force[:, None] * mesh.nodes[nodes]).sum(axis=0)
+    assert moment == pytest.approx([0.6 * 1.5, 0.4 * 1.0, 0.5], rel=1e-12)
+
+
+def test_groups_are_numbers() -> None:
+    plain = ts.rectangle((2.0, 1.0), (2, 1))
+    for wrong in ([0.7], [True, False]):
+        with pytest.raises(MeshError, match="a list of element numbers is wanted"):
+            ts.Mesh(plain.nodes, plain.elements, element_groups={"a": np.array(wrong)})

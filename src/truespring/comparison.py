@@ -138,7 +138,9 @@ def closest(comparisons: Mapping[str, Comparison]) -> str | None:
     """Return the name of the reference with the smallest rms error at full load, None where there is none."""
     errors = {name: one.rms_error for name, one in comparisons.items()}
     known = {name: error for name, error in errors.items() if error is not None}
-    return min(known, key=lambda name: known[name]) if known else None
+    # Errors that differ by rounding are equal; finite elements come first among equals.
+    order = {name: (float(f"{error:.9g}"), comparisons[name].reference.kind != "fem") for name, error in known.items()}
+    return min(order, key=lambda name: order[name]) if order else None
 
 
 def most_moved(path: Path) -> int:

@@ -256,11 +256,12 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
             f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]
+    what = "area" if states and states[0].positions.shape[1] == 2 else "volume"
     if inverted:
         advice = "a linear model does not notice" if linear else Status.INVERTED.advice
         warnings.append(
             f"inverted from load factor {inverted[0].load_factor:.6g} on "
-            f"(smallest area ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
+            f"(smallest {what} ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
         )
     unstable = [state for state in states if state.negative_eigenvalues]
     if unstable:

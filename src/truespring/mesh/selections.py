@@ -188,12 +188,14 @@ def shares(mesh: Mesh, nodes: Ints) -> Floats:
         return np.full(len(nodes), 1 / len(nodes))
     cells, measures = covered
     weight = np.zeros(mesh.n_nodes)
-    np.add.at(weight, cells, measures[:, None])
+    np.add.at(weight, cells, measures)
     return np.asarray(weight[nodes] / weight[nodes].sum())
 
 
 def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
-    """Return the cells that carry a load on `nodes`, and their measures [m^k]; None where nodes stand alone.
+    """Return the cells that carry a load on `nodes`, and each corner's part of their measures [m^k].
+
+    Both of shape (n, corners); None where nodes stand alone.
 
     These are the elements that lie wholly in the selection, else the facets of the boundary that do, else
     those inside, else the edges: the first of them that reach all nodes.
@@ -206,16 +208,36 @@ def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
         within = inside[cells].all(axis=1)
         found = cells[within]
         if len(np.unique(found)) == len(nodes):
-            return found, mesh.measures[within] if cells is mesh.elements else facet_measures(mesh.nodes[found])
+            if cells is mesh.elements and mesh.dim == 3:
+                return found, np.repeat(mesh.measures[within, None] / found.shape[1], found.shape[1], axis=1)
+            return found, corner_measures(mesh.nodes[found])
     return None
+
+
+def corner_measures(corners: Floats) -> Floats:
+    """Integrate each corner's shape function over edges, triangles or quadrilaterals [m^k], shape (n, corners).
+
+    Corners of shape (n, 2 to 4, dim). Quadrilaterals by 2 x 2 Gauss points, exact where they are plane.
+    """
+    n_corners = corners.shape[1]
+    if n_corners < 4:
+        return np.repeat(facet_measures(corners)[:, None] / n_corners, n_corners, axis=1)
+    share = np.zeros(corners.shape[:2])
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    for s, t in signs / np.sqrt(3):
+        shape = (1 + s * signs[:, 0]) * (1 + t * signs[:, 1]) / 4
+        along_s = np.einsum("c,nci->ni", signs[:, 0] * (1 + t * signs[:, 1]) / 4, corners)
+        along_t = np.einsum("c,nci->ni", signs[:, 1] * (1 + s * signs[:, 0]) / 4, corners)
+        gram = (along_s**2).sum(axis=1) * (along_t**2).sum(axis=1) - (along_s * along_t).sum(axis=1) ** 2
+        share += np.sqrt(np.maximum(gram, 0.0))[:, None] * shape
+    return share
 
 
 def facet_measures(corners: Floats) -> Floats:
     """Length [m] of edges or area [m^2] of triangles and quadrilaterals; corners of shape (n, 2 to 4, dim)."""
     if corners.shape[1] == 2:
         return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
-    if corners.shape[1] == 3:
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    else:
-        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    return np.asarray(np.linalg.norm(normal, axis=1) / 2)
+    if corners.shape[1] == 4:
+        return np.asarray(corner_measures(corners).sum(axis=1))
+    spans = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.sqrt(np.maximum(np.linalg.det(spans @ spans.swapaxes(1, 2)), 0.0)) / 2)

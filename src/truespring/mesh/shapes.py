@@ -42,6 +42,8 @@ def rectangle(
     """
     _known(element, PLANE_ELEMENTS, "element")
     _known(diagonal, DIAGONALS, "diagonal")
+    if element != "triangle" and diagonal != DIAGONALS[0]:
+        raise MeshError(f"diagonal = '{diagonal}' is for triangles, the elements are {element}s")
     lengths, counts = _checked(size, elements, "rectangle", "xy")
     nodes, cells = _grid(lengths, counts)
     if element == "quadrilateral":

@@ -22,24 +22,27 @@ def model_warnings(problem: Problem, model: Any) -> tuple[str, ...]:
         return model.warnings(problem)
     if not isinstance(model, Springs):
         return ()
-    several = len(problem.materials) > 1
-    warnings: dict[str, None] = {}
+    found: dict[str, list[str]] = {}  # each warning once, with its materials
     for twin in problem.homogeneous:
         material = twin.material
         assert material is not None  # springs have asked for it
-        where = f"where E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}: " if several else ""
-        warnings |= {f"{where}{text}": None for text in _springs_warnings(twin, model, moduli(twin, model))}
-    return tuple(warnings)
+        for text in _springs_warnings(twin, model, moduli(twin, model)):
+            found.setdefault(text, []).append(f"E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}")
+    everywhere = len(problem.homogeneous)
+    return tuple(
+        text if len(whose) == everywhere else f"where {' or '.join(whose)}: {text}" for text, whose in found.items()
+    )
 
 
 def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> Iterator[str]:
     yield from _moduli_warning(problem, realised)
     if not realised.stable:
         yield "these springs are not stable at rest: nodes inside the body have no positive stiffness"
+    unit = "E h^2" if problem.mesh.dim == 3 else "E h"
     if realised.patch_score and not realised.lattice and not springs.coupled:
         yield (
             "on this irregular mesh a uniform strain is no equilibrium of these springs (patch test: "
-            f"{realised.patch_score:.2g} E h unbalanced at inner nodes): they distort where the material would not; "
+            f"{realised.patch_score:.2g} {unit} unbalanced at inner nodes): they distort where the material would not; "
             "the rule biquadratic does not"
         )
     elif realised.patch_score:

@@ -60,11 +60,8 @@ class BiquadraticSprings:
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""
-        return float(self._element_energies(positions).sum())
-
-    def _element_energies(self, positions: Floats) -> Floats:
         q = self._change(self._vectors(positions))
-        return np.asarray((self._coupled(q) * q).sum(axis=1))
+        return float((self._coupled(q) * q).sum())
 
     def _coupled(self, q: Floats) -> Floats:
         """M q of each element, shape (n_elements, links)."""
@@ -113,19 +110,45 @@ class BiquadraticSprings:
         return np.asarray(np.sqrt(_squared(self._vectors(positions)) / self._at_rest).ravel())
 
     @cached_property
+    def _shared(self) -> tuple[Ints, Ints]:
+        """Each pair of nodes that a link joins once, and the pair of each element's links."""
+        pairs = np.sort(self.problem.mesh.elements[:, self._links].reshape(-1, 2), axis=1)
+        springs, place = np.unique(pairs, axis=0, return_inverse=True)
+        return springs, place.ravel()
+
+    @property
     def springs(self) -> Ints:
         """Each pair of nodes that a link joins once, shape (n_springs, 2)."""
-        pairs = self.problem.mesh.elements[:, self._links].reshape(-1, 2)
-        return np.unique(np.sort(pairs, axis=1), axis=0)
+        return self._shared[0]
 
     @property
     def cells(self) -> tuple[str, Ints]:
-        """The elements, shape (n_elements, nodes): their energy is not that of single links."""
-        return self.problem.mesh.kind.vtk, self.problem.mesh.elements
+        """The springs as lines, shape (n_springs, 2)."""
+        return "line", self.springs
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Strain energy [J] of each element."""
-        return {"strain_energy": self._element_energies(positions)}
+        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring.
+
+        Sums over the elements that share it: tension 2 p l, stiffness 8 L^2 M_ss, and of the energy q . M q
+        the part q_s (M q)_s, which may be negative and adds up to the whole.
+        """
+        vectors = self._vectors(positions)
+        q, length = self._change(vectors), np.sqrt(_squared(vectors))
+        coupled = self._coupled(q)
+        alone = np.broadcast_to(np.einsum("ess->es", self.coupling), q.shape)
+        springs, place = self._shared
+
+        def summed(values: Floats) -> Floats:
+            return np.bincount(place, values.ravel(), len(springs)).astype(np.float64, copy=False)
+
+        first = np.zeros(len(springs))
+        first[place] = self.stretch(positions)
+        return {
+            "tension": summed(4 * coupled * length),
+            "stretch": first,
+            "stiffness": summed(8 * self._at_rest * alone),
+            "strain_energy": summed(q * coupled),
+        }
 
 
 def _squared(vectors: Floats) -> Floats:

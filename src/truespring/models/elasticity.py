@@ -43,7 +43,8 @@ def lattice_classes(mesh: Mesh) -> Ints | None:
     canonical = np.take_along_axis(places, order[:, :, None], axis=1).reshape(len(at), -1)
     _, classes, count = np.unique(canonical, axis=0, return_inverse=True, return_counts=True)
     classes = classes.ravel()
-    inner = ~_at_boundary(mesh)
+    # Only tetrahedra have lattices that a plane cannot cut without elements of another kind.
+    inner = ~_at_boundary(mesh) if mesh.element == "tetrahedron" else np.ones(len(at), dtype=bool)
     kept = np.unique(classes[inner]) if inner.any() else np.arange(len(count))
     n_inner = int(inner.sum()) or len(at)
     if len(kept) > _MOST_CLASSES or (len(kept) > 1 and 2 * len(kept) > n_inner):

@@ -85,7 +85,7 @@ class Fem:
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff in bending; "
-            f'element = "{_finer(problem)}" is not',
+            f'element = "{_finer(problem)}" makes them of a kind that does not',
         )
 
     def potential(self, problem: Problem) -> "FemPotential":
@@ -114,7 +114,7 @@ def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" 
         raise ModelError(f"finite elements need a material, a section and elements of a kind among {', '.join(_SKFEM)}")
     plane_stress = isinstance(problem.section, PlaneStress)
     if len(problem.materials) == 1:
-        constants = Constants(*problem.material.lame, plane_stress)
+        constants = Constants(*problem.materials[0].lame, plane_stress)
     else:
         lam, mu = (problem.of_elements(value)[:, None] for value in (lambda one: one.lame.lam, lambda one: one.lame.mu))
         constants = Constants(lam, mu, plane_stress)

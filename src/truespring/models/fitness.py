@@ -47,6 +47,7 @@ class Fitness:
     sentence: str
 
 
+@lru_cache(maxsize=16)
 def judge(problem: Problem, springs: Springs, tolerance: float = 0.05) -> Fitness:
     """Return whether springs are fit for each material of a body, and which are better where they are not.
 

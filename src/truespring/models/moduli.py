@@ -1,7 +1,7 @@
 """Moduli: what a spring model realises, known before anything is solved."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from types import MappingProxyType
@@ -116,21 +116,17 @@ class Moduli:
         stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
         return np.asarray(1 / np.einsum("ni,ij,nj->n", stress, self._compliance, stress))
 
+    def poisson_along(self, directions: Floats) -> Floats:
+        """Return Poisson's ratio along unit vectors, in 3D the mean across [-], shape (n, dim) to (n,)."""
+        stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
+        strain = stress @ self._compliance
+        axial = (strain * stress).sum(axis=1)
+        return np.asarray(-(strain[:, : self.dim].sum(axis=1) - axial) / (self.dim - 1) / axial)
+
     @cached_property
     def young_range(self) -> tuple[float, float]:
         """Smallest and largest Young's modulus over all directions [Pa]."""
-        directions = _directions(self.dim)
-        found = self.young_along(directions)
-
-        def refined(sign: float) -> float:
-            start = directions[int((sign * found).argmin())]
-
-            def value(vector: Floats) -> float:
-                return float(sign * self.young_along((vector / np.linalg.norm(vector))[None])[0])
-
-            return sign * float(min(value(start), optimize.minimize(value, start, method="Nelder-Mead").fun))
-
-        return refined(1.0), refined(-1.0)
+        return _extremes(self.young_along, self.dim)
 
     @property
     def zener(self) -> float:
@@ -151,12 +147,7 @@ class Moduli:
     @cached_property
     def poisson_range(self) -> tuple[float, float]:
         """Smallest and largest Poisson's ratio over the directions of the test [-]."""
-        directions = _directions(self.dim)
-        stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
-        strain = stress @ self._compliance
-        axial = (strain * stress).sum(axis=1)
-        found = -(strain[:, : self.dim].sum(axis=1) - axial) / (self.dim - 1) / axial
-        return float(found.min()), float(found.max())
+        return _extremes(self.poisson_along, self.dim)
 
     @property
     def deviation(self) -> float:
@@ -172,6 +163,26 @@ class Moduli:
         weight = np.sqrt([1.0] * dim + [2.0] * (len(wanted) - dim))
         mandel = weight[:, None] * weight
         return float(np.linalg.norm(mandel * (self.elasticity - wanted)) / np.linalg.norm(mandel * wanted))
+
+
+def _extremes(value: Callable[[Floats], Floats], dim: int) -> tuple[float, float]:
+    """Smallest and largest value over all directions: of many tried the best few, refined."""
+    directions = _directions(dim)
+    found = value(directions)
+
+    def refined(sign: float) -> float:
+        def at(vector: Floats) -> float:
+            return float(sign * value((vector / np.linalg.norm(vector))[None])[0])
+
+        starts = directions[np.argsort(sign * found)[:40:10]]
+        close = 1e-12 * float(np.abs(found).max())
+        ends = [
+            float(optimize.minimize(at, start, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": close}).fun)
+            for start in starts
+        ]
+        return sign * min(float((sign * found).min()), *ends)
+
+    return refined(1.0), refined(-1.0)
 
 
 def _voigt_stress(n: Floats) -> Floats:

@@ -94,8 +94,9 @@ class QuadraticPotential(FemPotential):
         at_corner, at_middle = _CONSISTENT[cells.shape[1]]
         local = np.array([(i, j) for j in range(cells.shape[1]) for i in range(j)])
         middles = self.mesh.n_nodes + _edge_numbers(self.mesh, cells[:, local])
-        np.add.at(share, cells, at_corner * measures[:, None])
-        np.add.at(share, middles, at_middle * measures[:, None])
+        whole = measures.sum(axis=1, keepdims=True)
+        np.add.at(share, cells, at_corner * whole)
+        np.add.at(share, middles, at_middle * whole)
         return np.asarray(share / share.sum())
 
 

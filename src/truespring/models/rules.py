@@ -21,6 +21,7 @@ from truespring.problem import Problem
 #: Share of E h that `isotropic` gives to each body diagonal of a cube unless told otherwise: the member
 #: of its family whose matrix is nearest to that of the hexahedron.
 K_BODY = 1 / 12
+_LARGEST_K_BODY = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +171,8 @@ def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
     diagonals of each face, from C_iijj, then the edges, from C_iiii. On rectangles it is the member for
     Poisson's ratio 1/3 of Baudet et al. (2009); an edge turns negative beyond an aspect of sqrt(3).
     """
+    if not 0 <= k_body <= _LARGEST_K_BODY:
+        raise ModelError(f"k_body = {k_body:g}: allowed are 0 to {_LARGEST_K_BODY:g}, in E h")
     kind, dim = problem.mesh.kind, problem.mesh.dim
     sides = _bricks(problem, "isotropic")
     links = np.array(kind.links)

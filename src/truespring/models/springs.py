@@ -154,6 +154,7 @@ class Springs:
             raise ModelError(
                 f"{negative.size} of {len(springs)} springs have a negative stiffness, "
                 f"the first {stiffness[negative[0]]:g} "
-                f"N/m at {middle.tolist()} m: take elements nearer to squares, another rule, or allow_negative = true"
+                f"N/m at {middle.tolist()} m: take elements nearer to squares, cubes or regular simplices, "
+                "another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)

@@ -21,6 +21,7 @@ from truespring.report.figures import Drawing, distance_name, over_name, render_
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.verdict import (
+    cause_sentence,
     closest_sentence,
     deep,
     display_name,
@@ -92,7 +93,9 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "id": f"study-{place}",
         "title": result.title,
         "verdict": verdict_sentences(result),
-        "more": [text for say in (closest_sentence, force_sentence, mesh_sentence) if (text := say(result))],
+        "more": [
+            text for say in (closest_sentence, cause_sentence, force_sentence, mesh_sentence) if (text := say(result))
+        ],
         "converged": result.converged,
         "closest": display_name(result, nearest) if nearest else None,
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
@@ -275,6 +278,8 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
         "name": name,
         "label": path.label,
         "sentence": moduli_sentence(path),
+        "fit": result.fitness[name].fit if name in result.fitness else None,
+        "judged": result.fitness[name].sentence if name in result.fitness else "",
         "wanted": material_name(result) + (", outside its regions" if result.problem.regions else ""),
         "rows": _moduli_rows(moduli),
         "elements": linear_fem(path).removeprefix("linear "),

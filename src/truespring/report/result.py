@@ -2,12 +2,13 @@
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path as FilePath
 
 from truespring.comparison import Comparison, closest
 from truespring.equilibrium import Path, Status
+from truespring.models import Fitness
 from truespring.problem import Problem
 
 
@@ -24,6 +25,7 @@ class Result:
         model: name of the path that is compared with the others; None where nothing is compared.
         comparisons: by name of the reference.
         tolerance: the rms error up to which two paths agree.
+        fitness: whether the springs of a path are fit for the material, by its name.
         source: text of the study file; comments at its head are shown with its results.
     """
 
@@ -36,6 +38,7 @@ class Result:
     comparisons: Mapping[str, Comparison]
     tolerance: float
     source: str
+    fitness: Mapping[str, Fitness] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"

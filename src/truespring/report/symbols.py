@@ -71,7 +71,7 @@ def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arro
             beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
             tail = centre + 2 * gap * beside - length / 2
         symbol = "F" if unit == "N" else "u"
-        text = f"{symbol} = {given(float(np.linalg.norm(vector)), unit)}"
+        text = f"{symbol} = {given(float(f'{np.linalg.norm(vector):.4g}'), unit)}"
         start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
         side = 1 if seen[0] + 1e-9 * size >= seen_middle[0] else -1
         near = start if (side > 0) == (end[0] >= start[0]) else end

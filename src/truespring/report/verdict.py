@@ -35,6 +35,39 @@ def closest_sentence(result: Result) -> str | None:
     return f"Nearest at {_full(result)} is {display_name(result, name)}, {percent(error)} off."
 
 
+def cause_sentence(result: Result) -> str | None:
+    """Return whether the distance to the nearest nonlinear FEM comes with the load or is there from the start.
+
+    What is there at the first level is stiffness: moduli, bending, elements. What comes later is how springs
+    and law answer to large strain. None where there is no such FEM, or it is the springs but for rounding.
+    """
+    nonlinear = {
+        name: one
+        for name, one in result.comparisons.items()
+        if isinstance(one.reference.potential, FemPotential)
+        and one.reference.potential.law.finite
+        and one.load_factors.size > 1
+        and one.rms_errors[-1] > _TOLD_APART
+    }
+    if not nonlinear or result.model is None or result.paths[result.model].kind != "springs":
+        return None
+    name = min(nonlinear, key=lambda one: float(nonlinear[one].rms_errors[-1]))
+    levels, errors = nonlinear[name].load_factors, nonlinear[name].rms_errors
+    first, last = percent(float(errors[0])), percent(float(errors[-1]))
+    what = (
+        f"The distance to {display_name(result, name)} is {first} at load factor {levels[0]:.4g} and {last} at the last"
+    )
+    if errors[-1] > 2 * errors[0]:
+        return f"{what}: most of it comes with large strain, to which springs and law answer differently."
+    if errors[0] > 2 * errors[-1]:
+        return f"{what}: the springs' stiffness is off from the start, and large strain hides it."
+    return f"{what}: most of it is there from the start, in the springs' moduli and bending stiffness on this mesh."
+
+
+# Below this rms error there is nothing to explain.
+_TOLD_APART = 0.005
+
+
 def nearest_reference(result: Result) -> str | None:
     """Return the name of the nearest reference; None without a choice, or where the model itself is in trouble."""
     if result.model is None or len(result.comparisons) < 2 or path_trouble(result, result.model):

@@ -17,6 +17,8 @@ Reporter = Callable[[float, int, float], None]
 _EPS = float(np.finfo(float).eps)
 # Energies that differ by less than this share cannot be told apart; see Balance.search.
 _DROWNED = 1e-9
+# A state whose residual is within this factor of the best one's counts as it.
+_NEAR_BEST = 10.0
 # Rounding is estimated for bodies up to so many times their rest size.
 _LARGEST_STRETCH = 100.0
 # Armijo's constant, and how far one backtracking step may cut (Nocedal and Wright, 3.1 and 3.5).
@@ -115,6 +117,10 @@ class Balance:
 
         With `undamped_iterations` Newton's full steps are taken, so many of them, wherever they lead.
         """
+        with np.errstate(over="ignore", invalid="ignore"):  # of iterates that run away
+            return self._descend(load_factor, positions, undamped_iterations)
+
+    def _descend(self, load_factor: float, positions: Floats, undamped_iterations: int | None) -> Found:
         nowhere = np.full_like(positions, np.nan)
         best = Equilibrium(load_factor, positions, nowhere, np.inf, 0, np.inf, converged=False)
         drowned_before = np.inf
@@ -128,7 +134,8 @@ class Balance:
             if residual < best.residual:
                 best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self._free_block(self.potential.hessian(positions))
-            drowned = size <= self._rounding(tangent, positions)
+            # The rounding of a body that has run away excuses nothing: the best state is what is returned.
+            drowned = size <= self._rounding(tangent, positions) and residual <= _NEAR_BEST * best.residual
             # A force below rounding may still be that of a small load: only where steps no longer help is it noise.
             if size <= self.tolerance * scale or (drowned and (load_factor == 0 or size > drowned_before / 2)):
                 energy = self.potential.energy(best.positions)

@@ -95,6 +95,10 @@ class _Builder:
         """Name file, line and key in front of any error."""
         try:
             yield
+        except StudyError as error:
+            if str(error).startswith(f"{self.file}:"):  # named already, more closely
+                raise
+            raise StudyError(f"{_place(self.file, key, self.lines)}: {error}") from None
         except TruespringError as error:
             raise StudyError(f"{_place(self.file, key, self.lines)}: {error}") from None
 
@@ -162,9 +166,10 @@ class _Builder:
             case table:
                 with self.at("mesh", "unit"):
                     scale = to_si(f"1 {table.unit}", "length")
-                mesh = read_mesh(self.file.parent / table.file, scale)
-                refuse_too_large(mesh.n_nodes, mesh.dim)
-                return mesh
+                with self.at("mesh", "file"):
+                    mesh = read_mesh(self.file.parent / table.file, scale)
+                    refuse_too_large(mesh.n_nodes, mesh.dim)
+                    return mesh
 
     def section(self, mesh: Mesh) -> Section | None:
         table = self.table.section
@@ -192,7 +197,7 @@ class _Builder:
                     model = Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
-                moduli(problem, model)
+                moduli(problem.homogeneous[0], model)
             return model
 
     def compared(self, entries: Mapping[str, Model | Path]) -> tuple[str, tuple[str, ...]]:

@@ -75,6 +75,13 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
         comparisons={name: compare(model, paths[name], probe, study.tolerance) for name in names},
         tolerance=study.tolerance,
         source=study.source,
+        fitness={
+            name: judge(study.problem, entry, study.tolerance)
+            for name, entry in study.entries.items()
+            if isinstance(entry, Springs)
+        }
+        if comparing
+        else {},
     )
 
 
