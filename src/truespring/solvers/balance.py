@@ -131,6 +131,8 @@ class Balance:
             residual = size / scale if scale else 0.0
             if self.report:
                 self.report(load_factor, iteration, residual)
+            if not np.isfinite(residual):  # it ran away
+                break
             if residual < best.residual:
                 best = replace(best, positions=positions, internal_force=internal, residual=residual)
             tangent = self._free_block(self.potential.hessian(positions))
