@@ -89,8 +89,8 @@ class MeanDilatationPotential(FemPotential):
             mixed = np.einsum("ijkleq,kl->ijeq", response.elasticity, eye) / dim
             second = np.einsum("ijeq,ij->eq", mixed, eye) / dim
             pressure = np.einsum("ii...->...", response.stress) / dim
-            I = np.broadcast_to(eye[:, :, None, None], F.shape)  # noqa: E741
-            return _Volumetric(I, response.stress, response.elasticity, pressure, mixed, second)
+            identity = np.broadcast_to(eye[:, :, None, None], F.shape)
+            return _Volumetric(identity, response.stress, response.elasticity, pressure, mixed, second)
         C = np.einsum("ki...,kj...->ij...", F, F)
         stress = np.exp(2 * theta / dim) * response.stress
         elasticity = np.exp(4 * theta / dim) * response.elasticity
