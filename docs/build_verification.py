@@ -172,11 +172,12 @@ def lattices() -> Iterator[Row]:
     for name, problem, rule, wanted_range in (
         ("body-centred-cubic tetrahedra", centred, "lloyd", (1.00794, 1.00794)),
         ("body-centred-cubic tetrahedra", centred, "van-gelder", (0.857, 1.091)),
-        ("six tetrahedra a cube", six, "lloyd", (0.390, 2.857)),
+        ("six tetrahedra a cube", six, "lloyd", (0.390, 2.855)),
     ):
         found = ts.moduli(problem, ts.Springs(rule)).young_range
+        source = homogenised if problem is centred else f"{homogenised}, over sampled directions"
         for extreme, value, wanted in zip(("smallest", "largest"), found, wanted_range, strict=True):
-            yield Row(f"{name}, {rule}: {extreme} E of all directions", value, wanted, homogenised)
+            yield Row(f"{name}, {rule}: {extreme} E of all directions", value, wanted, source)
     for k_body, factors in {0.0: (1.80, 1.22, 1.10), 0.15: (2.25, 1.31, 1.14), 0.3: (2.40, 1.37, 1.17)}.items():
         bending = ts.moduli(cubes, ts.Springs("isotropic", k_body=k_body)).bending
         for depth, wanted in zip((1, 2, 3), factors, strict=True):
@@ -322,6 +323,12 @@ the springs do what a lattice of springs must, and the finite elements what thei
 """
 
 
+LOCKING = """\
+Linear hexahedra thus reach 0.922 of the limit at Poisson's ratio 0.45 and 0.791 at 0.49, as `tests/test_fem.py` holds.
+0.937 and 0.819 have been found by an independent code against a reference of its own; these are not met.
+"""
+
+
 CALCULIX = """\
 ## CalculiX
 
@@ -352,6 +359,7 @@ def page() -> str:
         table = ["| what | truespring | reference | apart | source |", "|---|---|---|---|---|"]
         table += [str(row) for make in rows for row in make()]
         parts.append(f"## {title}\n\n" + "\n".join(table) + "\n")
+    parts.append(LOCKING)
     parts.append(CALCULIX)
     parts.append(
         "## What springs and FEM make of the same body\n\nThe shipped studies at full load, all models of each on one "

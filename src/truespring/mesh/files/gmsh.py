@@ -4,6 +4,7 @@ Source: "File formats" in the reference manual of gmsh, https://gmsh.info/doc/te
 """
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any, NoReturn
 
@@ -90,19 +91,19 @@ def read_msh(data: bytes) -> Contents:
 # --- the two ways that a file is written ----------------------------------------------------------
 
 
-class _Sections:
+class _Sections(ABC):
     """What text and binary files share: lines that begin and end a section, and lines between."""
 
     section = "MeshFormat"
 
+    @abstractmethod
     def line(self) -> bytes:
         """Return the next line that is not blank, stripped; empty at the end of the file."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def where(self) -> str:
         """Where that line stands."""
-        raise NotImplementedError
 
     def refuse(self, why: str) -> NoReturn:
         """Raise MeshError."""
