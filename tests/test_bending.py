@@ -128,7 +128,7 @@ def turned_ends_factor(problem: ts.Problem, potential: Potential, length: int) -
         held[at_end, 0], displacement[at_end, 0] = True, sign * y[at_end]
     held[0, 1:] = True  # as a rigid body along y, z and about x
     held[np.flatnonzero((x == 0) & (nodes[:, -1] == upper[-1]))[0], 1] |= problem.mesh.dim == 3
-    K, free = potential.hessian(nodes), np.flatnonzero(~held.ravel())
+    K, free = potential.hessian(nodes).tocsr(), np.flatnonzero(~held.ravel())
     moved = displacement.ravel()
     moved[free] = spsolve(K[free][:, free].tocsc(), -(K @ moved)[free])
     force = (K @ moved).reshape(nodes.shape)

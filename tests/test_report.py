@@ -12,10 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
 
 import truespring as ts
 from truespring.mesh import Surface
 from truespring.report.figures import Drawing, draw_figures, over_name, save_figures
+from truespring.report.frame import blank_axes, round_numbers, written
 from truespring.report.page import render_page, write_page
 from truespring.report.plots import _apart, _uncrossed
 from truespring.report.quantity import given, percent, quantity, round_factor, significant
@@ -28,6 +31,7 @@ from truespring.report.verdict import (
     moduli_sentence,
     verdict,
 )
+from truespring.report.words import draw_words, text_width
 
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 LABELS = {"linear": "linear FEM", "svk": "St. Venant-Kirchhoff FEM", "hencky": "Hencky FEM"}
@@ -377,6 +381,12 @@ def segments(figure: Any, name: str) -> int:
     return int((drawn.get_path().codes == 1).sum())
 
 
+def words(figure: Any) -> dict[str, Any]:
+    """What is written in a figure, and the outline that writes it."""
+    outlines = figure.findobj(lambda artist: isinstance(artist, PathPatch) and artist.get_label())
+    return {outline.get_label(): outline for outline in outlines}
+
+
 def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
     figures = draw_figures(solved)
     assert set(figures) == {"undeformed", "springs_over_linear", "springs_over_a-b", "curves", "error", "moduli"}
@@ -394,18 +404,54 @@ def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
 
 
 def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Result) -> None:
-    axes = draw_figures(solved)["curves"].axes[0]
+    figure = draw_figures(solved)["curves"]
+    (axes,) = figure.axes
     lines = {line.get_label(): line for line in axes.lines}
     assert set(lines) == {"springs (lloyd)", "linear FEM", "Hencky FEM, a/b"}
-    written = {text.get_text() for text in axes.texts}
-    assert {"springs (lloyd)", "linear FEM", "Hencky FEM", "a/b"} <= written
+    said = words(figure)
+    assert {"springs (lloyd)", "linear FEM", "Hencky FEM", "a/b"} <= said.keys()
     states = solved.paths["springs"].states
     assert lines["springs (lloyd)"].get_ydata() == pytest.approx(
         [1e3 * state.displacement[solved.probe, 0] for state in states]
     )
     assert lines["springs (lloyd)"].get_xdata() == pytest.approx([400 * state.load_factor for state in states])
-    assert axes.get_xlabel() == "total force along x [mN]"
-    assert axes.get_ylabel() == "displacement along x [mm]"
+    assert {"total force along x [mN]", "displacement along x [mm]"} <= said.keys()
+    # Numbers stand below and beside what they tell.
+    right, up = (axes.transData.transform((float(number), float(number))) for number in ("400", "10"))
+    middles = [np.mean(said[number].get_window_extent().get_points(), axis=0) for number in ("400", "10")]
+    assert middles[0][0] == pytest.approx(right[0], abs=0.5) and middles[1][1] == pytest.approx(up[1], abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "numbers"),
+    [
+        (-10, 50, ["−10", "0", "10", "20", "30", "40", "50"]),
+        (0, 1.02, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]),
+        (-0.013, 0.031, ["−0.01", "0.00", "0.01", "0.02", "0.03"]),
+        (0, 0.11, ["0.000", "0.025", "0.050", "0.075", "0.100"]),
+        (0, 4.1e8, ["0", "1e+08", "2e+08", "3e+08", "4e+08"]),
+        (1e-9, 3e-9, ["1e-09", "1.5e-09", "2e-09", "2.5e-09", "3e-09"]),
+    ],
+)
+def test_axes_carry_round_numbers(low: float, high: float, numbers: list[str]) -> None:
+    assert written(round_numbers(low, high)) == [number.replace("e-", "e−") for number in numbers]
+
+
+def test_words_stand_where_they_are_put() -> None:
+    figure = Figure(figsize=(4, 3), dpi=72)
+    axes = blank_axes(figure, 1, 1, 2, 1)
+    axes.set(xlim=(0, 10), ylim=(0, 10))
+    draw_words(figure, 1, 2, "HIH", 20)
+    draw_words(figure, 1, 2, "HHI", 20, align=1.0, shift=(0, -36))
+    draw_words(axes, 5, 5, "IHI", 20, align=0.5, upright=True)
+    draw_words(figure, 1, 2, " ")
+    left, right, up = (words(figure)[text].get_window_extent() for text in ("HIH", "HHI", "IHI"))
+    assert (left.y0 + left.y1) / 2 == pytest.approx(2 * 72) and left.x0 == pytest.approx(72, abs=3)
+    assert (right.y0 + right.y1) / 2 == pytest.approx(1.5 * 72) and right.x1 == pytest.approx(72, abs=1e-6)
+    assert (up.y0 + up.y1) / 2 == pytest.approx(1.5 * 72, abs=2) and (up.x0 + up.x1) / 2 == pytest.approx(2 * 72)
+    assert left.height == pytest.approx(0.729 * 20, abs=0.1) == up.width
+    assert left.width == pytest.approx(72 * text_width("HIH", 20), rel=0.1)
+    assert len(words(figure)) == 3
 
 
 def test_names_at_the_ends_of_curves_keep_their_distance() -> None:
@@ -433,8 +479,8 @@ def test_the_right_margin_holds_the_longest_name() -> None:
         figure = draw_figures(found)["curves"]
         renderer = FigureCanvasAgg(figure).get_renderer()
         room = figure.bbox
-        names = figure.axes[0].texts
-        boxes = [text.get_window_extent(renderer) for text in names]
+        names = words(figure).values()
+        boxes = [name.get_window_extent(renderer) for name in names]
         assert len(boxes) >= 2
         assert all(room.x0 <= box.x0 and box.x1 <= room.x1 for box in boxes)
         assert figure.axes[0].get_window_extent(renderer).width >= 3.1 * figure.dpi
@@ -466,7 +512,7 @@ def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page
     tiny, larger = moved_by(problem, 8e-5, kind="springs", label="springs"), moved_by(problem, 1e-4)
     found = result(tiny, {"linear": larger})
     figure = draw_figures(found)[over_name(found, "linear")]
-    assert "displacements × 50" in [text.get_text() for text in figure.texts]
+    assert "displacements × 50" in words(figure)
     (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
     assert np.ravel(dot.get_data()) == pytest.approx([80, 50 * 0.08])
     page = page_of(found)
@@ -475,7 +521,7 @@ def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page
     data = json.loads(page.scripts[0])
     assert data["box"][1] == pytest.approx(20 + 50 * 0.1)
     plain = result(moved_by(problem, 4e-3, kind="springs", label="springs"), {"linear": moved_by(problem, 1e-4)})
-    texts = [text.get_text() for text in draw_figures(plain)[over_name(plain, "linear")].texts]
+    texts = words(draw_figures(plain)[over_name(plain, "linear")])
     assert not any("×" in text for text in texts)
     assert not any("displacements ×" in text for text in page_of(plain).said)
 
@@ -510,8 +556,7 @@ def test_the_picture_follows_the_body_and_the_model_not_a_reference_that_goes_fa
         figure = figures[over_name(found, name)]
         low, high = figure.axes[0].get_ylim()
         heights[name] = high - low
-        said = [text.get_text() for text in figure.texts]
-        assert ("linear FEM that ran away leaves the picture" in said) == leaves
+        assert ("linear FEM that ran away leaves the picture" in words(figure)) == leaves
         (drawn,) = figure.findobj(lambda artist: artist.get_gid() == "reference")
         assert drawn.get_clip_path() is not None or drawn.get_clip_box() is not None
     assert heights["near"] > 120 and 60 < heights["far"] < 80  # mm
@@ -660,12 +705,8 @@ def test_names_are_tags_wherever_the_label_does_not_begin_with_them(page_of: Cal
     assert page.tagged == {"lloyd"}
     same = path(problem, kind="springs", label="springs (lloyd)")
     found = result(springs, {"lloyd": same})
-    (texts,) = [
-        [text.get_text() for text in figure.texts]
-        for name, figure in draw_figures(found).items()
-        if name == over_name(found, "lloyd")
-    ]
-    assert {"springs (lloyd) · springs", "springs (lloyd) · lloyd"} <= set(texts)
+    said = words(draw_figures(found)[over_name(found, "lloyd")])
+    assert {"springs (lloyd) · springs", "springs (lloyd) · lloyd"} <= said.keys()
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.25])

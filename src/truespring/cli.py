@@ -83,7 +83,11 @@ def _threads(limit: int | None) -> Iterator[None]:
         if limit is not None:
             from threadpoolctl import threadpool_limits
 
+            from truespring.kernels.threads import set_threads
+
             stack.enter_context(threadpool_limits(limit))
+            stack.callback(set_threads, None)
+            set_threads(limit)
         yield
 
 

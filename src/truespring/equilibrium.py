@@ -1,7 +1,7 @@
 """solve(problem, model, solver) -> Path: the equilibria of a body and where they should not be trusted."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from truespring.mesh import Surface
 from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli
 from truespring.potential import Loading, Potential, Refined, Stretched
 from truespring.problem import Problem
-from truespring.solvers import Equilibrium, Newton, Reporter
+from truespring.solvers import Cost, Equilibrium, Newton, Reporter
 
 # A relative residual above this is worth a word; it can only come from loads that drown in rounding.
 _LOOSE = 1e-6
@@ -98,6 +98,7 @@ class Path:
         potential: what was solved, None for a path from elsewhere.
         moduli: what the springs realise on the problem's own material, None for other models and networks.
         n_unknowns: the directions of nodes that were free, 0 where nothing was solved.
+        cost: how it was solved and what that took, None where nothing was.
     """
 
     problem: Problem
@@ -112,6 +113,7 @@ class Path:
     potential: Potential | None = None
     moduli: Moduli | None = None
     n_unknowns: int = 0
+    cost: Cost | None = None
 
     def __repr__(self) -> str:
         return f"Path({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
@@ -172,7 +174,15 @@ def solve(
     if not isinstance(model, Potential) and not hasattr(model, "potential"):
         raise ModelError(f"{model!r} is no model: give Springs(rule=...), Fem(law=...) or a SpringNetwork")
     realised = moduli(problem.homogeneous[0], model) if isinstance(model, Springs) else None
-    started = time.perf_counter()
+    from truespring.kernels.threads import compiling
+
+    with compiling() as compiled:
+        started = time.perf_counter()
+        path = _solve(problem, model, solver or Newton(), report)
+        return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=realised)
+
+
+def _solve(problem: Problem, model: Model | Potential, solver: Newton, report: Reporter | None) -> Path:
     potential = model if isinstance(model, Potential) else model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
@@ -184,8 +194,7 @@ def solve(
     def upright(positions: Floats) -> bool:
         return linear or problem.mesh.smallest_area_ratio(positions) > 0
 
-    found = list((solver or Newton()).follow(potential, loading, report, upright))
-    seconds = time.perf_counter() - started
+    found = list(solver.follow(potential, loading, report, upright))
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
@@ -196,11 +205,10 @@ def solve(
         states=states,
         status=_status(states, best, linear),
         warnings=(*known, *_path_warnings(states, best, linear)),
-        seconds=seconds,
         best=best,
         potential=potential,
-        moduli=realised,
         n_unknowns=int((~loading.held).sum()),
+        cost=found[-1].cost,
     )
 
 

@@ -4,6 +4,7 @@ A model turns a problem into a `Potential`; a solver sees potentials and a `Load
 spring, an element or a mesh.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -12,7 +13,14 @@ from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
 
-SparseMatrix = sparse.csr_array[Any, tuple[int, int]]
+#: Blocks of one row and column a direction, one for each pair of nodes that share an element.
+SparseMatrix = sparse.bsr_array[Any]
+
+
+# Element matrices are held in slices of so many bytes, which stay in the processor's cache.
+_SLICE_BYTES = 4 * 2**20
+# Threads share the rows of a slice from so many on.
+_SMALLEST_SLAB = 256
 
 
 @runtime_checkable
@@ -59,6 +67,10 @@ class Stressed(Potential, Protocol):
 
     def stress(self, positions: Floats) -> Floats:
         """What multiplies the second derivative of the strain: tension [N] of springs, stress [Pa] of elements."""
+        ...
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """The stress at `positions` carried on linearly along `step` [m], as if strain were linear in the nodes."""
         ...
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
@@ -129,23 +141,94 @@ class Refined(Potential, Protocol):
 
 
 class Pattern:
-    """The fixed sparsity of a sum of small dense blocks, built once and filled many times."""
+    """The fixed sparsity of a sum of element matrices, built once and filled many times.
+
+    Attributes:
+        starts, columns: the nodes that share an element with each node, itself included, ascending.
+        slots: the place of each element's blocks among them, shape (n_elements, k, k).
+        at_starts, at: the elements at each node, as element * k + its place there.
+        zero: as many zeros as there are directions, which tells compiled loops the dimension.
+    """
 
     def __init__(self, elements: Ints, n_nodes: int, dim: int) -> None:
-        """Take node numbers of each block, shape (n_blocks, k)."""
-        self.dofs = (elements[:, :, None] * dim + np.arange(dim)).reshape(len(elements), -1)
-        self.n_dof = n_nodes * dim
-        size = self.dofs.shape[1]
-        keys = (np.repeat(self.dofs, size, axis=1) * self.n_dof + np.tile(self.dofs, (1, size))).ravel()
-        entries, self._place = np.unique(keys, return_inverse=True)
-        rows, self._columns = np.divmod(entries, self.n_dof)
-        self._starts = np.searchsorted(rows, np.arange(self.n_dof + 1))
+        """Take the node numbers of each element, shape (n_elements, k)."""
+        from truespring.kernels import sparsity
+        from truespring.kernels.threads import run
 
-    def matrix(self, blocks: Floats) -> SparseMatrix:
-        """Sum blocks of shape (n_blocks, k * dim, k * dim) into a matrix."""
-        values = np.bincount(self._place, blocks.ravel(), len(self._columns)).astype(np.float64, copy=False)
-        return sparse.csr_array((values, self._columns, self._starts), shape=(self.n_dof, self.n_dof))
+        self.elements = np.ascontiguousarray(elements, dtype=np.int32)
+        self.n_nodes, self.dim, self.zero = n_nodes, dim, (0.0,) * dim
+        self.at_starts, self.at = sparsity.incidence(self.elements, n_nodes)
+        counts = np.zeros(n_nodes, np.int32)
+        around = (self.elements, self.at_starts, self.at)
+        run(sparsity.count_neighbours, n_nodes, *around, counts)
+        self.starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int32)], dtype=np.int32)
+        self.columns = np.empty(self.starts[-1], np.int32)
+        run(sparsity.fill_neighbours, n_nodes, *around, self.starts, self.columns)
+        self.slots = np.empty((*elements.shape, elements.shape[1]), np.int32)
+        run(sparsity.fill_slots, len(elements), self.elements, self.starts, self.columns, self.slots)
 
-    def vector(self, blocks: Floats) -> Floats:
-        """Sum blocks of shape (n_blocks, k * dim) into a vector of shape (n_dof,)."""
-        return np.bincount(self.dofs.ravel(), blocks.ravel(), self.n_dof).astype(np.float64, copy=False)
+    def values(self) -> Floats:
+        """Return room for the values of a matrix, one block of shape (dim, dim) a pair of nodes; not filled."""
+        return np.empty((len(self.columns), self.dim, self.dim))
+
+    def matrix(self, values: Floats) -> SparseMatrix:
+        """Return values of shape (n_blocks, dim, dim) as a sparse matrix, without a copy."""
+        size = self.n_nodes * self.dim
+        return sparse.bsr_array((values, self.columns, self.starts), shape=(size, size))
+
+    def summed(self, blocks: Callable[[int, int], Floats]) -> SparseMatrix:
+        """Sum element matrices, which `blocks(first, last)` gives for a slice of the elements, see `add`."""
+        values = self.values()
+        values[:] = 0.0
+        self.add(blocks, values)
+        return self.matrix(values)
+
+    def add(self, blocks: Callable[[int, int], Floats], values: Floats) -> None:
+        """Add element matrices to the values of a matrix of this pattern, shape (n_blocks, dim, dim).
+
+        `blocks(first, last)` gives those of a slice of the elements, shape (last - first, k * dim, k * dim).
+        A slice at a time is held; each thread adds to rows of its own, in the order of the elements.
+        """
+        from truespring.kernels import sparsity
+        from truespring.kernels.threads import run
+
+        n_elements, k = self.elements.shape
+        step = max(1, _SLICE_BYTES // (8 * (k * self.dim) ** 2))
+        for first in range(0, n_elements, step):
+            last = min(first + step, n_elements)
+            given = np.ascontiguousarray(blocks(first, last))
+            low = int(self.elements[first:last].min())
+            rows = int(self.elements[first:last].max()) + 1 - low
+
+            def add(
+                begin: int, end: int, first: int = first, last: int = last, given: Floats = given, low: int = low
+            ) -> None:
+                sparsity.add_blocks(
+                    first, last, first, self.elements, self.slots, given, low + begin, low + end, values
+                )
+
+            run(add, rows, smallest=_SMALLEST_SLAB)
+
+    def vector(self, values: Floats) -> Floats:
+        """Sum vectors of the elements' nodes, shape (n_elements, k * dim), into one of shape (n_nodes, dim)."""
+        from truespring.kernels import sparsity
+        from truespring.kernels.threads import run
+
+        result = np.zeros((self.n_nodes, self.dim))
+        by_node = np.ascontiguousarray(values).reshape(-1, self.dim)
+        run(sparsity.add_rows, self.n_nodes, self.elements.shape[1], self.at_starts, self.at, by_node, result)
+        return result
+
+
+def rigid_body_modes(nodes: Floats) -> Floats:
+    """Return translations, then infinitesimal rotations about the centre, shape (n_dof, 3 or 6), each of size 1."""
+    n_nodes, dim = nodes.shape
+    centred = nodes - nodes.mean(axis=0)
+    centred = centred / max(float(np.abs(centred).max()), np.finfo(float).tiny)
+    modes = [np.tile(np.eye(dim)[axis], n_nodes) for axis in range(dim)]
+    for first in range(dim):
+        for second in range(first + 1, dim):
+            turn = np.zeros((n_nodes, dim))
+            turn[:, first], turn[:, second] = -centred[:, second], centred[:, first]
+            modes.append(turn.ravel())
+    return np.stack(modes, axis=1)

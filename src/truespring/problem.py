@@ -10,6 +10,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import NoLoadError, ProblemError
 from truespring.material import Material, Section, Solid
+from truespring.memory import slices
 from truespring.mesh import Mesh, Selection, select, select_elements, shares
 from truespring.mesh.selections import AXES
 from truespring.potential import Loading
@@ -108,8 +109,8 @@ class Problem:
         numbers = np.zeros(len(self.mesh.elements), dtype=np.int64)
         for region in self.regions:
             numbers[select_elements(self.mesh, region.on)] = named.index(region.material)
-        used, numbers = np.unique(numbers, return_inverse=True)
-        return [named[number] for number in used], numbers.ravel()
+        used = np.bincount(numbers, minlength=len(named)) > 0
+        return [material for material, there in zip(named, used, strict=True) if there], (np.cumsum(used) - 1)[numbers]
 
     @cached_property
     def homogeneous(self) -> "tuple[Problem, ...]":
@@ -172,33 +173,44 @@ class Problem:
     def _refuse_rigid_motion(self) -> None:
         """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
         parts = self.mesh.parts
-        n_parts = int(parts.max()) + 1
-        for part in range(n_parts):
-            nodes = np.flatnonzero(parts == part)
-            free = self._rigid_freedom(nodes)
+        by_part = np.argsort(parts, kind="stable")
+        several = np.split(by_part, np.flatnonzero(np.diff(parts[by_part])) + 1)
+        for nodes in several:
+            free = _rigid_freedom(self.mesh.nodes[nodes], self.loading.held[nodes])
             if free is None:
                 continue
             body = "the body"
-            if n_parts > 1:
+            if len(several) > 1:
                 place = ", ".join(f"{coordinate:.6g}" for coordinate in self.mesh.nodes[nodes].mean(axis=0))
                 body = (
-                    f"one of {n_parts} parts that nothing joins, disconnected without support enough "
+                    f"one of {len(several)} parts that nothing joins, disconnected without support enough "
                     f"({len(nodes)} nodes about ({place}) m),"
                 )
             raise ProblemError(
                 f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
             )
 
-    def _rigid_freedom(self, nodes: Ints) -> str | None:
-        """How `nodes` may move as a rigid body in spite of their supports, None where they can't."""
-        modes = rigid_body_modes(self.mesh.nodes[nodes])
-        hindered = modes[self.loading.held[nodes].ravel()]
-        tolerance = 1e-9 * np.sqrt(len(modes))  # nodes on a line have a turn that moves nothing
-        wanted = np.linalg.matrix_rank(modes, tol=tolerance)
-        if hindered.size and np.linalg.matrix_rank(hindered, tol=tolerance) == wanted:
-            return None
-        free = [axis for axis, mode in zip(AXES[: self.mesh.dim], hindered.T, strict=False) if not mode.any()]
-        return f"along {', '.join(free)}" if free else "by turning"
+
+def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
+    """How `nodes` [m] may move as a rigid body though some of their directions are `held`, None where they can't."""
+    if held.all():
+        return None
+    tolerance = 1e-9 * np.sqrt(nodes.size)  # nodes on a line have a turn that moves nothing
+    hindered = _rigid_rank(nodes, held, tolerance)
+    if hindered == _n_modes(nodes) or 0 < hindered == _rigid_rank(nodes, np.ones_like(held), tolerance):
+        return None
+    free = [axis for axis, there in zip(AXES, held.any(axis=0), strict=False) if not there]
+    return f"along {', '.join(free)}" if free else "by turning"
+
+
+def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
+    """The rank of the rigid-body modes of `nodes` [m] in the directions chosen: singular values above a tolerance."""
+    places = _centred(nodes)
+    upper = np.zeros((0, _n_modes(nodes)))
+    for part in slices(len(nodes), 8 * nodes.shape[1] * upper.shape[1]):
+        if chosen[part].any():
+            upper = np.linalg.qr(np.concatenate([upper, _modes(places[part])[chosen[part].ravel()]]), mode="r")
+    return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
 
 def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:
@@ -209,18 +221,31 @@ def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:
     return tuple(several)
 
 
+def _n_modes(nodes: Floats) -> int:
+    """Translations and rotations: 3 in the plane, 6 in space."""
+    dim = nodes.shape[1]
+    return dim * (dim + 1) // 2
+
+
 def rigid_body_modes(nodes: Floats) -> Floats:
     """Return translations, then infinitesimal rotations about the centre, shape (n_dof, 3 or 6), each of size 1."""
-    n_nodes, dim = nodes.shape
+    return _modes(_centred(nodes))
+
+
+def _centred(nodes: Floats) -> Floats:
+    """Places from the centre, the farthest coordinate 1."""
     centred = nodes - nodes.mean(axis=0)
-    centred = centred / max(float(np.abs(centred).max()), np.finfo(float).tiny)
-    modes = [np.tile(np.eye(dim)[axis], n_nodes) for axis in range(dim)]
-    for first in range(dim):
-        for second in range(first + 1, dim):
-            turn = np.zeros((n_nodes, dim))
-            turn[:, first], turn[:, second] = -centred[:, second], centred[:, first]
-            modes.append(turn.ravel())
-    return np.stack(modes, axis=1)
+    return np.asarray(centred / max(float(np.abs(centred).max()), np.finfo(float).tiny))
+
+
+def _modes(places: Floats) -> Floats:
+    n_nodes, dim = places.shape
+    turns = [(first, second) for first in range(dim) for second in range(first + 1, dim)]
+    modes = np.zeros((n_nodes, dim, dim + len(turns)))
+    modes[:, :, :dim] = np.eye(dim)
+    for turn, (first, second) in enumerate(turns):
+        modes[:, first, dim + turn], modes[:, second, dim + turn] = -places[:, second], places[:, first]
+    return modes.reshape(n_nodes * dim, -1)
 
 
 def _components(values: Sequence[float], dim: int, name: str, unit: str) -> Floats:

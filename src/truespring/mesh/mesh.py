@@ -1,7 +1,7 @@
 """The mesh: nodes, elements of one kind, and what follows from them alone."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -12,7 +12,10 @@ from scipy.sparse.csgraph import connected_components
 
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
-from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind
+from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
+from truespring.mesh.forms import Forms, find_forms
+from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind, Links
+from truespring.mesh.rows import ascending, distinct_rows
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
@@ -72,32 +75,33 @@ class Mesh:
             )
         used = np.zeros(self.n_nodes, dtype=bool)
         used[self.elements] = True
-        self._refuse(~used, "nodes", "unreferenced: no element has them", self.nodes)
-        centres = self.nodes[self.elements].mean(axis=1)
-        smallest = self._rest_jacobians.min(axis=1)
-        self._refuse(smallest <= -self._degenerate, "elements", "inverted: their corner Jacobian is negative", centres)
+        self._refuse(~used, "nodes", "unreferenced: no element has them", lambda: self.nodes)
+        smallest, least = self._rest_jacobians.min(axis=1), self._degenerate
         self._refuse(
-            ~(smallest > self._degenerate), "elements", "degenerate: flat or with nodes that coincide", centres
+            smallest <= -least, "elements", "inverted: their corner Jacobian is negative", lambda: self.centres
+        )
+        self._refuse(
+            ~(smallest > least), "elements", "degenerate: flat or with nodes that coincide", lambda: self.centres
         )
         if self.element != "line":  # springs may be parallel
-            _, first = np.unique(np.sort(self.elements, axis=1), axis=0, return_index=True)
             twice = np.ones(len(self.elements), dtype=bool)
-            twice[first] = False
-            self._refuse(twice, "elements", "duplicate: others have the same nodes", centres)
+            twice[distinct_rows(ascending(self.elements.T)).first] = False
+            self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
 
     @property
     def _degenerate(self) -> Floats:
         """The corner Jacobian below which an element is degenerate [m^dim], shape (n_elements,)."""
-        edges = np.array(self.kind.edges)
-        at = self.nodes[self.elements]
-        longest = np.linalg.norm(at[:, edges[:, 1]] - at[:, edges[:, 0]], axis=2).max(axis=1)
-        return np.asarray(_DEGENERATE * longest**self.kind.dim if self.element != "line" else 0.0 * longest)
+        longest = np.zeros(len(self.elements))
+        if self.element != "line":
+            for part, at in corners_in_slices(self.nodes, self.elements):
+                longest[part] = np.maximum.reduce([squared_distance(at, *edge) for edge in self.kind.edges])
+        return np.asarray(_DEGENERATE * longest ** (self.kind.dim / 2))
 
-    def _refuse(self, bad: Bools, what: str, why: str, places: Floats) -> None:
+    def _refuse(self, bad: Bools, what: str, why: str, places: Callable[[], Floats]) -> None:
         """Name, count and locate what is wrong."""
         if bad.any():
             first = int(bad.argmax())
-            place = ", ".join(f"{coordinate:.6g}" for coordinate in places[first])
+            place = ", ".join(f"{coordinate:.6g}" for coordinate in places()[first])
             raise MeshError(
                 f"{int(bad.sum())} of {len(bad)} {what} are {why}; the first is {what[:-1]} {first} at ({place}) m"
             )
@@ -117,64 +121,101 @@ class Mesh:
         """The number of nodes."""
         return len(self.nodes)
 
-    @property
+    @cached_property
     def lower(self) -> Floats:
         """The smallest coordinates [m], shape (dim,)."""
-        return np.asarray(self.nodes.min(axis=0))
+        return _frozen(np.array([column.min() for column in self.nodes.T]))
 
-    @property
+    @cached_property
     def upper(self) -> Floats:
         """The largest coordinates [m], shape (dim,)."""
-        return np.asarray(self.nodes.max(axis=0))
+        return _frozen(np.array([column.max() for column in self.nodes.T]))
 
     @property
     def diameter(self) -> float:
         """The diagonal of the bounding box [m]: the length that tolerances are relative to."""
         return float(np.linalg.norm(self.upper - self.lower))
 
+    @property
+    def centres(self) -> Floats:
+        """The mean of each element's nodes [m], shape (n_elements, dim)."""
+        total = np.zeros((len(self.elements), self.dim))
+        for corner in self.elements.T:
+            total += self.nodes[corner]
+        return np.asarray(total / self.elements.shape[1])
+
+    def pair_keys(self, pairs: Links) -> Ints:
+        """Return a number for each local pair of nodes of each element, shape (pairs, n_elements).
+
+        The same for the same two nodes: the smaller node number times n_nodes plus the larger one.
+        """
+        ends = [ascending((self.elements[:, one], self.elements[:, other])) for one, other in pairs]
+        return np.stack([low * self.n_nodes + high for low, high in ends])
+
     @cached_property
     def edges(self) -> Ints:
         """Every edge of the elements once, shape (n_edges, 2)."""
-        return np.unique(np.sort(self.elements[:, np.array(self.kind.edges)].reshape(-1, 2), axis=1), axis=0)
+        keys = np.sort(self.pair_keys(self.kind.edges), axis=None, kind="stable")
+        return np.stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], self.n_nodes), axis=1)
 
     @cached_property
     def facets(self) -> Ints:
         """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k)."""
-        return np.asarray(self._all_facets[self._facets[0]])
+        return self.facets_of(self.elements)[0]
 
     @cached_property
     def boundary(self) -> Ints:
         """The facets that belong to one element only, in that element's own order of nodes, shape (n, k)."""
-        first, count = self._facets
-        return np.asarray(self._all_facets[first[count == 1]])
+        facets, alone = self.facets_of(self.elements)
+        return np.asarray(facets[alone])
+
+    def facets_of(self, elements: Ints, within: Bools | None = None) -> tuple[Ints, Bools]:
+        """Return each facet of `elements` once, and whether but one of them has it; shapes (n, k) and (n,).
+
+        With `within`, true for some nodes, only the facets all of whose nodes are among these.
+        """
+        facets = [np.concatenate(column) for column in zip(*(elements.T[list(one)] for one in self.kind.facets), strict=True)]
+        if within is not None:
+            whole = np.logical_and.reduce([within[column] for column in facets])
+            facets = [column[whole] for column in facets]
+        found = distinct_rows(ascending(facets))
+        first = found.first
+        return np.stack([column[first] for column in facets], axis=1), np.asarray(found.count == 1)
 
     @cached_property
-    def _facets(self) -> tuple[Ints, Ints]:
-        """Where each facet stands first among all, and how many elements have it."""
-        _, first, count = np.unique(np.sort(self._all_facets, axis=1), axis=0, return_index=True, return_counts=True)
-        return first, count
+    def forms(self) -> Forms:
+        """The elements that translations carry into each other, node by node."""
+        return find_forms(self.nodes, self.elements)
 
-    @cached_property
-    def _all_facets(self) -> Ints:
-        local = np.array(self.kind.facets)
-        return self.elements[:, local].reshape(-1, local.shape[1])
+    def _jacobians(self, at: Corners) -> Iterator[Floats]:
+        """The Jacobian at each corner of elements whose nodes have the coordinates `at`; of lines the length."""
+        if self.element == "line":
+            yield np.sqrt(squared_distance(at, 0, 1))
+        else:
+            yield from determinants(at, self.kind.corners)
 
     def corner_jacobians(self, positions: Floats) -> Floats:
         """Return the Jacobian at each corner of each element [m^dim], shape (n_elements, corners).
 
         For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive.
         """
-        at = positions[self.elements]
-        if self.element == "line":
-            return np.asarray(np.linalg.norm(at[:, 1] - at[:, 0], axis=1)[:, None])
-        return _determinants(at, self.kind.corners)
+        found = np.empty((len(self.elements), len(self.kind.corners) or 1))
+        for part, at in corners_in_slices(positions, self.elements):
+            for corner, jacobian in enumerate(self._jacobians(at)):
+                found[part, corner] = jacobian
+        return found
 
     def smallest_area_ratio(self, positions: Floats) -> float:
         """Return the smallest corner Jacobian over its rest value: not positive where an element is inverted.
 
-        In space it is a ratio of volumes.
+        In space it is a ratio of volumes. Not a number where a position is none.
         """
-        return float((self.corner_jacobians(positions) / self._rest_jacobians).min())
+        smallest = np.inf
+        with np.errstate(over="ignore", invalid="ignore"):  # a solver may ask of a state that has run away
+            for part, at in corners_in_slices(positions, self.elements):
+                for jacobian, rest in zip(self._jacobians(at), self._rest_jacobians[part].T, strict=True):
+                    smallest = np.minimum(smallest, (jacobian / rest).min())
+        return float(smallest)
 
     @cached_property
     def _rest_jacobians(self) -> Floats:
@@ -189,22 +230,24 @@ class Mesh:
 
     def measures_at(self, positions: Floats) -> Floats:
         """Signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact for each kind."""
-        determinants = _determinants(positions[self.elements], self.kind.simplices)
-        return np.asarray(determinants.sum(axis=1) * self.kind.simplex_weight / math.factorial(self.kind.dim))
+        found = np.zeros(len(self.elements))
+        for part, at in corners_in_slices(positions, self.elements):
+            for determinant in determinants(at, self.kind.simplices):
+                found[part] += determinant
+        return found * (self.kind.simplex_weight / math.factorial(self.kind.dim))
 
     @cached_property
     def parts(self) -> Ints:
         """The connected part of the mesh that each node belongs to, numbered from 0, shape (n_nodes,)."""
         first, others = self.elements[:, :1], self.elements[:, 1:]
-        pairs = np.stack(np.broadcast_arrays(first, others), axis=-1).reshape(-1, 2)
-        graph = sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(self.n_nodes, self.n_nodes))
+        ends = np.broadcast_to(first, others.shape).ravel(), others.ravel()
+        graph = sparse.coo_array((np.ones(others.size, dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _determinants(at: Floats, simplices: Sequence[tuple[int, ...]]) -> Floats:
-    """Determinant spanned at the first of each simplex' nodes by the others, shape (n_elements, simplices)."""
-    local = np.array(simplices)
-    return np.asarray(np.linalg.det(at[:, local[:, 1:]] - at[:, local[:, :1]]))
+def _frozen(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array
 
 
 def _groups(groups: Mapping[str, Ints], n_there: int, what: str) -> Mapping[str, Ints]:

@@ -84,7 +84,7 @@ def select_elements(mesh: Mesh, on: Selection) -> Ints:
                 "a box takes the elements whose centres it holds"
             )
         case Box(lower, upper):
-            return _in_box(mesh, lower, upper, mesh.nodes[mesh.elements].mean(axis=1), "element with its centre")
+            return _in_box(mesh, lower, upper, mesh.centres, "element with its centre")
         case Plane() | Near():
             raise MeshError(f"{on!r} selects nodes; elements are selected by a group, a box or numbers")
         case _:
@@ -204,14 +204,26 @@ def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
         return None
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[nodes] = True
-    for cells in (mesh.elements, mesh.boundary, mesh.facets, mesh.edges):
-        within = inside[cells].all(axis=1)
-        found = cells[within]
-        if len(np.unique(found)) == len(nodes):
-            if cells is mesh.elements and mesh.dim == 3:
-                return found, np.repeat(mesh.measures[within, None] / found.shape[1], found.shape[1], axis=1)
-            return found, corner_measures(mesh.nodes[found])
-    return None
+    n_inside = np.zeros(len(mesh.elements), dtype=np.int64)
+    for corner in mesh.elements.T:
+        n_inside += inside[corner]
+    whole = n_inside == mesh.elements.shape[1]
+    if _reach(mesh.elements[whole], nodes):
+        found = mesh.elements[whole]
+        if mesh.dim == 3:
+            return found, np.repeat(mesh.measures[whole, None] / found.shape[1], found.shape[1], axis=1)
+        return found, corner_measures(mesh.nodes[found])
+    facets, alone = mesh.facets_of(mesh.elements[n_inside >= len(mesh.kind.facets[0])], inside)
+    for cells in (facets[alone], facets):
+        if _reach(cells, nodes):
+            return cells, corner_measures(mesh.nodes[cells])
+    edges = mesh.edges[inside[mesh.edges].all(axis=1)]
+    return (edges, corner_measures(mesh.nodes[edges])) if _reach(edges, nodes) else None
+
+
+def _reach(cells: Ints, nodes: Ints) -> bool:
+    """Whether cells of these nodes only have all of them."""
+    return len(np.unique(cells)) == len(nodes)
 
 
 def corner_measures(corners: Floats) -> Floats:

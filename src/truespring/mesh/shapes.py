@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import psutil
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, nearest
+from truespring.memory import available_memory
 from truespring.mesh.mesh import Mesh
+from truespring.mesh.rows import ascending, distinct_rows
 
 #: What a rectangle and a box may be made of: two triangles a rectangle; six tetrahedra a box, or the
 #: body-centred-cubic lattice, whose `elements` count its cubic cells.
@@ -19,9 +20,9 @@ SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron")
 #: other one, or each in turn, so that no direction is preferred.
 DIAGONALS = ("right", "left", "alternating")
 
-# What a solve takes at its peak, by the direct factorisation of a lattice: its fill grows with n log n in the
-# plane (25 million entries at 1e5 nodes, 433 million at 1e6), with n^(4/3) in space (119 million at 3.2e4).
-_BYTES_PLANE, _BYTES_SPACE = 450.0, 2500.0
+# What a solve takes at its peak for each node [bytes]: by multigrid in proportion to the size of the body, in the
+# plane and in space. Where a factorisation would take more it is not chosen.
+_BYTES_A_NODE = {2: 2560, 3: 10240}
 
 _FLATTEST = 1e3
 
@@ -101,13 +102,12 @@ def _body_centred(corners: Floats, cells: Ints) -> Mesh:
     n_corners, n_cells, n_faces = len(corners), len(cells), len(hexahedra.kind.facets)
     faces = cells[:, np.array(hexahedra.kind.facets)].reshape(-1, 4)
     owner = n_corners + np.repeat(np.arange(n_cells), n_faces)
-    _, first, face_of, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
+    found = distinct_rows(ascending(faces.T))
+    first, face_of, count = found.first, found.of, found.count
     # The middles on both sides: of two cells, or of a cell and of its face on the outside.
     other_side = np.zeros(len(first), dtype=np.int64)
-    later = np.flatnonzero(first[face_of.ravel()] != np.arange(len(faces)))
-    other_side[face_of.ravel()[later]] = owner[later]
+    later = np.flatnonzero(first[face_of] != np.arange(len(faces)))
+    other_side[face_of[later]] = owner[later]
     outside = np.flatnonzero(count == 1)
     other_side[outside] = n_corners + n_cells + np.arange(len(outside))
     near, far, ring = owner[first], other_side, faces[first]
@@ -120,9 +120,8 @@ def _body_centred(corners: Floats, cells: Ints) -> Mesh:
 
 def refuse_too_large(n_nodes: int, dim: int) -> None:
     """Raise MeshError where a mesh of `n_nodes` cannot be solved in the memory of this machine."""
-    plane = _BYTES_PLANE * n_nodes * max(1.0, math.log2(max(n_nodes, 1)))
-    needed = plane if dim == 2 else _BYTES_SPACE * float(n_nodes) ** (4 / 3)
-    there = psutil.virtual_memory().total
+    needed = _BYTES_A_NODE[dim] * n_nodes
+    there = available_memory()
     if needed > there:
         raise MeshError(
             f"a mesh of {n_nodes:,} nodes needs about {needed / 2**30:,.0f} GiB to be solved, "

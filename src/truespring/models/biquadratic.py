@@ -1,7 +1,9 @@
 """Biquadratic springs: springs in squared lengths, coupled within an element, that are St. Venant-Kirchhoff FEM."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,9 @@ from truespring.arrays import Floats, Ints
 from truespring.models.links import link_coupling
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
+
+# Threads share the elements from so many on.
+_SMALLEST_PIECE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,73 +38,100 @@ class BiquadraticSprings:
 
     @cached_property
     def _links(self) -> Ints:
-        return np.array(self.problem.mesh.kind.links)
+        """The link of each pair of an element's nodes, shape (k, k)."""
+        kind = self.problem.mesh.kind
+        number = np.full((kind.n_nodes, kind.n_nodes), -1)
+        for link, (i, j) in enumerate(kind.links):
+            number[i, j] = number[j, i] = link
+        return number
 
     @cached_property
     def _pattern(self) -> Pattern:
         return Pattern(self.problem.mesh.elements, *self.nodes.shape)
 
-    @cached_property
-    def _at_rest(self) -> Floats:
-        return _squared(self._vectors(self.nodes))
+    def _run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
+        """Run a kernel over all elements."""
+        from truespring.kernels.threads import run
 
-    def _vectors(self, positions: Floats) -> Floats:
-        """Vector of each link [m], shape (n_elements, links, dim)."""
-        first, second = self._ends
-        return np.asarray(np.take(positions, second, axis=0) - np.take(positions, first, axis=0))
+        run(kernel, len(self._pattern.elements), *arguments, smallest=_SMALLEST_PIECE)
 
-    @cached_property
-    def _ends(self) -> tuple[Ints, Ints]:
-        """The first and the second node of each link, shape (n_elements, links) each."""
-        elements = self.problem.mesh.elements
-        return elements[:, self._links[:, 0]], elements[:, self._links[:, 1]]
+    @property
+    def _place(self) -> tuple[Ints, Ints]:
+        """What kernels ask of the elements: their nodes and links."""
+        return self._pattern.elements, self._links
 
-    def _change(self, vectors: Floats) -> Floats:
-        """The change q of squared lengths [m^2], shape (n_elements, links)."""
-        return _squared(vectors) - self._at_rest
+    def _by_link(self) -> Floats:
+        """Room for a value of each link, shape (n_elements, links)."""
+        return np.empty((len(self._pattern.elements), self.coupling.shape[1]))
+
+    def _changes(self, positions: Floats, step: Floats | None = None) -> Floats:
+        """The change q of squared lengths [m^2], carried on linearly along a step [m], shape (n_elements, links)."""
+        from truespring.kernels import links
+        from truespring.kernels.threads import writable
+
+        x, change = writable(positions), self._by_link()
+        self._run(links.changes, x, writable(self.nodes), *self._place, change, self._pattern.zero)
+        if step is not None:
+            self._run(links.carry_on, x, writable(step), *self._place, change, self._pattern.zero)
+        return change
+
+    def _coupled(self, change: Floats) -> Floats:
+        """2 M q of each element [N/m], shape (n_elements, links)."""
+        from truespring.kernels import links
+
+        pull = self._by_link()
+        self._run(links.couple, self.coupling, change, pull)
+        return pull
+
+    def _squared(self, positions: Floats) -> Floats:
+        """Squared lengths [m^2], shape (n_elements, links)."""
+        from truespring.kernels import links
+        from truespring.kernels.threads import writable
+
+        squared = self._by_link()
+        self._run(links.squared_lengths, writable(positions), *self._place, squared, self._pattern.zero)
+        return squared
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""
-        q = self._change(self._vectors(positions))
-        return float((self._coupled(q) * q).sum())
-
-    def _coupled(self, q: Floats) -> Floats:
-        """M q of each element, shape (n_elements, links)."""
-        if len(self.coupling) == 1:
-            return np.asarray(q @ self.coupling[0])
-        return np.asarray((self.coupling @ q[:, :, None])[:, :, 0])
+        change = self._changes(positions)
+        return float(np.vdot(change, self._coupled(change))) / 2
 
     def stress(self, positions: Floats) -> Floats:
         """The derivative p = 2 M q of the energy by each squared length [N/m], shape (n_elements, links)."""
-        q = self._change(self._vectors(positions))
-        return 2 * self._coupled(q)
+        return self._coupled(self._changes(positions))
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """2 M (q + 2 d . change of d along the step) [N/m], shape (n_elements, links)."""
+        return self._coupled(self._changes(positions, step))
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        vectors = self._vectors(positions)
-        pull = 4 * self._coupled(self._change(vectors))[:, :, None] * vectors
-        return self._pattern.vector(self._incidence.T @ pull).reshape(positions.shape)
+        from truespring.kernels import links
+        from truespring.kernels.threads import writable
 
-    @cached_property
-    def _incidence(self) -> Floats:
-        """1 at the second, -1 at the first node of each link, shape (links, nodes of the element)."""
-        incidence = np.zeros((len(self._links), self.problem.mesh.kind.n_nodes))
-        every = np.arange(len(self._links))
-        incidence[every, self._links[:, 0]], incidence[every, self._links[:, 1]] = -1, 1
-        return incidence
+        n_elements, k = self._pattern.elements.shape
+        force = np.empty((n_elements, k * self._pattern.dim))
+        self._run(links.forces, writable(positions), *self._place, self.stress(positions), force, self._pattern.zero)
+        return self._pattern.vector(force)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
-        p = self.stress(positions) if stress is None else stress
-        d, s = self._vectors(positions), self._incidence
-        n_elements, n_local, dim = len(d), s.shape[1], d.shape[2]
-        J = 2 * np.einsum("la,eli->elai", s, d).reshape(n_elements, len(s), n_local * dim)
-        blocks = J.swapaxes(1, 2) @ (2 * self.coupling) @ J
-        spread = np.einsum("el,la,lb->eab", 2 * p, s, s, optimize=True)
-        blocks = blocks.reshape(n_elements, n_local, dim, n_local, dim)
-        for i in range(dim):
-            blocks[:, :, i, :, i] += spread
-        return self._pattern.matrix(blocks.reshape(n_elements, n_local * dim, n_local * dim))
+        from truespring.kernels import links
+        from truespring.kernels.threads import run, writable
+
+        x, p = writable(positions), writable(self.stress(positions) if stress is None else stress)
+        elements, own = self._pattern.elements, len(self.coupling) > 1
+        n_dof = elements.shape[1] * self._pattern.dim
+
+        def matrices(first: int, last: int) -> Floats:
+            blocks = np.empty((last - first, n_dof, n_dof))
+            coupling = self.coupling[first:last] if own else self.coupling
+            known = (x, elements[first:last], self._links, coupling, p[first:last])
+            run(links.stiffnesses, last - first, *known, blocks, self._pattern.zero, smallest=_SMALLEST_PIECE)
+            return blocks
+
+        return self._pattern.summed(matrices)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """The Hessian without what compressed links add to its geometric part, positive semidefinite [N/m]."""
@@ -107,14 +139,18 @@ class BiquadraticSprings:
 
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length of each element's links, shape (n_elements * links,)."""
-        return np.asarray(np.sqrt(_squared(self._vectors(positions)) / self._at_rest).ravel())
+        return np.asarray(np.sqrt(self._squared(positions) / self._squared(self.nodes)).ravel())
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints]:
         """Each pair of nodes that a link joins once, and the pair of each element's links."""
-        pairs = np.sort(self.problem.mesh.elements[:, self._links].reshape(-1, 2), axis=1)
-        springs, place = np.unique(pairs, axis=0, return_inverse=True)
-        return springs, place.ravel()
+        from truespring.kernels.sparsity import unique_pairs
+        from truespring.kernels.threads import writable
+
+        mesh = self.problem.mesh
+        pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
+        springs, place = unique_pairs(pairs, mesh.n_nodes)
+        return springs, place
 
     @property
     def springs(self) -> Ints:
@@ -132,10 +168,9 @@ class BiquadraticSprings:
         Sums over the elements that share it: tension 2 p l, stiffness 8 L^2 M_ss, and of the energy q . M q
         the part q_s (M q)_s, which may be negative and adds up to the whole.
         """
-        vectors = self._vectors(positions)
-        q, length = self._change(vectors), np.sqrt(_squared(vectors))
-        coupled = self._coupled(q)
-        alone = np.broadcast_to(np.einsum("ess->es", self.coupling), q.shape)
+        change = self._changes(positions)
+        pull = self._coupled(change)
+        alone = np.broadcast_to(np.einsum("ess->es", self.coupling), change.shape)
         springs, place = self._shared
 
         def summed(values: Floats) -> Floats:
@@ -144,13 +179,8 @@ class BiquadraticSprings:
         first = np.zeros(len(springs))
         first[place] = self.stretch(positions)
         return {
-            "tension": summed(4 * coupled * length),
+            "tension": summed(2 * pull * np.sqrt(self._squared(positions))),
             "stretch": first,
-            "stiffness": summed(8 * self._at_rest * alone),
-            "strain_energy": summed(q * coupled),
+            "stiffness": summed(8 * self._squared(self.nodes) * alone),
+            "strain_energy": summed(change * pull / 2),
         }
-
-
-def _squared(vectors: Floats) -> Floats:
-    """Squared lengths [m^2], shape (n_elements, links)."""
-    return np.asarray(np.einsum("eli,eli->el", vectors, vectors))

@@ -1,11 +1,13 @@
 """Finite elements on the same mesh, the embedded reference: shape functions and quadrature by scikit-fem."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import skfem
+from skfem.quadrature import get_quadrature
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
@@ -13,6 +15,7 @@ from truespring.material import PlaneStress
 from truespring.mesh import Mesh
 from truespring.models.laws import LAWS, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
+from truespring.models.symmetric import contracted, identity, voigt_places
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
@@ -23,17 +26,22 @@ LOCKING_POISSON = 0.4
 #: triangles and tetrahedra.
 ELEMENTS = ("linear", "mean-dilatation", "quadratic")
 
-# scikit-fem's mesh and element of each kind, and its quadrature: the order, or for the constant strain of a
-# triangle its one point. 2 Gauss points a direction integrate polynomials of third order.
-_SKFEM: dict[str, tuple[Any, Any, dict[str, Any]]] = {
-    "triangle": (skfem.MeshTri, skfem.ElementTriP1, {"quadrature": (np.full((2, 1), 1 / 3), np.array([0.5]))}),
-    "quadrilateral": (skfem.MeshQuad, skfem.ElementQuad1, {"intorder": 3}),
-    "tetrahedron": (skfem.MeshTet, skfem.ElementTetP1, {"intorder": 1}),
-    "hexahedron": (skfem.MeshHex, skfem.ElementHex1, {"intorder": 3}),
+# scikit-fem's element of each kind and its quadrature: the order, or for the constant strain of a triangle its one
+# point and weight. 2 Gauss points a direction integrate polynomials of third order.
+_SKFEM: dict[str, tuple[Any, Any]] = {
+    "triangle": (skfem.ElementTriP1, (np.full((2, 1), 1 / 3), np.array([0.5]))),
+    "quadrilateral": (skfem.ElementQuad1, 3),
+    "tetrahedron": (skfem.ElementTetP1, 1),
+    "hexahedron": (skfem.ElementHex1, 3),
 }
 
 # scikit-fem counts the corners of a hexahedron in another order than VTK: its places of ours.
 _ORDER = {"hexahedron": np.array([7, 4, 1, 5, 6, 2, 0, 3])}
+
+# What laws answer is held for so many Gauss points at a time, which stays in the processor's cache.
+_SLICE_POINTS = 8192
+# Threads share the elements of a slice from so many on.
+_SMALLEST_PIECE = 32
 
 
 @dataclass(frozen=True)
@@ -126,20 +134,64 @@ def element_matrices(problem: Problem) -> Floats:
     return fem_potential(problem, "linear").element_hessians(problem.mesh.nodes)
 
 
+class Reference(NamedTuple):
+    """What is known of every element of a kind, axes (point, node of the element, direction) and (point,).
+
+    Attributes:
+        corner_slopes: derivatives of the functions that place the reference element in space.
+        slopes: derivatives of its shape functions.
+        weights: of the Gauss points.
+    """
+
+    corner_slopes: Floats
+    slopes: Floats
+    weights: Floats
+
+
+def reference_element(kind: str, element: Any = None, order: int | None = None) -> Reference:
+    """Return scikit-fem's reference element of a kind: of first order, or `element` with the quadrature of `order`."""
+    corners, own = _SKFEM[kind]
+    rule = own if order is None else order
+    points, weights = rule if isinstance(rule, tuple) else get_quadrature(corners.refdom, rule)
+
+    def slopes(functions: Any) -> Floats:
+        by_node = [functions.lbasis(points, node)[1] for node in range(len(functions.doflocs))]
+        return np.ascontiguousarray(np.stack(by_node)[_ORDER.get(kind, slice(None))].transpose(2, 0, 1))
+
+    return Reference(slopes(corners()), slopes(corners() if element is None else element), weights)
+
+
+class Points(NamedTuple):
+    """The Gauss points of a slice of the elements at a deformed state.
+
+    Attributes:
+        gradients: of the shape functions [1/m], axes (element, point, node of the element, direction).
+        volumes: reference volume of each point [m^3], axes (element, point).
+        F: deformation gradient, axes (i, j, element, point).
+        frame: F, of a linear law the identity: a change dF strains by the symmetric part of frame^T dF.
+        constants: of the law.
+    """
+
+    gradients: Floats
+    volumes: Floats
+    F: Floats
+    frame: Floats
+    constants: Constants
+
+
 @dataclass(frozen=True, eq=False)
 class FemPotential:
     """Elastic energy of a mesh of finite elements, integrated over the reference body.
 
-    With W the law's energy density, S its stress and A its elasticity at the deformation gradient F:
-    energy W, gradient F S : grad v, Hessian F^T grad u : A : F^T grad v + S : (grad u^T grad v).
-    The linear law has F = I in the last two and no geometric part. Elements are summed into the
-    same fixed pattern as springs are.
+    With W the law's energy density, S its stress and D its elasticity at the deformation gradient F:
+    energy W, gradient F S : grad v, Hessian F^T grad u : D : F^T grad v + S : (grad u^T grad v).
+    The linear law has F = I in the last two and no geometric part. Elements are taken a slice at a
+    time, and nothing is kept of them but the pattern of their sum.
     """
 
     problem: Problem
     law: Law
     constants: Constants
-    _last: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     #: One of ELEMENTS.
     interpolation: ClassVar[str] = "linear"
@@ -156,126 +208,189 @@ class FemPotential:
 
     @property
     def elements(self) -> Ints:
-        """Node numbers of each element, in the order of its shape functions, shape (n_elements, k)."""
+        """Node numbers of each element, its corners first, shape (n_elements, k)."""
         return self.mesh.elements
 
     @cached_property
-    def _basis(self) -> Any:
-        return skfem_basis(self.mesh)
-
-    @cached_property
-    def shape_gradients(self) -> Floats:
-        """Gradients of the shape functions [1/m], axes (node of the element, direction, element, point)."""
-        order = _ORDER.get(self.mesh.element, slice(None))
-        return np.stack([function.grad for (function,) in self._basis.basis])[order]
-
-    @cached_property
-    def _gradients(self) -> Floats:
-        """The same, axes (element, point, node of the element, direction)."""
-        return np.ascontiguousarray(np.moveaxis(self.shape_gradients, (2, 3), (0, 1)))
-
-    @cached_property
-    def volumes(self) -> Floats:
-        """Reference volume of each Gauss point [m^3], axes (element, point)."""
-        section = self.problem.section
-        assert section is not None  # fem_potential refuses bodies without one
-        return np.asarray(section.thickness * self._basis.dx)
+    def _reference(self) -> Reference:
+        return reference_element(self.mesh.element)
 
     @cached_property
     def _pattern(self) -> Pattern:
         return Pattern(self.elements, *self.nodes.shape)
 
-    def _deformation(self, positions: Floats) -> Floats:
-        """Deformation gradient at the Gauss points, axes (i, j, element, point)."""
-        at = positions[self.elements].swapaxes(1, 2)
-        return np.ascontiguousarray(np.moveaxis(at[:, None] @ self._gradients, (2, 3), (0, 1)))
+    @cached_property
+    def _voigt(self) -> Ints:
+        return voigt_places(self.mesh.dim)
 
-    def _respond(self, positions: Floats) -> tuple[Floats, Response]:
-        """Deformation gradient and the law's response; the last ones are kept, for energy, gradient and Hessian."""
-        key = positions.tobytes()
-        if self._last.get("key") != key:
-            F = self._deformation(positions)
-            if self.law.finite:
-                strain = np.einsum("ki...,kj...->ij...", F, F)
-            else:
-                strain = (F + F.swapaxes(0, 1)) / 2 - np.eye(len(F))[:, :, None, None]
-            self._last.update(key=key, F=F, response=self.law.respond(strain, self.constants))
-        return self._last["F"], self._last["response"]
+    def _slices(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
+        """Cut a range of elements, by default all, into slices."""
+        end = len(self.elements) if last is None else last
+        step = max(1, _SLICE_POINTS // len(self._reference.weights))
+        return ((begin, min(begin + step, end)) for begin in range(first, end, step))
+
+    def quadrature(self, first: int = 0, last: int | None = None) -> tuple[Floats, Floats]:
+        """Gradients of the shape functions [1/m] and volume [m^3] of the Gauss points of a slice of the elements.
+
+        Axes (element, point, node of the element, direction) and (element, point).
+        """
+        from truespring.kernels import elements
+        from truespring.kernels.threads import run
+
+        section = self.problem.section
+        assert section is not None  # fem_potential refuses bodies without one
+        corner_slopes, slopes, weights = self._reference
+        corners = self.mesh.elements[first:last]
+        places = self.mesh.nodes[corners]
+        gradients = np.empty((len(places), *slopes.shape))
+        volumes = np.empty((len(places), len(weights)))
+        known = (places, corner_slopes, slopes, section.thickness * weights)
+        run(elements.quadrature, len(places), *known, gradients, volumes, self._zero, smallest=_SMALLEST_PIECE)
+        return gradients, volumes
+
+    @property
+    def _zero(self) -> tuple[float, ...]:
+        return (0.0,) * self.mesh.dim
+
+    def _points(self, positions: Floats, first: int, last: int) -> Points:
+        gradients, volumes = self.quadrature(first, last)
+        F = self._gradient_of(positions, gradients, first, last)
+        identity = np.zeros_like(F)
+        for i in range(len(F)):
+            identity[i, i] = 1.0
+        frame = F if self.law.finite else identity
+        return Points(gradients, volumes, F, frame, self.constants.part(first, last))
+
+    def _gradient_of(self, field: Floats, gradients: Floats, first: int, last: int) -> Floats:
+        """Gradient of a vector field given at the nodes, axes (i, j, element, point)."""
+        from truespring.kernels import elements
+        from truespring.kernels.threads import run
+
+        values = field[self.elements[first:last]]
+        result = np.empty((self.mesh.dim,) * 2 + gradients.shape[:2])
+        run(elements.gradients, len(values), values, gradients, result, self._zero, smallest=_SMALLEST_PIECE)
+        return result
+
+    def _strain(self, at: Points) -> Floats:
+        """What the law asks for: C = F^T F, or the small strain, axes (component, element, point)."""
+        pairs = voigt_pairs(len(at.F))
+        if self.law.finite:
+            return np.stack([sum(row[i] * row[j] for row in at.F) for i, j in pairs])
+        small = np.stack([(at.F[i, j] + at.F[j, i]) / 2 for i, j in pairs])
+        return small - identity(small)
+
+    def _respond(self, at: Points) -> Response:
+        return self.law.respond(self._strain(at), at.constants)
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]; infinite where a law with a barrier meets an inverted element."""
+        total = 0.0
         with np.errstate(over="ignore", invalid="ignore"):
-            F, response = self._respond(positions)
-        density = response.energy
-        if not np.isfinite(density).all() or (self.law.barrier and (determinant(F) <= 0).any()):
-            return float("inf")
-        return float((density * self.volumes).sum())
+            for first, last in self._slices():
+                at = self._points(positions, first, last)
+                density = self._respond(at).energy
+                if self._refused(at) or not np.isfinite(density).all():
+                    return float("inf")
+                total += float((density * at.volumes).sum())
+        return total
+
+    def _refused(self, at: Points) -> bool:
+        """Whether an element is inverted under a law with a barrier."""
+        return self.law.barrier and bool((determinant(at.F) <= 0).any())
 
     def stress(self, positions: Floats) -> Floats:
-        """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (i, j, element, point)."""
-        return self._respond(positions)[1].stress
+        """Second Piola-Kirchhoff stress at the Gauss points [Pa], axes (component, element, point)."""
+        return self._everywhere(lambda first, last: self._respond(self._points(positions, first, last)).stress)
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """The stress carried on linearly along `step` [m] by the law's elasticity [Pa], axes as of `stress`."""
+
+        def carried_on(first: int, last: int) -> Floats:
+            at = self._points(positions, first, last)
+            response = self._respond(at)
+            change = self._strain_change(at, self._gradient_of(step, at.gradients, first, last))
+            return response.stress + contracted(response.elasticity(), change)
+
+        return self._everywhere(carried_on)
+
+    def _everywhere(self, stress: Callable[[int, int], Floats]) -> Floats:
+        """What `stress` gives for slices of the elements, for all."""
+        n_components, n_points = len(voigt_pairs(self.mesh.dim)), len(self._reference.weights)
+        result = np.empty((n_components, len(self.elements), n_points))
+        for first, last in self._slices():
+            result[:, first:last] = stress(first, last)
+        return result
+
+    def _strain_change(self, at: Points, change: Floats) -> Floats:
+        """The change of the strain that is linear in one of F, axes (component, element, point)."""
+        pairs = voigt_pairs(len(change))
+        both = zip(at.frame, change, strict=True)
+        rows = [[one[i] * other[j] + one[j] * other[i] for i, j in pairs] for one, other in both]
+        return np.asarray(np.array(rows).sum(axis=0) / 2)
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        F, response = self._respond(positions)
-        first = np.einsum("ik...,kj...->ij...", F, response.stress) if self.law.finite else response.stress
-        return self._summed(first)
+        forces = np.empty((len(self.elements), self.elements.shape[1] * self.mesh.dim))
+        for first, last in self._slices():
+            at = self._points(positions, first, last)
+            forces[first:last] = self._forces(at, self._working_stress(at))
+        return self._pattern.vector(forces)
 
-    def _summed(self, first: Floats) -> Floats:
-        """Nodal forces [N] of a first Piola-Kirchhoff stress, axes (i, j, element, point)."""
-        forces = self.nodal(first * self.volumes).sum(axis=1)
-        return self._pattern.vector(forces).reshape(self.nodes.shape)
+    def _working_stress(self, at: Points) -> Floats:
+        """The stress whose work on the strain is that of the nodal forces [Pa], axes (component, element, point)."""
+        return self._respond(at).stress
 
-    def nodal(self, first: Floats) -> Floats:
-        """Return the derivative by the nodes of a density from that by F, axes (i, j, element, point).
+    def _forces(self, at: Points, stress: Floats) -> Floats:
+        """Nodal forces [N] of a stress on the strain, shape (n, k * dim)."""
+        from truespring.kernels import elements
+        from truespring.kernels.threads import run
 
-        Its own axes are (element, point, node of the element, direction).
-        """
-        return np.asarray(self._gradients @ np.moveaxis(first, (1, 0), (2, 3)))
+        n, _, k, dim = at.gradients.shape
+        forces = np.empty((n, k * dim))
+        known = (at.frame, stress, self._voigt, at.gradients, at.volumes)
+        run(elements.forces, n, *known, forces, self._zero, smallest=_SMALLEST_PIECE)
+        return forces
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [Pa] makes the geometric part, by default that of the positions."""
-        return self._pattern.matrix(self.element_hessians(positions, stress))
+        return self._pattern.summed(lambda first, last: self.element_hessians(positions, stress, first, last))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Sum of the element Hessians, each with its negative eigenvalues cut off [N/m]."""
-        blocks = self.element_hessians(positions)
-        values, vectors = np.linalg.eigh((blocks + blocks.swapaxes(1, 2)) / 2)
-        return self._pattern.matrix(np.einsum("eik,ek,ejk->eij", vectors, np.maximum(values, 0.0), vectors))
 
-    def element_hessians(self, positions: Floats, stress: Floats | None = None) -> Floats:
-        """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
-        F, response = self._respond(positions)
-        if not self.law.finite:
-            F = np.broadcast_to(np.eye(len(F))[:, :, None, None], F.shape)
-        return self._tangent(F, response.stress if stress is None else stress, response.elasticity)
+        def positive(first: int, last: int) -> Floats:
+            values, vectors = np.linalg.eigh(self.element_hessians(positions, None, first, last))
+            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
 
-    def _tangent(self, F: Floats, S: Floats, elasticity: Floats) -> Floats:
-        """Element matrices [N/m] of a stress and an elasticity by Green's strain, at the deformation gradient F.
+        return self._pattern.summed(positive)
 
-        B^T D B with B the derivative of the strain by the nodes, in Voigt's order; F is I for a linear law.
-        """
-        dim, n_local = len(F), self._gradients.shape[2]
-        pairs = voigt_pairs(dim)
-        columns = np.moveaxis(F, (0, 1), (3, 2))[:, :, :, None]  # of F, beside the gradients, (e, q, j, 1, i)
+    def element_hessians(
+        self, positions: Floats, stress: Floats | None = None, first: int = 0, last: int | None = None
+    ) -> Floats:
+        """Tangent stiffness of each element, or of a slice [N/m], shape (n, n_dof, n_dof), dofs node by node."""
+        parts = []
+        for begin, end in self._slices(first, last):
+            given = None if stress is None else np.ascontiguousarray(stress[:, begin:end])
+            parts.append(self._tangent(self._points(positions, begin, end), given))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
-        def strain(j: int, k: int) -> Floats:
-            return np.asarray(columns[:, :, j] * self._gradients[..., [k]])
+    def _tangent(self, at: Points, stress: Floats | None) -> Floats:
+        """Element matrices [N/m], the geometric part of `stress` or the law's own."""
+        response = self._respond(at)
+        return self._matrices(at, response.stress if stress is None else stress, response.elasticity())
 
-        rows = [strain(j, k) if j == k else strain(j, k) + strain(k, j) for j, k in pairs]
-        n_elements, n_points = self.volumes.shape
-        B = np.stack(rows, axis=2).reshape(n_elements, n_points, len(pairs), dim * n_local)  # by Green's strain
-        D = np.stack([np.stack([elasticity[one + two] for two in pairs], axis=-1) for one in pairs], axis=-2)
-        weighted = (self.volumes[:, :, None, None] * D) @ B
-        flat = (n_elements, n_points * len(pairs), dim * n_local)
-        blocks = B.reshape(flat).swapaxes(1, 2) @ weighted.reshape(flat)
-        if self.law.finite:
-            stress = np.moveaxis(S * self.volumes, (0, 1), (2, 3))
-            spread = (self._gradients @ stress @ self._gradients.swapaxes(2, 3)).sum(axis=1)
-            by_node = blocks.reshape(n_elements, n_local, dim, n_local, dim)
-            for i in range(dim):
-                by_node[:, :, i, :, i] += spread
-        return np.asarray(blocks)
+    def _matrices(self, at: Points, stress: Floats, elasticity: Floats) -> Floats:
+        """Element matrices [N/m] of a stress and an elasticity, shape (n, k * dim, k * dim)."""
+        from truespring.kernels import elements
+        from truespring.kernels.threads import run
+
+        n, _, k, dim = at.gradients.shape
+        blocks = np.empty((n, k * dim, k * dim))
+        geometric = stress if self.law.finite else np.zeros_like(stress)
+        known = (at.frame, geometric, elasticity, self._voigt, at.gradients, at.volumes)
+        zeros = self._zero, self._zero * dim
+        run(elements.stiffnesses, n, *known, blocks, *zeros, smallest=_SMALLEST_PIECE)
+        return blocks
 
     @property
     def cells(self) -> tuple[str, Ints]:
@@ -284,46 +399,43 @@ class FemPotential:
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""
-        stress = self.cauchy_stress(positions)
-        energy = (self._respond(positions)[1].energy * self.volumes).sum(axis=1)
-        return {"stress": stress.reshape(-1, 9), "strain_energy": energy}
+        energy = np.empty(len(self.elements))
+        for first, last in self._slices():
+            at = self._points(positions, first, last)
+            energy[first:last] = (self._respond(at).energy * at.volumes).sum(axis=1)
+        return {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """True stress averaged over the points of each element [Pa], shape (n_elements, 3, 3).
 
         F S F^T over the volume ratio, the change of thickness included; of the linear law, its stress.
         """
-        F, response = self._respond(positions)
-        return true_stress(F, response, self.law.finite)
+        stress = np.empty((len(self.elements), 3, 3))
+        for first, last in self._slices():
+            at = self._points(positions, first, last)
+            stress[first:last] = self._true_stress(self._law_gradient(at), self._respond(at)).mean(axis=-1).T
+        return stress
 
+    def _law_gradient(self, at: Points) -> Floats:
+        """The deformation gradient that the law answers to."""
+        return at.F
 
-def true_stress(F: Floats, response: Response, finite: bool) -> Floats:
-    """Return the true stress of a law's response at F, averaged over the points [Pa], shape (n_elements, 3, 3)."""
-    dim = len(F)
-    stress = np.zeros((3, 3, *F.shape[2:]))
-    stress[2, 2] = response.across
-    stress[:dim, :dim] = response.stress
-    if finite:
-        stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, response.stress, F)
-        volume = determinant(F) * response.thickness_stretch
-        stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
-    return np.moveaxis(stress.mean(axis=-1), -1, 0)
-
-
-def skfem_basis(mesh: Mesh, element: Any = None, **quadrature: Any) -> Any:
-    """Return scikit-fem's basis on a mesh: of its own kind of first order, or of the `element` given."""
-    mesh_class, element_class, own_quadrature = _SKFEM[mesh.element]
-    # scikit-fem's corner i is ours of number argsort(order)[i].
-    order = np.argsort(_ORDER.get(mesh.element, np.arange(mesh.kind.n_nodes)))
-    grid = mesh_class(
-        np.ascontiguousarray(mesh.nodes.T),
-        np.ascontiguousarray(mesh.elements[:, order].T),
-        validate=False,
-        sort_t=False,
-    )
-    return skfem.Basis(grid, element or element_class(), **(quadrature or own_quadrature))
+    def _true_stress(self, F: Floats, response: Response) -> Floats:
+        """True stress [Pa] of a law's response at F, axes (i, j, element, point) in space."""
+        dim = len(F)
+        stress = np.zeros((3, 3, *F.shape[2:]))
+        stress[2, 2] = response.across
+        stress[:dim, :dim] = response.stress[self._voigt]
+        if self.law.finite:
+            stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, stress[:dim, :dim], F)
+            volume = determinant(F) * response.thickness_stretch
+            stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
+        return stress
 
 
 def determinant(F: Floats) -> Floats:
     """Return the determinant of tensors whose axes come first."""
-    return np.asarray(np.linalg.det(np.moveaxis(F, (0, 1), (-2, -1))))
+    if len(F) == 2:
+        return np.asarray(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+    minors = [F[1, j] * F[2, k] - F[1, k] * F[2, j] for j, k in ((1, 2), (2, 0), (0, 1))]
+    return np.asarray(F[0, 0] * minors[0] + F[0, 1] * minors[1] + F[0, 2] * minors[2])

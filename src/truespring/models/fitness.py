@@ -265,8 +265,8 @@ def _patch_test(problem: Problem, springs: Springs) -> _Patch:
     """
     mesh, realised = problem.mesh, moduli(problem, springs)
     material, section = require_body(problem)
-    K = springs.potential(problem).hessian(mesh.nodes)
-    exact = fem_potential(problem, "linear").hessian(mesh.nodes)  # passes: its forces of a uniform strain are right
+    K = springs.potential(problem).hessian(mesh.nodes).tocsr()
+    exact = fem_potential(problem, "linear").hessian(mesh.nodes).tocsr()  # passes: its forces of a uniform strain are right
     elasticity = hooke(*section.lame_within(material), mesh.dim)
     centred = mesh.nodes - mesh.nodes.mean(axis=0)
     strains = np.stack([uniform_strain(centred, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)

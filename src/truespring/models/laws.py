@@ -1,9 +1,9 @@
-"""Constitutive laws: from the deformation gradient to energy density, stress and elasticity.
+"""Constitutive laws: from the strain to energy density, stress and elasticity.
 
-Arrays have their tensor axes first and any number of axes after them, as scikit-fem does. In the
-plane, tensors are 2 by 2 and the third direction is settled here: in plane strain it keeps its
-length, in plane stress it takes the one that leaves it free of stress. A law is one function and
-one line in LAWS.
+Arrays have their tensor axes first, then those of elements and points; a symmetric tensor has one
+axis, its components in Voigt's order. In the plane the third direction is settled here: in plane
+strain it keeps its length, in plane stress it takes the one that leaves it free of stress. A law is
+one function and one line in LAWS.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,18 @@ from types import MappingProxyType
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.models.strain import voigt_pairs
+from truespring.models.symmetric import (
+    contracted,
+    determinant,
+    dimensions,
+    dyad,
+    identity,
+    inverted,
+    outer,
+    swapped,
+    trace,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +45,12 @@ class Constants:
         """The first Lamé constant within the plane [Pa]."""
         return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
 
+    def part(self, first: int, last: int) -> "Constants":
+        """Return those of a slice of the elements."""
+        if np.ndim(self.lam) == 0:
+            return self
+        return Constants(np.asarray(self.lam)[first:last], np.asarray(self.mu)[first:last], self.plane_stress)
+
 
 @dataclass(frozen=True, slots=True)
 class Response:
@@ -40,15 +58,17 @@ class Response:
 
     Attributes:
         energy: per reference volume [J/m^3]; infinite where the law does not reach.
-        stress: second Piola-Kirchhoff stress [Pa], axes (i, j, ...); of the linear law, the stress.
-        elasticity: its derivative by the Green strain [Pa], axes (i, j, k, l, ...).
+        stress: second Piola-Kirchhoff stress [Pa], axes (component, ...); of the linear law, the stress.
+        elasticity: makes its derivative by the Green strain [Pa], axes (component, component, ...): a function,
+            for it costs most and energy and forces do not need it. A component of the strain stands for both of
+            its mirror images, so that a change of strain of e.g. e_xy multiplies twice.
         thickness_stretch: length of the third direction over its rest length; 1 where it is held or in 3D.
         across: Kirchhoff stress of the third direction [Pa], zero in plane stress; of the linear law, the stress.
     """
 
     energy: Floats
     stress: Floats
-    elasticity: Floats
+    elasticity: Callable[[], Floats]
     thickness_stretch: Floats
     across: Floats
 
@@ -70,12 +90,12 @@ class Law:
 
 def linear(strain: Floats, constants: Constants) -> Response:
     """Hooke: W = lam/2 (tr e)^2 + mu e : e of the small strain."""
-    return _quadratic(strain, constants, np.ones(strain.shape[2:]) + _thickness_strain(strain, constants))
+    return _quadratic(strain, constants, 1.0 + _thickness_strain(strain, constants))
 
 
 def saint_venant_kirchhoff(C: Floats, constants: Constants) -> Response:
     """W = lam/2 (tr E)^2 + mu E : E of the Green strain E = (C - I) / 2."""
-    strain = (C - _identity(C)) / 2
+    strain = (C - identity(C)) / 2
     # The thickness is the root of 1 + 2 E_33; the law itself goes on where that is negative.
     thickness = np.sqrt(np.maximum(1 + 2 * _thickness_strain(strain, constants), 0.0))
     return _quadratic(strain, constants, thickness)
@@ -83,27 +103,26 @@ def saint_venant_kirchhoff(C: Floats, constants: Constants) -> Response:
 
 def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Response:
     lam, mu = constants.lam_plane, constants.mu
-    eye = np.eye(len(strain))
-    trace = np.einsum("ii...->...", strain)
-    identity = _identity(strain)
-    stress = lam * trace * identity + 2 * mu * strain
-    swap = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
-    elasticity = _times(lam, np.einsum("ij,kl->ijkl", eye, eye)) + _times(mu, swap)
-    energy = lam / 2 * trace**2 + mu * np.einsum("ij...,ij...->...", strain, strain)
-    across = np.zeros_like(trace) if constants.plane_stress else lam * trace
-    return Response(energy, stress, _everywhere(elasticity, strain.shape[2:]), thickness, across)
+    dim, volume_change = dimensions(strain), trace(strain)
+    stress = 2 * mu * strain
+    stress[:dim] += lam * volume_change
 
+    def elasticity() -> Floats:
+        result = np.zeros((len(strain), *strain.shape))
+        result[:dim, :dim] = lam
+        for component in range(len(strain)):
+            result[component, component] += 2 * mu if component < dim else mu
+        return result
 
-def _times(factor: float | Floats, tensor: Floats) -> Floats:
-    """A tensor times a number, or at each element times its own: the axes of `factor` come last."""
-    return tensor.reshape(tensor.shape + (1,) * np.ndim(factor)) * factor
+    across = np.zeros_like(volume_change) if constants.plane_stress else lam * volume_change
+    return Response(contracted(stress, strain) / 2, stress, elasticity, thickness, across)
 
 
 def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
     """Strain of the third direction under a quadratic law: -lam / (lam + 2 mu) tr e in plane stress."""
     if not constants.plane_stress:
-        return np.zeros(strain.shape[2:])
-    return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * np.einsum("ii...->...", strain))
+        return np.zeros(strain.shape[1:])
+    return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * trace(strain))
 
 
 def neo_hookean(C: Floats, constants: Constants) -> Response:
@@ -113,21 +132,22 @@ def neo_hookean(C: Floats, constants: Constants) -> Response:
     lam into lam 2 mu C_33 / (2 mu C_33 + lam) in the elasticity.
     """
     lam, mu = constants.lam, constants.mu
-    det = _determinant(C)
+    det = determinant(C)
     valid = det > 0
     det = np.where(valid, det, 1.0)
     C_33 = _free_thickness(np.log(det), lam / mu) if constants.plane_stress else np.ones_like(det)
     valid &= np.isfinite(C_33)
     C_33 = np.where(valid, C_33, 1.0)
     log_J = (np.log(det) + np.log(C_33)) / 2
-    inverse = _inverse(np.where(valid, C, _identity(C)))
-    stress = mu * (_identity(C) - inverse) + lam * log_J * inverse
-    lam_eliminated = lam * 2 * mu * C_33 / (2 * mu * C_33 + lam) if constants.plane_stress else lam
-    outer = np.einsum("ij...,kl...->ijkl...", inverse, inverse)
-    swap = np.einsum("ik...,jl...->ijkl...", inverse, inverse) + np.einsum("il...,jk...->ijkl...", inverse, inverse)
-    elasticity = lam_eliminated * outer + (mu - lam * log_J) * swap
-    trace = np.einsum("ii...->...", C) - len(C) + (C_33 - 1)
-    energy = np.where(valid, mu / 2 * trace - mu * log_J + lam / 2 * log_J**2, np.inf)
+    inverse = inverted(np.where(valid, C, identity(C)))
+    stress = mu * identity(C) + (lam * log_J - mu) * inverse
+
+    def elasticity() -> Floats:
+        eliminated = lam * 2 * mu * C_33 / (2 * mu * C_33 + lam) if constants.plane_stress else lam
+        return eliminated * outer(inverse, inverse) + (mu - lam * log_J) * swapped(inverse)
+
+    stretch = trace(C) - dimensions(C) + (C_33 - 1)
+    energy = np.where(valid, mu / 2 * stretch - mu * log_J + lam / 2 * log_J**2, np.inf)
     return Response(energy, stress, elasticity, np.sqrt(C_33), mu * (C_33 - 1) + lam * log_J)
 
 
@@ -157,31 +177,42 @@ def hencky(C: Floats, constants: Constants) -> Response:
     log1p so that equal stretches need no special case. Plane stress keeps the law, with lam_plane.
     """
     lam, mu = constants.lam_plane, constants.mu
-    c, N = np.linalg.eigh(np.moveaxis(C, (0, 1), (-2, -1)))
-    c, N = np.moveaxis(c, -1, 0), np.moveaxis(N, (-2, -1), (0, 1))
+    dim = dimensions(C)
+    c, N = _principal(C)
     valid = c[0] > 0
     c = np.where(valid, c, 1.0)
     strain = np.log(c) / 2
-    trace = strain.sum(axis=0)
-    tau = 2 * mu * strain + lam * trace
-    dim = len(C)
-    normal, shear = np.empty((dim, *c.shape)), np.empty((dim, *c.shape))
-    for i in range(dim):
-        for j in range(dim):
-            normal[i, j] = (2 * mu * (i == j) + lam) / (c[i] * c[j]) - 2 * (i == j) * tau[i] / c[i] ** 2
-            shear[i, j] = (mu * _log_difference(c[i], c[j]) - mu * np.log(c[j]) - lam * trace) / (c[i] * c[j])
-    elasticity = np.zeros((dim, dim, dim, dim, *c.shape[1:]))
-    for i in range(dim):
-        for j in range(dim):
-            own, other, mixed = (np.einsum("a...,b...->ab...", N[:, p], N[:, q]) for p, q in ((i, i), (j, j), (i, j)))
-            elasticity += normal[i, j] * np.einsum("ab...,cd...->abcd...", own, other)
-            if i != j:
-                elasticity += shear[i, j] * np.einsum("ab...,cd...->abcd...", mixed, mixed + mixed.swapaxes(0, 1))
-    stress = np.einsum("i...,ai...,bi...->ab...", tau / c, N, N)
-    energy = np.where(valid, mu * (strain**2).sum(axis=0) + lam / 2 * trace**2, np.inf)
-    free = -constants.lam / (constants.lam + 2 * constants.mu) * trace if constants.plane_stress else 0.0 * trace
-    across = np.zeros_like(trace) if constants.plane_stress else lam * trace
-    return Response(energy, stress, elasticity, np.exp(free), across)
+    volume_change = strain.sum(axis=0)
+    tau = 2 * mu * strain + lam * volume_change
+    stress = sum(tau[i] / c[i] * dyad(N[:, i], N[:, i]) / 2 for i in range(dim))
+
+    def elasticity() -> Floats:
+        result = np.zeros((len(C), *C.shape))
+        own = [dyad(N[:, i], N[:, i]) / 2 for i in range(dim)]
+        for i in range(dim):
+            for j in range(dim):
+                normal = (2 * mu * (i == j) + lam) / (c[i] * c[j]) - 2 * (i == j) * tau[i] / c[i] ** 2
+                result += normal * outer(own[i], own[j])
+            for j in range(i):
+                shear = mu * _log_difference(c[i], c[j]) - mu * np.log(c[j]) - lam * volume_change
+                mixed = dyad(N[:, i], N[:, j])
+                result += shear / (c[i] * c[j]) * outer(mixed, mixed)
+        return result
+
+    energy = np.where(valid, mu * (strain**2).sum(axis=0) + lam / 2 * volume_change**2, np.inf)
+    free = -constants.lam / (constants.lam + 2 * constants.mu) * volume_change if constants.plane_stress else 0.0
+    across = np.zeros_like(volume_change) if constants.plane_stress else lam * volume_change
+    return Response(energy, np.asarray(stress), elasticity, np.exp(free + np.zeros_like(volume_change)), across)
+
+
+def _principal(C: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues, ascending, axes (which, ...), and unit eigenvectors, axes (direction, which, ...)."""
+    dim = dimensions(C)
+    full = np.empty((*C.shape[1:], dim, dim))
+    for component, (i, j) in zip(C, voigt_pairs(dim), strict=True):
+        full[..., i, j] = full[..., j, i] = component
+    values, vectors = np.linalg.eigh(full)
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0)), np.ascontiguousarray(np.moveaxis(vectors, (-2, -1), (0, 1)))
 
 
 def _log_difference(a: Floats, b: Floats) -> Floats:
@@ -190,27 +221,6 @@ def _log_difference(a: Floats, b: Floats) -> Floats:
     near = np.abs(x) < 0.5
     logarithm = np.where(near, np.log1p(np.where(near, x, 0.0)), np.log(a) - np.log(b))
     return np.divide(logarithm, x, out=np.ones_like(x), where=x != 0)
-
-
-def _identity(tensor: Floats) -> Floats:
-    return _everywhere(np.eye(len(tensor)), tensor.shape[2:])
-
-
-def _everywhere(constant: Floats, points: tuple[int, ...]) -> Floats:
-    """Repeat a tensor, given once or once an element, over the axes `points`, without a copy."""
-    order = constant.ndim // 2 * 2 if constant.ndim <= 4 else 4
-    missing = order + len(points) - constant.ndim
-    axes = constant.shape[:order]
-    return np.broadcast_to(constant.reshape(axes + (1,) * missing + constant.shape[order:]), axes + points)
-
-
-def _determinant(tensor: Floats) -> Floats:
-    return np.asarray(np.linalg.det(np.moveaxis(tensor, (0, 1), (-2, -1))))
-
-
-def _inverse(tensor: Floats) -> Floats:
-    inverse = np.asarray(np.linalg.inv(np.moveaxis(tensor, (0, 1), (-2, -1))))
-    return np.moveaxis(inverse, (-2, -1), (0, 1))
 
 
 LAWS: MappingProxyType[str, Law] = MappingProxyType(

@@ -5,6 +5,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.mesh import Mesh
 from truespring.models.fem import fem_potential
+from truespring.models.laws import Constants
 from truespring.problem import Problem
 
 #: Corners of a square (the first four) and of a cube, in the order of quadrilaterals and hexahedra.
@@ -12,6 +13,9 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0
 
 # Elements whose links differ by less than this share have one coupling: their own would differ by rounding.
 _ALIKE = 1e-13
+
+# Elements whose coupling is found at a time.
+_SLICE = 1024
 
 
 def link_vectors(mesh: Mesh) -> Floats:
@@ -32,20 +36,39 @@ def link_coupling(problem: Problem) -> Floats:
     biquadratic springs of Delingette (2008), on tetrahedra the links of Goulette and Chen (2015).
     """
     potential = fem_potential(problem, "saint-venant-kirchhoff")
-    lam, mu = potential.constants.lam_plane, potential.constants.mu
-    across = link_vectors(problem.mesh)
-    alike = len(problem.materials) == 1 and np.abs(across - across[:1]).max() <= _ALIKE * np.abs(across).max()
-    wanted = slice(1 if alike else None)
-    links = np.array(problem.mesh.kind.links)
-    gradients = np.moveaxis(
-        potential.shape_gradients[:, :, wanted], (2, 3), (0, 1)
-    )  # (element, point, node, direction)
+    alike = len(problem.materials) == 1 and _alike(problem.mesh)
+    n_links = len(problem.mesh.kind.links)
+    coupling = np.empty((1 if alike else len(problem.mesh.elements), n_links, n_links))
+    for first in range(0, len(coupling), _SLICE):
+        last = min(first + _SLICE, len(coupling))
+        constants = potential.constants.part(first, last)
+        coupling[first:last] = _coupling(problem.mesh, *potential.quadrature(first, last), constants)
+    return coupling
+
+
+def _alike(mesh: Mesh) -> bool:
+    """Whether the links of all elements are the same vectors."""
+    links = np.array(mesh.kind.links)
+
+    def vectors(first: int, last: int) -> Floats:
+        at = mesh.nodes[mesh.elements[first:last]]
+        return np.asarray(at[:, links[:, 1]] - at[:, links[:, 0]])
+
+    own = vectors(0, 1)
+    bound = _ALIKE * np.abs(own).max()
+    slices = range(0, len(mesh.elements), _SLICE)
+    return all(np.abs(vectors(first, first + _SLICE) - own).max() <= bound for first in slices)
+
+
+def _coupling(mesh: Mesh, gradients: Floats, volumes: Floats, constants: Constants) -> Floats:
+    """M of elements by the gradients of their shape functions, axes (element, point, node, direction)."""
+    lam, mu = constants.lam_plane, constants.mu
+    links = np.array(mesh.kind.links)
     first, second = gradients[:, :, links[:, 0]], gradients[:, :, links[:, 1]]
     outer = first[..., :, None] * second[..., None, :]
     C = -(outer + outer.swapaxes(-1, -2)) / 2
-    w = potential.volumes[wanted]
     trace = np.einsum("eqlii->eql", C)
     by_point = np.moveaxis(C.reshape(*C.shape[:3], -1), 2, 1).reshape(len(C), len(links), -1)
-    weighted = np.moveaxis((w * mu / 4)[:, :, None, None, None] * C, 2, 1).reshape(by_point.shape)
-    dilation = ((w * lam / 8)[:, :, None] * trace).swapaxes(1, 2) @ trace
+    weighted = np.moveaxis((volumes * mu / 4)[:, :, None, None, None] * C, 2, 1).reshape(by_point.shape)
+    dilation = ((volumes * lam / 8)[:, :, None] * trace).swapaxes(1, 2) @ trace
     return np.asarray(dilation + weighted @ by_point.swapaxes(1, 2))

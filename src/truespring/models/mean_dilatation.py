@@ -5,28 +5,26 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.fem import FemPotential, determinant, true_stress
-from truespring.models.laws import Response
+from truespring.models.fem import FemPotential, Points, determinant
+from truespring.models.symmetric import contracted, identity, inverted, outer, swapped
 
 
-class _Volumetric(NamedTuple):
-    """What the exchange of the volume ratio adds, at the Gauss points.
+class _Exchange(NamedTuple):
+    """The exchange of the volume ratio at the Gauss points.
 
     Attributes:
-        F: deformation gradient, axes (i, j, element, point); the identity for a linear law.
-        stress: stress S' by which the law answers to a change of F at a constant ratio [Pa].
-        elasticity: its elasticity by the Green strain [Pa].
-        pressure: derivative p of the energy density by theta = ln(mean J / J) [Pa].
-        mixed: derivative of p by the right Cauchy-Green tensor, times 2 [Pa], axes (i, j, element, point).
-        second: second derivative of the energy density by theta [Pa].
+        J: the true ratio, axes (element, point); 1 for a linear law.
+        theta: ln(Jm / J), Jm the mean of J over the element at rest; for a linear law the change of the trace.
+        scale: exp(2 theta / d), by which C is changed; 1 for a linear law, not a number in an inverted element.
+        metric: C, axes (component, element, point); the identity for a linear law.
+        inverse: its inverse, which is the derivative of ln J by the strain.
     """
 
-    F: Floats
-    stress: Floats
-    elasticity: Floats
-    pressure: Floats
-    mixed: Floats
-    second: Floats
+    J: Floats
+    theta: Floats
+    scale: Floats
+    metric: Floats
+    inverse: Floats
 
 
 class MeanDilatationPotential(FemPotential):
@@ -35,122 +33,92 @@ class MeanDilatationPotential(FemPotential):
     The law is asked at (Jm / J)^(1/d) F with the mean Jm of J over the element at rest and d the
     dimensions: the mean dilatation method of Nagtegaal, Parks and Rice (CMAME 4, 1974), at finite
     strain that of Simo, Taylor and Pister (CMAME 51, 1985) with the pressure eliminated. For the
-    linear law it is the trace of the strain that is averaged (Hughes' B-bar).
+    linear law it is the trace of the strain that is averaged (Hughes' B-bar). `stress` is what the
+    law answers there.
     """
 
     interpolation = "mean-dilatation"
 
-    def _exchanged(self, positions: Floats) -> tuple[Floats, Floats, Floats]:
-        """The true deformation gradient, its J (1 for a linear law), and theta, axes (element, point)."""
-        F = self._deformation(positions)
+    def _exchange(self, at: Points) -> _Exchange:
+        strain, dim = super()._strain(at), self.mesh.dim
         if not self.law.finite:
-            trace = np.einsum("ii...->...", F) - len(F)
-            return F, np.ones_like(trace), self._mean(trace) - trace
-        J = determinant(F)
-        if (J <= 0).any():
-            return F, J, np.full_like(J, np.nan)
-        return F, J, np.log(self._mean(J) / J)
+            trace = strain[:dim].sum(axis=0)
+            ones, eye = np.ones_like(trace), np.broadcast_to(identity(strain), strain.shape)
+            return _Exchange(ones, _mean(trace, at) - trace, ones, eye, eye)
+        J = determinant(at.F)
+        valid = (J > 0).all(axis=1, keepdims=True)
+        J = np.where(valid, J, 1.0)
+        theta = np.log(_mean(J, at) / J)
+        metric = np.where(valid, strain, identity(strain))
+        return _Exchange(J, theta, np.where(valid, np.exp(2 * theta / dim), np.nan), metric, inverted(metric))
 
-    def _mean(self, values: Floats) -> Floats:
-        """The mean over each element at rest, axes (element, 1)."""
-        return np.asarray((values * self.volumes).sum(axis=1, keepdims=True) / self.volumes.sum(axis=1, keepdims=True))
-
-    def _respond(self, positions: Floats) -> tuple[Floats, Response]:
-        """The exchanged deformation gradient and the law's response to it."""
-        key = positions.tobytes()
-        if self._last.get("key") != key:
-            F, J, theta = self._exchanged(positions)
-            dim = len(F)
-            if self.law.finite:
-                F_bar = np.exp(theta / dim) * F
-                strain = np.einsum("ki...,kj...->ij...", F_bar, F_bar)
-                strain = np.where(np.isnan(theta), np.eye(dim)[:, :, None, None], strain)
-            else:
-                F_bar = F
-                strain = (F + F.swapaxes(0, 1)) / 2 + (theta / dim - 1) * np.eye(dim)[:, :, None, None]
-            self._last.update(
-                key=key, F=F, J=J, theta=theta, F_bar=F_bar, response=self.law.respond(strain, self.constants)
-            )
-        return self._last["F_bar"], self._last["response"]
-
-    def energy(self, positions: Floats) -> float:
-        """Stored energy [J]; infinite where an element is inverted: its volume ratio has no logarithm there."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            _, response = self._respond(positions)
-        if np.isnan(self._last["theta"]).any() or not np.isfinite(response.energy).all():
-            return float("inf")
-        return float((response.energy * self.volumes).sum())
-
-    def _volumetric(self, positions: Floats) -> _Volumetric:
-        _, response = self._respond(positions)
-        F, theta, dim = self._last["F"], self._last["theta"], self.mesh.dim
+    def _strain(self, at: Points) -> Floats:
+        """What the law asks for, with the element's volume ratio; that at rest where an element is inverted."""
+        exchange = self._exchange(at)
         if not self.law.finite:
-            eye = np.eye(dim)
-            mixed = np.einsum("ijkleq,kl->ijeq", response.elasticity, eye) / dim
-            second = np.einsum("ijeq,ij->eq", mixed, eye) / dim
-            pressure = np.einsum("ii...->...", response.stress) / dim
-            identity = np.broadcast_to(eye[:, :, None, None], F.shape)
-            return _Volumetric(identity, response.stress, response.elasticity, pressure, mixed, second)
-        C = np.einsum("ki...,kj...->ij...", F, F)
-        stress = np.exp(2 * theta / dim) * response.stress
-        elasticity = np.exp(4 * theta / dim) * response.elasticity
-        pressure = np.einsum("ij...,ij...->...", stress, C) / dim
-        stiffening = np.einsum("ijkl...,kl...->ij...", elasticity, C) / dim
-        mixed = 2 * stress / dim + stiffening
-        second = 2 / dim * pressure + np.einsum("ij...,ij...->...", stiffening, C) / dim
-        return _Volumetric(F, stress, elasticity, pressure, mixed, second)
+            return super()._strain(at) + exchange.theta / self.mesh.dim * exchange.metric
+        return np.where(np.isnan(exchange.scale), 1.0, exchange.scale) * exchange.metric
 
-    def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
-        at = self._volumetric(positions)
-        J = self._last["J"]
-        inverse = _inverse_transposed(at.F)
-        share = self._mean(at.pressure) / self._mean(J) * J - at.pressure
-        own = np.einsum("ik...,kj...->ij...", at.F, at.stress) if self.law.finite else at.stress
-        return self._summed(own + share * inverse)
+    def _refused(self, at: Points) -> bool:
+        """Whether an element is inverted: its volume ratio has no logarithm."""
+        return self.law.finite and bool((determinant(at.F) <= 0).any())
 
-    def element_hessians(self, positions: Floats, stress: Floats | None = None) -> Floats:
-        """Tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), dofs node by node.
+    def _law_gradient(self, at: Points) -> Floats:
+        """The deformation gradient with the element's volume ratio."""
+        return np.sqrt(self._exchange(at).scale) * at.F
 
-        With h the derivative of ln J and t that of theta by the nodes: beside the tangent of the law
-        c t^T + t c^T + W'' t t^T, c from `mixed`, and where the law is finite what the second
-        derivatives of ln Jm and ln J add. `stress` is not used.
+    def _strain_change(self, at: Points, change: Floats) -> Floats:
+        """The change of the law's strain that is linear in one of F, axes (component, element, point)."""
+        own, exchange = super()._strain_change(at, change), self._exchange(at)
+        grown = contracted(exchange.inverse, own)  # of ln J
+        theta = _mean(exchange.J * grown, at) / _mean(exchange.J, at) - grown
+        return exchange.scale * (own + theta / self.mesh.dim * exchange.metric)
+
+    def _working_stress(self, at: Points) -> Floats:
+        """S' + (g - p) C^-1: S' works at a constant theta, p on theta, and g is what ln Jm takes of ln J."""
+        exchange = self._exchange(at)
+        stress = exchange.scale * self._respond(at).stress
+        pressure = contracted(stress, exchange.metric) / self.mesh.dim
+        return stress + (_share(pressure, exchange, at) - pressure) * exchange.inverse
+
+    def _tangent(self, at: Points, stress: Floats | None) -> Floats:
+        """Element matrices [N/m], the geometric part of `stress` or the law's own.
+
+        With S', p and g as above, m the derivative of ln Jm by the nodes and c half that of S' : C / d by the
+        true strain, theta being constant: what depends on a point's strain alone is the tangent of a law, and
+        what the mean couples adds y m^T + m y^T + b m m^T.
         """
-        at = self._volumetric(positions)
-        J, w = self._last["J"], self.volumes
-        blocks = self._tangent(at.F, at.stress, at.elasticity)
-        size = blocks.shape[1]
-
-        def nodal(first: Floats) -> Floats:
-            return self.nodal(first).reshape(*J.shape, size)
-
-        h = nodal(_inverse_transposed(at.F))
-        mean_J = self._mean(J)
-        m = np.einsum("eq,eqi->ei", w * J, h) / (w.sum(axis=1, keepdims=True) * mean_J)  # derivative of ln Jm
-        t = m[:, None] - h
-        c = nodal(np.einsum("ik...,kj...->ij...", at.F, at.mixed))
-        mixed = _summed(w, c, t)
-        blocks += mixed + mixed.swapaxes(1, 2) + _summed(w * at.second, t, t)
+        exchange, response, dim = self._exchange(at), self._respond(at), self.mesh.dim
+        metric, inverse = exchange.metric, exchange.inverse
+        own = exchange.scale * (response.stress if stress is None else stress)
+        elasticity = exchange.scale**2 * response.elasticity()
+        pressure = contracted(own, metric) / dim
+        mixed = contracted(elasticity, metric) / dim
+        second = contracted(mixed, metric) / dim
         if self.law.finite:
-            p = self._mean(at.pressure) * w.sum(axis=1, keepdims=True)
-            grown = p * w * J / (w.sum(axis=1, keepdims=True) * mean_J)
-            n_local, dim = size // self.mesh.dim, self.mesh.dim
-            turned = _summed(w * at.pressure - grown, h, h).reshape(-1, n_local, dim, n_local, dim)
-            blocks += turned.swapaxes(2, 4).reshape(blocks.shape) + _summed(grown, h, h)
-            blocks -= p[:, :, None] * m[:, :, None] * m[:, None, :]
-        return np.asarray(blocks)
+            mixed += 2 / dim * own
+            second += 2 / dim * pressure
+        share = _share(pressure, exchange, at)
+        coupled = outer(mixed, inverse)
+        elasticity += second * outer(inverse, inverse) - coupled - coupled.swapaxes(0, 1)
+        bending = 0 * second
+        if self.law.finite:
+            elasticity += (pressure - share) * swapped(inverse) + share * outer(inverse, inverse)
+            bending = pressure
+        blocks = self._matrices(at, own + (share - pressure) * inverse, elasticity)
+        weight = (exchange.J * at.volumes).sum(axis=1)
+        m = self._forces(at, exchange.J * inverse) / weight[:, None]
+        b = ((second - bending) * at.volumes).sum(axis=1)
+        y = self._forces(at, mixed - second * inverse) + b[:, None] / 2 * m
+        crossed = y[:, :, None] * m[:, None]
+        return np.asarray(blocks + crossed + crossed.swapaxes(1, 2))
 
-    def cauchy_stress(self, positions: Floats) -> Floats:
-        """True stress averaged over the points of each element [Pa], shape (n_elements, 3, 3)."""
-        F_bar, response = self._respond(positions)
-        return true_stress(F_bar, response, self.law.finite)
+
+def _mean(values: Floats, at: Points) -> Floats:
+    """The mean over each element at rest, axes (element, 1)."""
+    return np.asarray((values * at.volumes).sum(axis=1, keepdims=True) / at.volumes.sum(axis=1, keepdims=True))
 
 
-def _summed(weight: Floats, left: Floats, right: Floats) -> Floats:
-    """Sum of weighted outer products over the points, shapes (n, points), (n, points, k) twice, to (n, k, k)."""
-    return np.asarray((weight[:, :, None] * left).swapaxes(1, 2) @ right)
-
-
-def _inverse_transposed(F: Floats) -> Floats:
-    inverse = np.linalg.inv(np.moveaxis(F, (0, 1), (-2, -1)))
-    return np.asarray(np.moveaxis(inverse, (-1, -2), (0, 1)))
+def _share(pressure: Floats, exchange: _Exchange, at: Points) -> Floats:
+    """What ln J at each point takes of the pressure's work on the mean ratio [Pa], axes (element, point)."""
+    return _mean(pressure, at) / _mean(exchange.J, at) * exchange.J

@@ -288,7 +288,7 @@ def _relaxed(problem: Problem, springs: Springs, affine: Floats) -> tuple[Floats
     inner = np.flatnonzero(np.repeat(~outside, mesh.dim))
     if not inner.size:
         return affine, 0.0, True
-    K = replace(springs, allow_negative=True).potential(problem).hessian(mesh.nodes)
+    K = replace(springs, allow_negative=True).potential(problem).hessian(mesh.nodes).tocsr()
     strains = np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
     force = K @ strains
     size = (mesh.measures.sum() / len(mesh.elements)) ** ((mesh.dim - 1) / mesh.dim)

@@ -1,11 +1,13 @@
 """The potential of nodes joined by linear springs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
+from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_ints
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
 from truespring.potential import Pattern, SparseMatrix
@@ -39,7 +41,11 @@ class SpringNetwork:
             n_springs = len(self.springs)
             set_field(self, "stiffness", frozen_floats(self.stiffness, (n_springs,), "stiffness"))
             given = np.asarray(self.rest_length)
-            rest = given if given.size else self._lengths(self.nodes)[1]
+            rest = (
+                given
+                if given.size
+                else np.linalg.norm(self.nodes[self.springs[:, 1]] - self.nodes[self.springs[:, 0]], axis=1)
+            )
             set_field(self, "rest_length", frozen_floats(rest, (n_springs,), "rest_length"))
         except ValueError as error:
             raise ModelError(str(error)) from None
@@ -74,49 +80,86 @@ class SpringNetwork:
             "tension": tension,
             "stretch": self.stretch(positions),
             "stiffness": self.stiffness,
-            "strain_energy": tension * (self._lengths(positions)[1] - self.rest_length) / 2,
+            "strain_energy": tension * (self.lengths(positions) - self.rest_length) / 2,
         }
 
     @cached_property
     def _pattern(self) -> Pattern:
         return Pattern(self.springs, *self.nodes.shape)
 
-    def _lengths(self, positions: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors, shape (n_springs, dim), and lengths [m]; the vector of a collapsed spring is zero."""
-        across = positions[self.springs[:, 1]] - positions[self.springs[:, 0]]
-        length = np.linalg.norm(across, axis=1)
-        return across / np.where(length > 0, length, 1.0)[:, None], np.asarray(length)
+    def _run(self, kernel: Callable[..., Any], positions: Floats, *arguments: Any) -> list[Any]:
+        """Run a kernel over all springs."""
+        from truespring.kernels.threads import run, writable
+
+        return run(kernel, len(self.springs), writable(positions), *arguments, self._pattern.zero)
+
+    @property
+    def _law(self) -> tuple[ShortInts, Floats, Floats]:
+        """What kernels ask of the springs: their nodes, stiffness [N/m] and rest length [m]."""
+        return self._pattern.elements, self.stiffness, self.rest_length
+
+    def lengths(self, positions: Floats) -> Floats:
+        """Length of each spring [m], shape (n_springs,)."""
+        from truespring.kernels import springs
+
+        length = np.empty(len(self.springs))
+        self._run(springs.lengths, positions, self._pattern.elements, length)
+        return length
 
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length, shape (n_springs,)."""
-        return self._lengths(positions)[1] / self.rest_length
+        return self.lengths(positions) / self.rest_length
 
     def stress(self, positions: Floats) -> Floats:
         """Tension [N], shape (n_springs,)."""
-        return self.stiffness * (self._lengths(positions)[1] - self.rest_length)
+        from truespring.kernels import springs
+
+        tension = np.empty(len(self.springs))
+        self._run(springs.tensions, positions, *self._law, tension)
+        return tension
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """Tension carried on linearly along `step` [m]: k (l - L + n . (d_j - d_i)) [N], shape (n_springs,)."""
+        from truespring.kernels import springs
+        from truespring.kernels.threads import writable
+
+        tension = np.empty(len(self.springs))
+        self._run(springs.extrapolated, positions, writable(step), *self._law, tension)
+        return tension
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""
-        return float(0.5 * self.stiffness @ (self._lengths(positions)[1] - self.rest_length) ** 2)
+        from truespring.kernels import springs
+
+        return float(sum(self._run(springs.energy, positions, *self._law)))
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        direction, length = self._lengths(positions)
-        pull = (self.stiffness * (length - self.rest_length))[:, None] * direction
-        return self._pattern.vector(np.concatenate([-pull, pull], axis=1)).reshape(positions.shape)
+        from truespring.kernels import springs
+        from truespring.kernels.threads import run, writable
+
+        x, pattern = writable(positions), self._pattern
+        pull, force = np.empty(len(self.springs)), np.empty(self.nodes.shape)
+        self._run(springs.pulls, x, *self._law, pull)
+        rows = (pattern.elements, pattern.at_starts, pattern.at)
+        run(springs.forces, len(self.nodes), x, *rows, pull, force, pattern.zero)
+        return force
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` are the tensions [N] of the geometric part, by default the true ones."""
         return self._tangent(positions, self.stiffness, self.stress(positions) if stress is None else stress)
 
     def _tangent(self, positions: Floats, stiffness: Floats, tension: Floats) -> SparseMatrix:
-        direction, length = self._lengths(positions)
-        along = direction[:, :, None] * direction[:, None, :]
-        across = np.eye(positions.shape[1]) - along
-        # A collapsed spring has no direction: its geometric part is left out rather than infinite.
-        sideways = np.divide(tension, length, out=np.zeros_like(length), where=length > 0)
-        block = stiffness[:, None, None] * along + sideways[:, None, None] * across
-        return self._pattern.matrix(np.block([[block, -block], [-block, block]]))
+        from truespring.kernels import springs
+        from truespring.kernels.threads import run, writable
+
+        x, pattern, values = writable(positions), self._pattern, self._pattern.values()
+        parts = np.empty(len(self.springs)), np.empty(len(self.springs))
+        self._run(springs.stiffen, x, pattern.elements, stiffness, tension, *parts)
+        rows = (pattern.elements, pattern.at_starts, pattern.at)
+        places = (pattern.starts, pattern.slots)
+        run(springs.hessian, len(self.nodes), x, *rows, *parts, *places, values, pattern.zero)
+        return pattern.matrix(values)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Each spring's Hessian with its negative eigenvalues cut off: compression bears no geometric part [N/m]."""

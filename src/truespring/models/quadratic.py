@@ -8,7 +8,7 @@ import skfem
 
 from truespring.arrays import Floats, Ints
 from truespring.mesh import Mesh, covering, select
-from truespring.models.fem import FemPotential, skfem_basis
+from truespring.models.fem import FemPotential, Reference, reference_element
 from truespring.potential import Loading
 
 # scikit-fem's element of second order and its order of quadrature, 3 points in a triangle and 4 in a tetrahedron;
@@ -47,9 +47,9 @@ class QuadraticPotential(FemPotential):
         return self.mesh.edges
 
     @cached_property
-    def _basis(self) -> Any:
+    def _reference(self) -> Reference:
         element, order, _ = _QUADRATIC[self.mesh.element]
-        return skfem_basis(self.mesh, element(), intorder=order)
+        return reference_element(self.mesh.element, element(), order)
 
     @cached_property
     def loading(self) -> Loading:

@@ -1,18 +1,21 @@
 """Linear equilibrium of springs near rest, for what is told of them before a solve."""
 
+from typing import Any
+
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import cg, splu
 
 from truespring.arrays import Floats, Ints
-from truespring.potential import SparseMatrix
 from truespring.problem import rigid_body_modes
+
+FreeMatrix = sparse.csr_array[Any, tuple[int, int]]
 
 # Up to so many unknowns, in the plane and in space, a factorisation is quick.
 _DIRECT = {2: 300_000, 3: 20_000}
 
 
-def relaxed(matrix: SparseMatrix, right: Floats, dim: int) -> Floats | None:
+def relaxed(matrix: FreeMatrix, right: Floats, dim: int) -> Floats | None:
     """Solve matrix x = right, columns of shape (n, k); None where the matrix is not seen to be positive definite.
 
     By factorisation, whose pivots tell; of large bodies in space by conjugate gradients, which may not notice.
@@ -33,7 +36,7 @@ def relaxed(matrix: SparseMatrix, right: Floats, dim: int) -> Floats | None:
     return np.asarray(factors.solve(right))
 
 
-def _by_gradients(matrix: SparseMatrix, right: Floats) -> Floats | None:
+def _by_gradients(matrix: FreeMatrix, right: Floats) -> Floats | None:
     diagonal = matrix.diagonal()
     if (diagonal <= 0).any():
         return None

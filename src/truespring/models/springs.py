@@ -139,10 +139,13 @@ class Springs:
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
     def _network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
+        from truespring.kernels.sparsity import unique_pairs
+        from truespring.kernels.threads import writable
+
         mesh = problem.mesh
-        pairs = np.sort(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
-        springs, inverse = np.unique(pairs, axis=0, return_inverse=True)
-        place = inverse.ravel()
+        pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
+        springs, place = unique_pairs(pairs, mesh.n_nodes)
+        del pairs
         stiffness = np.bincount(place, per_element.ravel()).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)

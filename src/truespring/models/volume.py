@@ -1,17 +1,19 @@
 """Springs with an area or volume term, so that a lattice realises any Poisson's ratio."""
 
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import permutations
+from functools import cached_property, partial
 from math import factorial
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.mesh import ElementKind
+from truespring.errors import ModelError
 from truespring.models.network import SpringNetwork
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
+
+# Threads share the elements of a slice from so many on.
+_SMALLEST_PIECE = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,39 +27,30 @@ class VolumeTerm:
     kappa: Floats
 
     @cached_property
-    def _pattern(self) -> Pattern:
+    def pattern(self) -> Pattern:
+        """Where the elements stand in a matrix."""
         return Pattern(self.problem.mesh.elements, *self.problem.mesh.nodes.shape)
-
-    @cached_property
-    def _form(self) -> Floats:
-        section = self.problem.section
-        assert section is not None  # the springs beside it need one
-        return section.thickness * volume_form(self.problem.mesh.kind)
 
     @cached_property
     def _at_rest(self) -> Floats:
         return self._volumes(self.problem.mesh.nodes)
 
-    def _places(self, positions: Floats) -> Floats:
-        """Nodes of each element from their middle [m], shape (n_elements, n_dof): volumes are small differences."""
-        at = positions[self.problem.mesh.elements]
-        return np.asarray((at - at.mean(axis=1, keepdims=True)).reshape(len(at), -1))
-
-    def _curvatures(self, places: Floats) -> Floats:
-        """Second derivative of each element's volume by its nodes [m], shape (n_elements, n_dof, n_dof)."""
-        n_dof = places.shape[1]
-        if self._form.ndim == 2:
-            return np.broadcast_to(self._form, (len(places), n_dof, n_dof))
-        return np.asarray((places @ self._form.reshape(n_dof, -1)).reshape(-1, n_dof, n_dof))
-
-    def _slopes(self, places: Floats) -> Floats:
-        """The derivative of each element's volume by its nodes [m^2], shape (n_elements, n_dof)."""
-        return np.asarray(np.einsum("eij,ej->ei", self._curvatures(places), places) / (self._form.ndim - 1))
+    @cached_property
+    def _form(self) -> tuple[Ints, float]:
+        """The simplices of an element, and by what the sum of their determinants is multiplied."""
+        section, kind = self.problem.section, self.problem.mesh.kind
+        assert section is not None  # the springs beside it need one
+        return np.array(kind.simplices), section.thickness * kind.simplex_weight / factorial(kind.dim)
 
     def _volumes(self, positions: Floats) -> Floats:
         """Signed volume of each element [m^3]; of a plane one area times thickness."""
-        places = self._places(positions)
-        return np.asarray((self._slopes(places) * places).sum(axis=1) / self._form.ndim)
+        from truespring.kernels import volumes
+        from truespring.kernels.threads import run, writable
+
+        volume = np.empty(len(self.kappa))
+        known = (writable(positions), self.pattern.elements, *self._form)
+        run(volumes.volumes, len(volume), *known, volume, self.pattern.zero)
+        return volume
 
     def element_energies(self, positions: Floats) -> Floats:
         """Stored energy of each element [J], shape (n_elements,)."""
@@ -67,45 +60,53 @@ class VolumeTerm:
         """kappa (V / V0 - 1), positive in tension [Pa], shape (n_elements,)."""
         return np.asarray(self.kappa * (self._volumes(positions) / self._at_rest - 1))
 
+    def extrapolated_pressure(self, positions: Floats, step: Floats) -> Floats:
+        """The pressure carried on linearly along `step` [m], in Pa, shape (n_elements,)."""
+        from truespring.kernels import volumes
+        from truespring.kernels.threads import run, writable
+
+        growth = np.empty(len(self.kappa))
+        known = (writable(positions), writable(step), self.pattern.elements, *self._form)
+        run(volumes.growths, len(growth), *known, growth, self.pattern.zero)
+        return self.pressure(positions) + self.kappa * growth / self._at_rest
+
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        forces = self.pressure(positions)[:, None] * self._slopes(self._places(positions))
-        return self._pattern.vector(forces).reshape(positions.shape)
+        from truespring.kernels import volumes
+        from truespring.kernels.threads import run, writable
 
-    def hessian(self, positions: Floats, pressure: Floats) -> SparseMatrix:
-        """Tangent stiffness [N/m], the curvature of the volumes weighted by `pressure` [Pa]."""
-        bent = pressure[:, None, None] * self._curvatures(self._places(positions))
-        return self._pattern.matrix(self.stiffening(positions) + bent)
+        pattern, pressure = self.pattern, self.pressure(positions)
+        force = np.empty((len(pressure), pattern.elements.shape[1] * pattern.dim))
+        known = (writable(positions), pattern.elements, *self._form, pressure)
+        run(volumes.forces, len(force), *known, force, pattern.zero)
+        return pattern.vector(force)
 
-    def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """What of the Hessian is positive semidefinite everywhere: the stiffness against a change of volume [N/m]."""
-        positive = (self.kappa > 0)[:, None, None]
-        return self._pattern.matrix(np.where(positive, self.stiffening(positions), 0.0))
+    def add_hessian(self, positions: Floats, pressure: Floats, values: Floats) -> None:
+        """Add the tangent stiffness [N/m], the curvature of the volumes weighted by `pressure` [Pa], to a matrix."""
+        self.pattern.add(partial(self._matrices, positions, self.kappa, pressure), values)
 
-    def stiffening(self, positions: Floats) -> Floats:
-        """Stiffness of each element against a change of its volume [N/m], shape (n_elements, n_dof, n_dof)."""
-        slopes = self._slopes(self._places(positions))
-        return np.asarray((self.kappa / self._at_rest)[:, None, None] * slopes[:, :, None] * slopes[:, None, :])
+    def add_projected_hessian(self, positions: Floats, values: Floats) -> None:
+        """Add what of it is positive semidefinite everywhere: the stiffness against a change of volume [N/m]."""
+        stiff = np.maximum(self.kappa, 0.0)
+        self.pattern.add(partial(self._matrices, positions, stiff, np.zeros_like(stiff)), values)
 
+    def stiffening(self, positions: Floats, first: int = 0, last: int | None = None) -> Floats:
+        """Stiffness of elements against a change of their volume [N/m], shape (n, n_dof, n_dof)."""
+        end = len(self.kappa) if last is None else last
+        return self._matrices(positions, self.kappa, np.zeros(len(self.kappa)), first, end)
 
-def volume_form(kind: ElementKind) -> Floats:
-    """Return the last derivative of an element's area or volume by its nodes: a constant, shape (n_dof,) * dim.
+    def _matrices(self, positions: Floats, kappa: Floats, pressure: Floats, first: int, last: int) -> Floats:
+        """Element matrices of a slice [N/m], shape (last - first, n_dof, n_dof)."""
+        from truespring.kernels import volumes
+        from truespring.kernels.threads import run, writable
 
-    The area is quadratic in the nodes, the volume cubic: sums of determinants over the simplices.
-    """
-    dim, n_dof = kind.dim, kind.n_nodes * kind.dim
-    signs = np.linalg.det(np.eye(dim)[np.array(list(np.ndindex(*(dim,) * dim)))]).reshape((dim,) * dim)
-    axes = "abc"[:dim], "ijk"[:dim]
-    rule = (
-        ",".join(f"{node}" for node in axes[0]) + f",{axes[1]}->" + "".join(a + i for a, i in zip(*axes, strict=True))
-    )
-    form = np.zeros((n_dof,) * dim)
-    for simplex in kind.simplices:
-        edges = np.zeros((dim, kind.n_nodes))  # each edge from the simplex' first node, as a sum of nodes
-        edges[np.arange(dim), simplex[1:]], edges[:, simplex[0]] = 1, -1
-        form += np.einsum(rule, *edges, signs).reshape(form.shape)
-    symmetric = sum(np.transpose(form, order) for order in permutations(range(dim)))
-    return np.asarray(symmetric * kind.simplex_weight / factorial(dim))
+        here = slice(first, last)
+        elements, stiffness = self.pattern.elements[here], kappa[here] / self._at_rest[here]
+        n_dof = elements.shape[1] * self.pattern.dim
+        blocks = np.empty((last - first, n_dof, n_dof))
+        known = (writable(positions), elements, *self._form, stiffness, writable(pressure)[here])
+        run(volumes.stiffnesses, last - first, *known, blocks, self.pattern.zero, smallest=_SMALLEST_PIECE)
+        return blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +134,11 @@ class VolumeSprings:
         """Tension of the springs [N], then pressure of the elements [Pa], shape (n_springs + n_elements,)."""
         return np.concatenate([self.network.stress(positions), self.term.pressure(positions)])
 
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """Tensions [N] and pressures [Pa] carried on linearly along `step` [m], shape (n_springs + n_elements,)."""
+        tension = self.network.extrapolated_stress(positions, step)
+        return np.concatenate([tension, self.term.extrapolated_pressure(positions, step)])
+
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
         return self.network.gradient(positions) + self.term.gradient(positions)
@@ -141,11 +147,22 @@ class VolumeSprings:
         """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
         given = self.stress(positions) if stress is None else stress
         tension, pressure = np.split(given, [len(self.springs)])
-        return self.network.hessian(positions, tension) + self.term.hessian(positions, pressure)
+        matrix = self._checked(self.network.hessian(positions, tension))
+        self.term.add_hessian(positions, pressure, matrix.data)
+        return matrix
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """The projected springs, and of the term what is positive semidefinite [N/m]."""
-        return self.network.projected_hessian(positions) + self.term.projected_hessian(positions)
+        matrix = self._checked(self.network.projected_hessian(positions))
+        self.term.add_projected_hessian(positions, matrix.data)
+        return matrix
+
+    def _checked(self, matrix: SparseMatrix) -> SparseMatrix:
+        """Return the network's matrix, to whose values those of the term are then added: it has the same blocks."""
+        pattern = self.term.pattern
+        if not (np.array_equal(matrix.indptr, pattern.starts) and np.array_equal(matrix.indices, pattern.columns)):
+            raise ModelError("the springs do not join the very nodes that share an element of the volume term")
+        return matrix
 
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length of the springs, shape (n_springs,)."""

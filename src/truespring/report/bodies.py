@@ -10,12 +10,15 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path
 from truespring.mesh import Mesh
+from truespring.report.frame import blank_axes, draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.lines import draw_lines
 from truespring.report.quantity import Scale, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name, text_width
+from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
 from truespring.report.symbols import ROLLER, draw_arrow, draw_dot, draw_loaded, draw_pin, find_arrows
 from truespring.report.verdict import display_name, level_name
+from truespring.report.words import draw_words, text_width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,31 +88,23 @@ def _body_figure(
     margin = (broad / width - 1) / 2 * extent[0]
     told = f"{title}; {remark}" if remark else title
     figure = Figure(figsize=(left + broad + right, bottom + height + top), label=told)
-    total = figure.get_size_inches()
-    axes = figure.add_axes((left / total[0], bottom / total[1], broad / total[0], height / total[1]))
+    head = float(figure.get_figheight())
+    axes = blank_axes(figure, left, bottom, broad, height)
     axes.set_xlim((lower[0] - margin) / scale.size, (upper[0] + margin) / scale.size)
     axes.set_ylim(lower[1] / scale.size, upper[1] / scale.size)
-    axes.set_aspect("equal", adjustable="box")
-    axes.locator_params(nbins=6)
-    axes.set_xlabel(f"x [{scale.unit}]")
-    axes.set_ylabel(f"y [{scale.unit}]")
-    figure.text(left / total[0], 1 - 0.17 / total[1], title, weight="bold", size=9, va="center")
-    if remark:
-        figure.text(left / total[0], 1 - 0.37 / total[1], remark, color=LOAD, size=8, va="center")
-    draw_legend(figure, columns, left, float(total[1]) - top + 0.14 + ROW * rows)
+    draw_frame(figure, axes, f"x [{scale.unit}]", f"y [{scale.unit}]")
+    draw_words(figure, left, head - 0.17, title, 9, bold=True)
+    draw_words(figure, left, head - 0.37, remark, color=LOAD)
+    draw_legend(figure, columns, left, head - top + 0.14 + ROW * rows)
     return figure, axes, scale
 
 
-def _lines(axes: "Axes", points: Floats, lines: Ints, color: str, width: float, name: str, **more: Any) -> None:
-    """Draw many segments as one path: fast, and one element of an SVG however fine the mesh."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
-    width *= min(1.0, max(0.25, (500 / max(len(lines), 1)) ** 0.5))  # fine meshes in fine lines
-    codes = np.tile(np.array([Outline.MOVETO, Outline.LINETO], dtype=np.uint8), len(lines))
-    outline = Outline(points[lines].reshape(-1, 2), codes)
-    # Not add_patch, which measures every segment to find limits that are already set.
-    axes.add_artist(PathPatch(outline, fill=False, edgecolor=color, lw=width, gid=name, **more))
+def _lines(
+    axes: "Axes", points: Floats, lines: Ints, color: str, width: float, zorder: float, name: str, **more: Any
+) -> None:
+    """Draw lines between points; fine meshes in fine lines."""
+    width *= min(1.0, max(0.25, (500 / max(len(lines), 1)) ** 0.5))
+    draw_lines(axes, points[lines], color, width, zorder, name, **more)
 
 
 def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | None":
@@ -147,11 +142,11 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | 
     title = over_title(result, level, comparison)
     figure, axes, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
     outline = mesh.boundary if mesh.element != "line" else path_lines(model)
-    _lines(axes, rest / scale.size, outline, FAINT, 0.8, "rest", linestyle=(0, (3, 2)), zorder=1)
+    _lines(axes, rest / scale.size, outline, FAINT, 0.8, 1, "rest", linestyle=(0, (3, 2)))
     if inside is not None:
-        _lines(axes, points / scale.size, inside, "#8b9299", 0.4, "triangles", zorder=2)
-    _lines(axes, points / scale.size, lines, INK, 1.3, "reference", zorder=3)
-    _lines(axes, positions / scale.size, path_lines(model), BLUE, 0.75, "model", zorder=4)
+        _lines(axes, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
+    _lines(axes, points / scale.size, lines, INK, 1.3, 3, "reference")
+    _lines(axes, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
     draw_dot(axes, positions[comparison.probe] / scale.size)
     return figure
 
@@ -182,9 +177,9 @@ def undeformed_figure(result: Result) -> "Figure":
     title += f", {len(path_lines(model))} springs" if springs else ""
     figure, axes, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":
-        _lines(axes, mesh.nodes / scale.size, mesh.edges, INK, 1.3, "elements", zorder=2)
+        _lines(axes, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
     if springs:
-        _lines(axes, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, "springs", zorder=3)
+        _lines(axes, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, 3, "springs")
     _supports(axes, result, scale, 0.028 * size)
     for arrow in arrows:
         draw_loaded(axes, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
@@ -285,6 +280,6 @@ def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
         ends.append(foot + size * (normal - 0.7 * direction))
     strokes = np.stack([np.concatenate(starts), np.concatenate(ends)], axis=1)
     pairs = np.arange(2 * len(strokes)).reshape(-1, 2)
-    _lines(axes, strokes.reshape(-1, 2), pairs, "#3d4248", 0.9, "support", zorder=1, clip_on=False)
+    _lines(axes, strokes.reshape(-1, 2), pairs, "#3d4248", 0.9, 1, "support", clip_on=False)
     sides = np.arange(2 * len(edges)).reshape(-1, 2)
-    _lines(axes, edges.reshape(-1, 2), sides, "#3d4248", 2.2, "clamped", zorder=5)
+    _lines(axes, edges.reshape(-1, 2), sides, "#3d4248", 2.2, 5, "clamped")

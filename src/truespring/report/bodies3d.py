@@ -14,11 +14,12 @@ from truespring.comparison import Comparison
 from truespring.report.bodies import magnification, over_title, path_lines, picture_box, spring_lines
 from truespring.report.frame3d import Bar, Picture
 from truespring.report.legend import Entry
+from truespring.report.lines import draw_lines
 from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, times
 from truespring.report.render import Layer, rgb
 from truespring.report.result import Result
 from truespring.report.style import BLUE, FAINT, INK, RED, error_colors, full_name
-from truespring.report.supports3d import clamped_nodes, draw_lines, draw_supports
+from truespring.report.supports3d import clamped_nodes, draw_supports
 from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.symbols import Arrow, draw_arrow, draw_dot, draw_loaded, find_arrows
 from truespring.report.verdict import display_name, level_name
@@ -172,7 +173,9 @@ def _pair_picture(
     at_rest = outline(pair.rest, facets, silhouette=True) if len(facets) else mesh.edges
 
     def marks(axes: "Axes", scale: Scale) -> None:
-        draw_lines(axes, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES)
+        draw_lines(
+            axes, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES, clip_on=False
+        )
         draw_dot(axes, pair.mine[comparison.probe, :2] / scale.size)
 
     return Picture(

@@ -5,6 +5,7 @@ Matplotlib is imported where it is needed, and only through its objects: no wind
 
 import io
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
@@ -44,14 +45,14 @@ class Drawing:
 def draw_figures(result: Result) -> "dict[str, Figure]":
     """Return the figures of a study by the stem of their file names."""
     with figure_style():
-        return {name: figure for name, (figure, _) in _draw(result).items()}
+        return {name: figure for name, figure, _ in _draw(result)}
 
 
 def render_figures(result: Result) -> dict[str, Drawing]:
     """Return the figures of a study as PNG and SVG, by the stem of their file names."""
     if result not in _DRAWN:
         with figure_style():
-            _DRAWN[result] = {name: _written(figure, note) for name, (figure, note) in _draw(result).items()}
+            _DRAWN[result] = {name: _written(figure, note) for name, figure, note in _draw(result)}
     return _DRAWN[result]
 
 
@@ -84,7 +85,7 @@ def _written(figure: "Figure", note: str) -> Drawing:
 
     FigureCanvasAgg(figure)
     png, svg = io.BytesIO(), io.BytesIO()
-    figure.savefig(png, format="png", dpi=_DPI, pil_kwargs={"compress_level": 4})
+    figure.savefig(png, format="png", dpi=_DPI, pil_kwargs={"compress_level": 1})
     figure.savefig(svg, format="svg", metadata={"Date": None})
     width = float(figure.get_figwidth())
     return Drawing(png.getvalue(), _shorter(svg.getvalue()), str(figure.get_label()), width, note)
@@ -93,39 +94,46 @@ def _written(figure: "Figure", note: str) -> Drawing:
 def _shorter(svg: bytes) -> bytes:
     """The same picture in fewer bytes: coordinates to a hundredth of a point, no comments, no indents."""
     text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg.decode(), flags=re.DOTALL)
-    text = re.sub(r"(?<=\d\d\.\d\d)\d+", "", text)  # not below 10: scales of glyphs need their digits
-    return re.sub(r"\n\s*", "\n", text).encode()
+    text = re.sub(r"(?<=\.\d\d)\d+", "", text)
+    return re.sub(r"\s*\n\s*", "\n", text).encode()
 
 
-def _draw(result: Result) -> "dict[str, tuple[Figure, str]]":
-    """Every figure by its name, with a note."""
-    figures = _bodies_in_space(result) if result.problem.mesh.dim == 3 else _plane_bodies(result)
+# A figure, the stem of the names of its files, and what a reader should know of how it was drawn.
+_Named = tuple[str, "Figure", str]
+
+
+def _draw(result: Result) -> Iterator[_Named]:
+    """Yield every figure; plots first, since a child draws what bodies in 3D look like meanwhile."""
+    bodies = _bodies_in_space(result) if result.problem.mesh.dim == 3 else lambda: _plane_bodies(result)
     if any(len(path.states) > 1 for path in result.paths.values()):
-        figures["curves"] = curves_figure(result), ""
+        yield "curves", curves_figure(result), ""
     if any(one.load_factors.size for one in result.comparisons.values()):
-        figures["error"] = error_figure(result), ""
+        yield "error", error_figure(result), ""
     if any(path.moduli is not None for path in result.paths.values()):
-        figures["moduli"] = moduli_figure(result), ""
-    return figures
+        yield "moduli", moduli_figure(result), ""
+    yield from bodies()
 
 
-def _plane_bodies(result: Result) -> "dict[str, tuple[Figure, str]]":
-    figures = {"undeformed": (undeformed_figure(result), "")}
+def _plane_bodies(result: Result) -> Iterator[_Named]:
+    yield "undeformed", undeformed_figure(result), ""
     for name, comparison in result.comparisons.items():
         drawn = over_figure(result, name, comparison)
         if drawn is not None:
-            figures[over_name(result, name)] = drawn, ""
-    return figures
+            yield over_name(result, name), drawn, ""
 
 
-def _bodies_in_space(result: Result) -> "dict[str, tuple[Figure, str]]":
+def _bodies_in_space(result: Result) -> Callable[[], Iterator[_Named]]:
     pictures = {"undeformed": undeformed_picture(result)}
     for name, comparison in result.comparisons.items():
         for called, draw in ((over_name, over_picture), (distance_name, distance_picture)):
             picture = draw(result, name, comparison)
             if picture is not None:
                 pictures[called(result, name)] = picture
-    images, note = render([shot(picture) for picture in pictures.values()])
-    return {
-        name: (figure_of(picture, image), note) for (name, picture), image in zip(pictures.items(), images, strict=True)
-    }
+    rendered = render([shot(picture) for picture in pictures.values()])
+
+    def figures() -> Iterator[_Named]:
+        images, note = rendered()
+        for (name, picture), image in zip(pictures.items(), images, strict=True):
+            yield name, figure_of(picture, image), note
+
+    return figures

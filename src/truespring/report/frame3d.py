@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.report.frame import blank_axes, draw_bar, round_numbers, written
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.quantity import Scale, natural_scale, quantity
 from truespring.report.render import Image, Layer, Shot
-from truespring.report.style import LOAD, error_colors, text_width
+from truespring.report.style import LOAD, error_colors
 from truespring.report.surfaces import VIEW
+from truespring.report.words import draw_words, text_width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,22 +138,19 @@ def figure_of(picture: Picture, image: Image) -> "Figure":
     scale = natural_scale(float(np.abs(picture.upper - picture.lower).max()), "m")
     told = f"{picture.title}; {picture.remark}" if picture.remark else picture.title
     figure = Figure(figsize=(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top), label=told)
-    total = figure.get_size_inches()
-    axes = figure.add_axes((_SIDE / total[0], _BOTTOM / total[1], at.width / total[0], at.height / total[1]))
-    axes.set_axis_off()
+    head = float(figure.get_figheight())
+    axes = blank_axes(figure, _SIDE, _BOTTOM, at.width, at.height)
     (left, bottom), (right, top) = at.lower / scale.size, at.upper / scale.size
     axes.imshow(image, extent=(left, right, bottom, top), zorder=3, gid="image", aspect="auto")
     axes.set(xlim=(left, right), ylim=(bottom, top))
     picture.marks(axes, scale)
     _draw_triad(axes, at, scale)
-    figure.text(_SIDE / total[0], 1 - 0.17 / total[1], picture.title, weight="bold", size=9, va="center")
-    below = 0.30
-    if picture.remark:
-        figure.text(_SIDE / total[0], 1 - 0.37 / total[1], picture.remark, color=LOAD, size=8, va="center")
-        below += ROW
-    draw_legend(figure, at.columns, _SIDE, float(total[1]) - below)
+    draw_words(figure, _SIDE, head - 0.17, picture.title, 9, bold=True)
+    draw_words(figure, _SIDE, head - 0.37, picture.remark, color=LOAD)
+    below = 0.30 + ROW * bool(picture.remark)
+    draw_legend(figure, at.columns, _SIDE, head - below)
     if picture.bar:
-        _draw_bar(figure, picture.bar, float(total[1]) - below - ROW * len(at.columns[0]) - 0.08)
+        _draw_bar(figure, picture.bar, head - below - ROW * len(at.columns[0]) - 0.08)
     return figure
 
 
@@ -163,24 +162,14 @@ def _draw_triad(axes: "Axes", at: _Layout, scale: Scale) -> None:
         style = {"arrowstyle": "-|>,head_width=0.14,head_length=0.28", "color": _TRIAD, "lw": 1.0}
         axes.annotate("", (x + right, y + up), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
         beyond = 6 / float(np.hypot(right, up))
-        offset = (beyond * right, beyond * up)
-        told: dict[str, Any] = {"ha": "center", "va": "center", "size": 8, "zorder": 9}
-        axes.annotate(name, (x + right, y + up), xytext=offset, textcoords="offset points", **told)
+        draw_words(axes, x + right, y + up, name, align=0.5, shift=(beyond * right, beyond * up))
     lowest = y + float((at.arm * VIEW[1]).min()) / scale.size
-    told = {"ha": "center", "va": "center", "size": 7.5, "zorder": 9, "color": _TRIAD}
-    axes.annotate(f"each {quantity(at.arm, 'm', 1)}", (x, lowest), xytext=(0, -11), textcoords="offset points", **told)
+    draw_words(axes, x, lowest, f"each {quantity(at.arm, 'm', 1)}", 7.5, _TRIAD, align=0.5, shift=(0, -11))
 
 
 def _draw_bar(figure: "Figure", bar: Bar, top: float) -> None:
     """Draw a bar of colours with its label above, whose upper edge is at `top` [inch]."""
-    width, height = figure.get_size_inches()
-    figure.text(_SIDE / width, (top - 0.07) / height, bar.label, size=8, va="center")
-    axes = figure.add_axes((_SIDE / width, (top - 0.26) / height, 2.6 / width, 0.09 / height), gid="bar")
-    colors = error_colors(np.linspace(0, 1, 256))[None]
-    axes.imshow(colors, extent=(0, bar.largest or 1.0, 0, 1), aspect="auto")
-    axes.set_yticks([])
-    axes.grid(visible=False)
-    axes.locator_params(axis="x", nbins=5)
-    axes.tick_params(labelsize=7.5, length=2.5, pad=1.5)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(True)
+    draw_words(figure, _SIDE, top - 0.07, bar.label)
+    largest = bar.largest or 1.0
+    values = round_numbers(0.0, largest, 5)
+    draw_bar(figure, _SIDE, top - 0.17, 2.6, error_colors(np.linspace(0, 1, 256)), values / largest, written(values))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from truespring.report.style import text_width
+from truespring.report.words import draw_words, text_width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,5 +62,5 @@ def draw_legend(figure: "Figure", columns: Sequence[Sequence[Entry]], left: floa
             )
             figure.add_artist(sample)
             at = left + _SAMPLE + _GAP
-            figure.text(at, y, one.text, size=8, va="center_baseline", transform=figure.dpi_scale_trans)
+            draw_words(figure, at, y, one.text)
         left += _column_width(column)

@@ -51,9 +51,7 @@ def _draw_layer(layer: Layer, shot: Shot) -> Image:
     _look(plotter, layer, shot)
     picture = np.asarray(plotter.screenshot(return_img=True, transparent_background=filled))
     plotter.close()
-    if filled:
-        return _coarser(picture)
-    return inked(_coarser(picture)[..., 0], layer.ink)
+    return _coarser(picture) if filled else inked(_coarser(picture[..., 0]), layer.ink)
 
 
 def _polygons(corners: Floats) -> Any:
@@ -90,8 +88,10 @@ def _look(plotter: Any, layer: Layer, shot: Shot) -> None:
 
 def _coarser(picture: Any) -> Image:
     """Average blocks of pixels."""
-    fine = [picture[row::_FINER, column::_FINER].astype(np.uint16) for row in range(_FINER) for column in range(_FINER)]
-    return np.asarray(sum(fine) // len(fine)).astype(np.uint8)
+    total = np.zeros_like(picture[::_FINER, ::_FINER], dtype=np.uint16)
+    for row, column in np.ndindex(_FINER, _FINER):
+        total += picture[row::_FINER, column::_FINER]
+    return (total // _FINER**2).astype(np.uint8)
 
 
 if __name__ == "__main__":

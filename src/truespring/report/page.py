@@ -4,10 +4,11 @@ import base64
 import platform
 import re
 from collections.abc import Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
@@ -37,11 +38,14 @@ from truespring.report.verdict import (
 )
 from truespring.report.viewer import viewer
 
+if TYPE_CHECKING:
+    from jinja2 import Template
+
 #: Numbers that the viewers of one page may hold together: about a megabyte.
 _BUDGET = 400_000
 
 #: A picture of more bytes as SVG than this is shown as PNG.
-_LARGEST_SVG = 150_000
+_LARGEST_SVG = 180_000
 
 
 def write_page(results: Sequence[Result], file: FilePath, command: str) -> None:
@@ -51,22 +55,27 @@ def write_page(results: Sequence[Result], file: FilePath, command: str) -> None:
 
 def render_page(results: Sequence[Result], command: str) -> str:
     """Return the page as HTML: it loads nothing from anywhere."""
-    from jinja2 import Environment, StrictUndefined
-
     folder = files("truespring.report")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = _close
-    template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
     studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
     turning = any(study["viewer"] and study["in_space"] for study in studies)
     scripts = [*(["scene.min.js"] if turning else []), "viewer.js"]
-    return template.render(
+    return _template().render(
         title=results[0].title if len(results) == 1 else f"{len(results)} studies",
         studies=studies,
         versions=_versions(),
         command=command,
         scripts=[(folder / script).read_text(encoding="utf-8") for script in scripts],
     )
+
+
+@cache
+def _template() -> "Template":
+    """The page without a study; to compile it takes as long as to fill it."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["close"] = _close
+    return environment.from_string((files("truespring.report") / "page.html.j2").read_text(encoding="utf-8"))
 
 
 def _close(text: str) -> str:
@@ -86,6 +95,7 @@ def _versions() -> list[tuple[str, str]]:
 
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     drawings = render_figures(result)
+    pictures = {name: _picture(drawing) for name, drawing in drawings.items()}
     nearest = result.closest if len(result.comparisons) == 1 else nearest_reference(result)
     in_space = result.problem.mesh.dim == 3
     moving = viewer(result, budget)
@@ -107,12 +117,12 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "short": _in_short(result),
         "note": result.note,
         "file": str(result.file),
-        "pictures": {name: _picture(drawings[name]) for name in drawings},
+        "pictures": pictures,
         "over": [
-            _picture(drawings[drawn])
+            pictures[drawn]
             for name in result.comparisons
             for drawn in (over_name(result, name), distance_name(result, name))
-            if drawn in drawings
+            if drawn in pictures
         ],
         "viewer": moving,
         "model": result.model,
@@ -130,7 +140,9 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
 def _picture(drawing: Drawing) -> dict[str, str]:
     """A picture as the address that an <img> takes it from, its width on paper in CSS pixels, and its words."""
     if len(drawing.svg) <= _LARGEST_SVG:
-        address = "data:image/svg+xml," + quote(drawing.svg.decode().replace('"', "'"), safe=" =:/;,'()!*?")
+        address = "data:image/svg+xml," + quote(
+            drawing.svg.decode().replace("\n", " ").replace('"', "'"), safe=" =:/;,'()!*?"
+        )
     else:
         address = "data:image/png;base64," + base64.b64encode(drawing.png).decode()
     return {"address": address, "width": f"{96 * drawing.width:.0f}", "title": drawing.title}

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.report.frame import EDGE, blank_axes, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, POINT, is_strong, label_and_name, path_styles, text_width
+from truespring.report.style import BLUE, FAINT, POINT, is_strong, label_and_name, path_styles
 from truespring.report.verdict import display_name, drive, material_name
+from truespring.report.words import draw_words, text_width
 from truespring.report.young import Known, young_figure
 
 if TYPE_CHECKING:
@@ -51,10 +53,12 @@ def curves_figure(result: Result) -> "Figure":
         )
         for name in forces
     ]
-    figure, axes = _plot("Displacement of the probe against force", curves)
-    axes.set_xlabel(f"total force along {to.name} [{x_scale.unit}]")
-    axes.set_ylabel(f"displacement along {to.name} [{y_scale.unit}]")
-    return figure
+    return _plot(
+        "Displacement of the probe against force",
+        f"total force along {to.name} [{x_scale.unit}]",
+        f"displacement along {to.name} [{y_scale.unit}]",
+        curves,
+    )
 
 
 def error_figure(result: Result) -> "Figure":
@@ -75,10 +79,8 @@ def error_figure(result: Result) -> "Figure":
     within = f"within {tolerance_percent(result.tolerance)}"
     curves.append(_Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    figure, axes = _plot(f"Error of {who} against each reference", curves, to_right=1.02)
-    axes.axhspan(0, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5)
-    axes.set_xlabel("load factor")
-    axes.set_ylabel("rms error [%]")
+    figure = _plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
+    figure.axes[0].axhspan(0, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5)
     return figure
 
 
@@ -90,7 +92,7 @@ def _two_lines(result: Result, name: str) -> str:
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
-def _plot(title: str, curves: Sequence[_Curve], to_right: float | None = None) -> "tuple[Figure, Axes]":
+def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_right: float | None = None) -> "Figure":
     """Curves with their names at their ends, moved apart where they would meet.
 
     The axes end at 0 or below and, with `to_right`, span 0 to that.
@@ -104,18 +106,18 @@ def _plot(title: str, curves: Sequence[_Curve], to_right: float | None = None) -
     height = max(3.0, 0.34 * len(curves))
     figure = Figure(figsize=(max(5.9, left + 3.2 + right), bottom + height + top), label=title)
     total = figure.get_size_inches()
-    box = (left / total[0], bottom / total[1], 1 - (left + right) / total[0], height / total[1])
-    axes = figure.add_axes(box)
-    figure.text(box[0], 1 - 0.19 / total[1], title, weight="bold", size=9, va="center")
+    width = float(total[0]) - left - right
+    axes = blank_axes(figure, left, bottom, width, height)
+    draw_words(figure, left, float(total[1]) - 0.19, title, 9, bold=True)
     for curve in curves:
         axes.plot(curve.x, curve.y, label=curve.label.replace("\n", ", "), **_look(curve))
     if to_right is not None:
         axes.set_xlim(0, to_right)
-    axes.locator_params(nbins=6)
     low, high = axes.get_ylim()
     axes.set_ylim(0.0 if to_right is not None else min(low, 0.0), high)
-    _name_ends(figure, axes, curves, (box[2] * float(total[0]), height))
-    return figure, axes
+    draw_frame(figure, axes, x_label, y_label)
+    _name_ends(figure, axes, curves)
+    return figure
 
 
 def _look(curve: _Curve) -> dict[str, Any]:
@@ -131,14 +133,16 @@ def _look(curve: _Curve) -> dict[str, Any]:
     }
 
 
-def _name_ends(figure: "Figure", axes: "Axes", curves: Sequence[_Curve], size: tuple[float, float]) -> None:
-    """Write each curve's name right of the axes of `size` [inch], by height of their ends, with a sample of its line.
+def _name_ends(figure: "Figure", axes: "Axes", curves: Sequence[_Curve]) -> None:
+    """Write each curve's name right of the axes, by height of their ends, with a sample of its line.
 
     A leader joins the two where the curve ends near the right edge.
     """
     from matplotlib.lines import Line2D
     from matplotlib.transforms import Affine2D
 
+    corner, opposite = axes.get_position().get_points() * figure.get_size_inches()
+    size = opposite - corner
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     ends = np.array([((one.x[-1] - left) / (right - left), (one.y[-1] - bottom) / (top - bottom)) for one in curves])
     ends = ends.clip(0, 1) * size
@@ -146,22 +150,18 @@ def _name_ends(figure: "Figure", axes: "Axes", curves: Sequence[_Curve], size: t
     places = size[1] * _apart(ends[:, 1] / size[1], gap / size[1], ends[:, 0])
     led = np.flatnonzero(ends[:, 0] > 0.9 * size[0])
     places[led] = _uncrossed(ends[led], size[0] + _LEADER, places[led])
-    inches = Affine2D().scale(1 / size[0], 1 / size[1]) + axes.transAxes
+    inches: dict[str, Any] = {"transform": Affine2D().translate(*corner) + figure.dpi_scale_trans, "clip_on": False}
     for index, (curve, (x, y), place) in enumerate(zip(curves, ends, places, strict=True)):
         first, _, second = curve.label.partition("\n")
         at = size[0] + _LEADER
         if index in led:
-            leader = Line2D([x, at], [y, place], color=FAINT, lw=0.7, transform=inches, zorder=2, clip_on=False)
-            figure.add_artist(leader)
-        sample = Line2D([at, at + _SAMPLE / 2, at + _SAMPLE], [place] * 3, markevery=[1], **_look(curve))
-        sample.set(transform=inches, clip_on=False)
-        figure.add_artist(sample)
-        at += _SAMPLE + _GAP
-        weight = "bold" if curve.strong else "normal"
-        up = 5 * POINT if second else 0.0
-        axes.text(at, place + up, first, color=curve.color, size=8, weight=weight, va="center", transform=inches)
-        if second:
-            axes.text(at, place - up, second, color="#5b6168", size=7, va="center", transform=inches)
+            figure.add_artist(Line2D([x, at], [y, place], color=FAINT, lw=0.7, zorder=2, **inches))
+        sample = [at, at + _SAMPLE / 2, at + _SAMPLE]
+        figure.add_artist(Line2D(sample, [place] * 3, markevery=[1], **_look(curve), **inches))
+        x, y = corner[0] + at + _SAMPLE + _GAP, corner[1] + place
+        up = 5 if second else 0
+        draw_words(figure, x, y, first, color=curve.color, bold=curve.strong, shift=(0, up))
+        draw_words(figure, x, y, second, 7, EDGE, shift=(0, -up))
 
 
 def _uncrossed(ends: Floats, to_right: float, places: Floats) -> Floats:

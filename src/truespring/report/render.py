@@ -9,7 +9,8 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,15 +68,22 @@ class Shot:
     points: float
 
 
-def render(shots: Sequence[Shot]) -> tuple[list[Image], str]:
-    """Return an image of each shot, and where PyVista did not draw them why, and the way out."""
-    if importlib.util.find_spec("pyvista") is None:
-        images, why = None, "PyVista is not installed; pip install 'truespring[3d]' brings it"
-    else:
-        images, why = _by_child(shots)
-    if images is not None:
-        return images, ""
-    return [draw(shot) for shot in shots], f"The pictures in 3D are drawn by matplotlib, more coarsely: {why}."
+def render(shots: Sequence[Shot]) -> Callable[[], tuple[list[Image], str]]:
+    """Begin to draw: what is returned waits for an image of each shot, so that meanwhile other figures can be drawn.
+
+    Besides, where PyVista did not draw them, why, and the way out.
+    """
+    pool = ThreadPoolExecutor(1)  # it waits for the child, and draws nothing: matplotlib is not for threads
+    answer = pool.submit(_by_child, shots)
+    pool.shutdown(wait=False)
+
+    def images() -> tuple[list[Image], str]:
+        found, why = answer.result()
+        if found is not None:
+            return found, ""
+        return [draw(shot) for shot in shots], f"The pictures in 3D are drawn by matplotlib, more coarsely: {why}."
+
+    return images
 
 
 def _command(job: Path, answer: Path) -> list[str]:
@@ -85,6 +93,8 @@ def _command(job: Path, answer: Path) -> list[str]:
 
 def _by_child(shots: Sequence[Shot]) -> tuple[list[Image] | None, str]:
     """Have a child draw, so that a graphics library that crashes or hangs takes no results with it."""
+    if importlib.util.find_spec("pyvista") is None:
+        return None, "PyVista is not installed; pip install 'truespring[3d]' brings it"
     patience = _PATIENCE + _PATIENCE_EACH * len(shots)
     with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
         job, answer = Path(folder) / "job.npz", Path(folder) / "images.npz"
@@ -172,15 +182,15 @@ def inked(coverage: Image, ink: str) -> Image:
 
 def stacked(images: Sequence[Image]) -> Image:
     """Return images one over the other as one."""
-    below = images[0].astype(np.float32) / 255
+    whole = images[0].copy()
     for image in images[1:]:
-        above = image.astype(np.float32) / 255
-        share = above[..., 3:]
-        rest = (1 - share) * below[..., 3:]
+        drawn = image[..., 3] > 0  # mostly a few lines
+        above, below = image[drawn] / 255, whole[drawn] / 255
+        share, rest = above[:, 3:], (1 - above[:, 3:]) * below[:, 3:]
         opacity = share + rest
-        color = (share * above[..., :3] + rest * below[..., :3]) / np.where(opacity > 0, opacity, 1)
-        below = np.concatenate([color, opacity], axis=2)
-    return np.rint(255 * below).astype(np.uint8)
+        color = (share * above[:, :3] + rest * below[:, :3]) / opacity
+        whole[drawn] = np.rint(255 * np.concatenate([color, opacity], axis=1))
+    return whole
 
 
 def draw(shot: Shot) -> Image:

@@ -84,4 +84,6 @@ def write_stl(path: Path, file: FilePath) -> None:
 
 def _in_space(vectors: Floats) -> Floats:
     """Pad plane vectors with zeros to three components, shape (n, 3)."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+    padded = np.zeros((len(vectors), 3))
+    padded[:, : vectors.shape[1]] = vectors
+    return padded

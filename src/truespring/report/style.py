@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,22 +30,6 @@ _RC: Any = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.5,
     "text.color": INK,
-    "axes.edgecolor": "#5b6168",
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e6e9",
-    "grid.linewidth": 0.6,
-    "xtick.color": "#5b6168",
-    "ytick.color": "#5b6168",
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.direction": "out",
-    "legend.frameon": False,
-    "legend.handlelength": 1.6,
     "svg.fonttype": "path",
     "svg.hashsalt": "truespring",
     "savefig.facecolor": "white",
@@ -85,16 +68,6 @@ def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
 def is_strong(result: Result, name: str) -> bool:
     """Tell whether a path is drawn in blue: springs, and what is compared."""
     return name == result.model or result.paths[name].kind == "springs"
-
-
-@cache
-def text_width(text: str, size: float, bold: bool = False) -> float:
-    """Return the width of a text in figures [inch]; `size` in points."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(family="DejaVu Sans", size=size, weight="bold" if bold else "normal")
-    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) * POINT
 
 
 def full_name(result: Result, name: str) -> str:

@@ -1,10 +1,11 @@
 """Supports of a body in 3D: clamped faces hatched at their rim, other nodes on pins and rollers."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.report.lines import draw_lines
 from truespring.report.quantity import Scale
 from truespring.report.result import Result
 from truespring.report.surfaces import VIEW, facets_of, normals, seen
@@ -72,16 +73,7 @@ def _hatch(axes: "Axes", points: Floats, facets: Ints, facing: Floats, scale: Sc
             slant = size * (facing[owner[at]] - 0.7 * along / np.linalg.norm(along))
             strokes.append(np.stack([foot, foot + slant], axis=1))
         if strokes:
-            draw_lines(axes, np.concatenate(strokes)[:, :, :2] / scale.size, _SUPPORT, 0.9, zorder, "support")
+            strokes_on_paper = np.concatenate(strokes)[:, :, :2] / scale.size
+            draw_lines(axes, strokes_on_paper, _SUPPORT, 0.9, zorder, "support", clip_on=False)
             sides = points[edges[rim[(facing[owner, 2] > 0) == front]]][:, :, :2]
-            draw_lines(axes, sides / scale.size, _SUPPORT, 2.2, zorder, "clamped")
-
-
-def draw_lines(axes: "Axes", ends: Floats, color: str, width: float, zorder: float, name: str, **more: Any) -> None:
-    """Draw segments between ends on paper, in units of the axes, shape (n, 2, 2)."""
-    from matplotlib.collections import LineCollection
-
-    axes.add_collection(
-        LineCollection(list(ends), colors=color, linewidths=width, zorder=zorder, gid=name, clip_on=False, **more),
-        autolim=False,
-    )
+            draw_lines(axes, sides / scale.size, _SUPPORT, 2.2, zorder, "clamped", clip_on=False)

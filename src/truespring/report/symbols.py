@@ -11,6 +11,7 @@ from truespring.mesh import select
 from truespring.report.quantity import Scale, given
 from truespring.report.result import Result
 from truespring.report.style import LOAD, MOTION, POINT, RED
+from truespring.report.words import draw_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,17 +86,9 @@ def draw_arrow(axes: "Axes", arrow: Arrow, scale: Scale) -> None:
     style = {"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": arrow.color, "lw": 1.8}
     axes.annotate("", (to_x, to_y), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
     upright = abs(to_y - y) > abs(to_x - x)
-    axes.annotate(
-        arrow.text,
-        (min(x, to_x) if arrow.side > 0 else max(x, to_x), (y + to_y) / 2),
-        xytext=(7 * arrow.side, 0 if upright else 7),
-        textcoords="offset points",
-        ha="left" if arrow.side > 0 else "right",
-        va="center" if upright else "bottom",
-        color=arrow.color,
-        zorder=11,
-        bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.8},
-    )
+    end, align = (min(x, to_x), 0.0) if arrow.side > 0 else (max(x, to_x), 1.0)
+    shift = (7 * arrow.side, 0 if upright else 11)
+    draw_words(axes, end, (y + to_y) / 2, arrow.text, 8.5, arrow.color, align=align, shift=shift, halo=True)
 
 
 def draw_loaded(axes: "Axes", points: Floats, color: str) -> None:

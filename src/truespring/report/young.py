@@ -11,9 +11,13 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats
 from truespring.models import Moduli
+from truespring.report.frame import GRID, SIZE, blank_axes, draw_bar, round_numbers, written
+from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.lines import draw_lines
 from truespring.report.quantity import natural_scale, quantity
 from truespring.report.style import BLUE, INK, LOAD, SPRING_STYLES, figure_style
 from truespring.report.surfaces import VIEW, seen
+from truespring.report.words import draw_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _TITLE = "Young's modulus by direction"
+_DASHES = (0, (5, 2))
 _MOST_COLUMNS = 3
 _DPI = 130
 
@@ -64,43 +69,45 @@ def young_figure(several: Sequence[Known], material: str) -> "Figure":
 def _polar(several: Sequence[Known], material: str) -> "Figure":
     """The springs' curves against the material's circle."""
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
     wanted = several[0].moduli.young_wanted
     angles = np.radians(np.arange(0.0, 361.0))
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     largest = max(wanted, *(known.moduli.young_range[1] for known in several))
     scale = natural_scale(largest, "Pa")
-    figure = Figure(figsize=(3.9, 4.25 + 0.18 * len(several)), label=_TITLE)
-    total = figure.get_size_inches()
-    foot = (0.65 + 0.18 * len(several)) / total[1]
-    axes = figure.add_axes((0.12, foot, 0.76, 0.76 * total[0] / total[1]), projection="polar")
-    axes.plot(angles, np.full(angles.shape, wanted / scale.size), color=INK, lw=1.3, ls=(0, (5, 2)))
-    handles = [Line2D([], [], color=INK, lw=1.3, ls=(0, (5, 2)))]
-    labels = [f"{material}: {quantity(wanted, 'Pa')}"]
+    legend = [Entry(f"{material}: {quantity(wanted, 'Pa')}", INK, linestyle=_DASHES)]
     for known in several:
-        values = known.moduli.young_along(directions)
-        axes.plot(angles, values / scale.size, color=known.color, lw=2, ls=known.dashes)
-        handles.append(Line2D([], [], color=known.color, lw=2, ls=known.dashes))
         extremes = dict.fromkeys(quantity(value, "Pa") for value in known.moduli.young_range)
-        labels.append(f"{known.label}: {' to '.join(extremes)}")
-    axes.set_ylim(0, 1.12 * largest / scale.size)
-    axes.set_yticks(_ticks(largest / scale.size))
-    axes.set_rlabel_position(22.5)  # type: ignore[attr-defined]
-    axes.set_thetagrids(np.arange(0, 360, 45))  # type: ignore[attr-defined]
-    axes.tick_params(pad=2)
-    axes.spines["polar"].set_visible(False)
-    figure.text(0.5, 1 - 0.19 / total[1], f"{_TITLE} [{scale.unit}]", weight="bold", size=9, va="center", ha="center")
-    figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 0.02), borderpad=0, fontsize=8)
+        legend.append(Entry(f"{known.label}: {' to '.join(extremes)}", known.color, linestyle=known.dashes))
+    columns, words = legend_columns(legend, 0.0)
+    width, height = 3.9, 4.25 + ROW * len(several)
+    figure = Figure(figsize=(width, height), label=_TITLE)
+    axes = blank_axes(figure, 0.12 * width, 0.65 + ROW * len(several), 0.76 * width, 0.76 * width)
+    _draw_compass(axes, largest / scale.size)
+    axes.plot(*(wanted / scale.size * directions.T), color=INK, lw=1.3, ls=_DASHES)
+    for known in several:
+        values = known.moduli.young_along(directions)[:, None] / scale.size
+        axes.plot(*(values * directions).T, color=known.color, lw=2, ls=known.dashes)
+    draw_words(figure, width / 2, height - 0.19, f"{_TITLE} [{scale.unit}]", 9, bold=True, align=0.5)
+    draw_legend(figure, columns, (width - words) / 2, 0.1 + ROW * len(legend))
     return figure
 
 
-def _ticks(largest: float) -> Floats:
-    """Three or four round numbers from zero on."""
-    from matplotlib.ticker import MaxNLocator
+def _draw_compass(axes: "Axes", largest: float) -> None:
+    """Draw rings at round numbers up to about `largest`, and rays at every 45 degrees."""
+    from matplotlib.patches import Circle
 
-    ticks = np.asarray(MaxNLocator(4).tick_values(0, largest))
-    return ticks[(ticks > 0) & (ticks <= 1.1 * largest)]
+    end = 1.12 * largest
+    axes.set(xlim=(-end, end), ylim=(-end, end))
+    numbers = round_numbers(0.0, 1.1 * largest, 5)[1:]
+    for number, told in zip(numbers, written(numbers), strict=True):
+        axes.add_artist(Circle((0, 0), number, fill=False, ec=GRID, lw=0.6, zorder=0.5))
+        draw_words(axes, number * np.cos(np.pi / 8), number * np.sin(np.pi / 8), told, SIZE, shift=(0, 3))
+    angles = np.arange(0, 360, 45)
+    rays = end * np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
+    draw_lines(axes, np.stack([0 * rays, rays], axis=1), GRID, 0.6, 0.5, "rays")
+    for angle, (x, y) in zip(angles, 1.12 * rays, strict=True):
+        draw_words(axes, x, y, f"{angle}°", SIZE, align=0.5)
 
 
 # --- in space ---------------------------------------------------------------------------------------
@@ -108,7 +115,6 @@ def _ticks(largest: float) -> Floats:
 
 def _surfaces(several: Sequence[Known], material: str) -> "Figure":
     """A surface for each springs model, its radius and colour E over the material's, which is the sphere of wires."""
-    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
     columns = min(len(several), _MOST_COLUMNS)
@@ -116,7 +122,7 @@ def _surfaces(several: Sequence[Known], material: str) -> "Figure":
     width = max(columns * _PANEL, 3.6)
     height = _TOP + rows * (_PANEL + _CAPTION) + _FOOT
     figure = Figure(figsize=(width, height), label=_TITLE, dpi=200)
-    figure.text(0.5, 1 - 0.19 / height, _TITLE, weight="bold", size=9, va="center", ha="center")
+    draw_words(figure, width / 2, height - 0.19, _TITLE, 9, bold=True, align=0.5)
     shares = np.array([known.moduli.young_range for known in several]) / several[0].moduli.young_wanted
     facets = [_facets(known.moduli) for known in several]
     extent = max(1.0, *(float(np.abs(corners[..., :2]).max()) for corners, _ in facets))
@@ -127,27 +133,21 @@ def _surfaces(several: Sequence[Known], material: str) -> "Figure":
         row, column = divmod(place, columns)
         bottom = height - _TOP - (row + 1) * (_PANEL + _CAPTION)
         corner = (left + column * _PANEL, bottom + _CAPTION)
-        axes = figure.add_axes((corner[0] / width, corner[1] / height, _PANEL / width, _PANEL / height))
-        axes.set(xlim=(-1.3 * extent, 1.3 * extent), ylim=(-1.3 * extent, 1.3 * extent), aspect="equal")
-        axes.set_axis_off()
+        axes = blank_axes(figure, *corner, _PANEL, _PANEL)
+        axes.set(xlim=(-1.3 * extent, 1.3 * extent), ylim=(-1.3 * extent, 1.3 * extent))
         _draw_surface(axes, *facets[place], lambda share: colors(norm(share)))
         _draw_sphere(axes, known.moduli)
         _draw_axes(axes, known.moduli, extent)
-        middle = (corner[0] + _PANEL / 2) / width
+        middle = corner[0] + _PANEL / 2
         extremes = " to ".join(dict.fromkeys(f"{value:.2f}" for value in shares[place]))
-        figure.text(
-            middle, (bottom + 0.3) / height, known.label, color=INK, size=8, weight="bold", va="center", ha="center"
-        )
-        figure.text(middle, (bottom + 0.13) / height, extremes, color=INK, size=8, va="center", ha="center")
-    bar = figure.add_axes((0.5 - 1.2 / width, 0.4 / height, 2.4 / width, 0.09 / height))
-    figure.colorbar(ScalarMappable(norm, colors), cax=bar, orientation="horizontal")
-    marks = _marks(farthest)
-    bar.set_xticks(marks, [f"{mark:g}" for mark in marks])
-    bar.minorticks_off()
-    bar.tick_params(length=2, pad=2, labelsize=7)
+        draw_words(figure, middle, bottom + 0.3, known.label, bold=True, align=0.5)
+        draw_words(figure, middle, bottom + 0.13, extremes, align=0.5)
+    marks = np.array(_marks(farthest))
+    shown = colors(np.linspace(0, 1, 256))[:, :3]
+    draw_bar(figure, width / 2 - 1.2, 0.49, 2.4, shown, np.asarray(norm(marks)), [f"{mark:g}" for mark in marks])
     wanted = quantity(several[0].moduli.young_wanted, "Pa")
     under = f"times that of the {material}, {wanted} (the sphere)"
-    figure.text(0.5, 0.11 / height, under, size=7.5, va="center", ha="center")
+    draw_words(figure, width / 2, 0.11, under, 7.5, align=0.5)
     return figure
 
 
@@ -189,7 +189,7 @@ def _draw_axes(axes: "Axes", moduli: Moduli, extent: float) -> None:
         for piece in _visible_pieces(line, moduli):
             axes.plot(piece[:, 0], piece[:, 1], color=INK, lw=0.9)
         right, up, _ = seen((end + 0.1 * extent) * axis)
-        axes.text(right, up, name, size=8, ha="center", va="center")
+        draw_words(axes, right, up, name, align=0.5)
 
 
 def _share(moduli: Moduli, directions: Floats) -> Floats:

@@ -2,4 +2,5 @@
 
 from truespring.solvers.balance import Equilibrium as Equilibrium
 from truespring.solvers.balance import Reporter as Reporter
+from truespring.solvers.cost import Cost as Cost
 from truespring.solvers.newton import Newton as Newton

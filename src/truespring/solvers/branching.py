@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from truespring.solvers.balance import Balance, Found
+from truespring.solvers.line_search import descend
 
 # Leaps along the mode by these shares of the body's size are tried, each with so many undamped iterations;
 # then a descent from nearby.
@@ -16,6 +17,9 @@ def stabilised(balance: Balance, found: Found) -> Found:
     """Return a stable equilibrium of lower energy reached from an unstable one; `found` where there is none."""
     for _ in range(_MAX_ESCAPES):
         if not found.state.converged or not found.state.negative_eigenvalues:
+            break
+        found = balance.factorised(found)
+        if found.tangent is None or not found.state.negative_eigenvalues:
             break
         left = _escaped(balance, found)
         if left.state.positions is found.state.positions:
@@ -35,23 +39,25 @@ def _escaped(balance: Balance, unstable: Found) -> Found:
     state, tangent = unstable.state, unstable.tangent
     assert tangent is not None  # it was found negative by factorising
     level, spent = state.load_factor, state.iterations
-    mode = balance.size * tangent.lowest_mode()
+    lowest = tangent.lowest_mode()
+    assert lowest is not None  # so can any factorisation
+    mode = balance.size * lowest
     unit = mode / np.linalg.norm(mode)
     energy, _ = balance.total_energy(state.positions, level)
     at_state = balance.force(state.positions, level)
     for share in (*_LEAPS, _NUDGE):
         leaping = share != _NUDGE
-        sides = [balance.moved(state.positions, side * share * mode) for side in (1, -1)]
+        sides = [state.positions + side * share * mode for side in (1, -1)]
         energies = [balance.total_energy(side, level)[0] for side in sides]
         if not np.isfinite(energies).all():
             continue
         start = sides[int(np.argmin(energies))]
         if leaping:
             bent = -tangent.solve(balance.force(sides[0], level) + balance.force(sides[1], level) - 2 * at_state) / 2
-            start = balance.moved(start, bent - unit * (unit @ bent))
+            start = start + bent - unit * (unit * bent).sum()
             if not np.isfinite(balance.total_energy(start, level)[0]):
                 continue
-        found = balance.descend(level, start, _UNDAMPED_ITERATIONS if leaping else None)
+        found = descend(balance, level, start, _UNDAMPED_ITERATIONS if leaping else None)
         spent += found.state.iterations
         lower = found.state.converged and balance.total_energy(found.state.positions, level)[0] < energy
         if lower and (not leaping or found.state.negative_eigenvalues == 0):

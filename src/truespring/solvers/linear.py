@@ -1,82 +1,91 @@
-"""The linear solver: a factorisation that also tells the inertia of its matrix."""
+"""Linear solvers behind one interface: a tangent made ready, which solves and tells of its stability.
 
-from dataclasses import dataclass
-from typing import Any
+Directions that are held take no part: right sides and solutions of shape (n_nodes, dim) are zero there.
+"""
 
-import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+from types import MappingProxyType
+from typing import ClassVar, Protocol
 
-from truespring.arrays import Floats
+from truespring.arrays import Bools, Floats
+from truespring.errors import ProblemError, nearest
+from truespring.memory import available_memory
 from truespring.potential import SparseMatrix
+from truespring.solvers.direct import FACTORISERS, Direct, direct_bytes, present
+from truespring.solvers.iterative import Multigrid
 
-# Up to this size the eigenvalues themselves decide where the pivots cannot.
-_DENSE = 2000
-
-
-class SingularMatrixError(ArithmeticError):
-    """The matrix has no inverse: a mechanism, or a state exactly at a limit or bifurcation point."""
+# Up to so many free directions, in the plane and in space, a factorisation is as quick as multigrid, and exact.
+_DIRECT = MappingProxyType({2: 30_000, 3: 6_000})
 
 
-@dataclass(frozen=True)
-class Factorisation:
-    """L D L^T of a symmetric matrix.
+class Tangent(Protocol):
+    """A tangent stiffness made ready to be solved with."""
+
+    #: Whether it stays good when the solver is given the next one.
+    lasting: ClassVar[bool]
+
+    @property
+    def negative_eigenvalues(self) -> int | None:
+        """Their number; of an iterative solver 1 where there is any; None where it is not known."""
+        ...
+
+    def solve(self, right: Floats, accuracy: float = 1e-12) -> Floats:
+        """Return x of tangent x = right, to a relative residual of `accuracy` or better.
+
+        Raises IndefiniteError where an iterative solver meets a negative direction.
+        """
+        ...
+
+    def lowest_mode(self) -> Floats | None:
+        """Return a mode of a negative eigenvalue, largest component +1; None where there is no way to it."""
+        ...
+
+
+class LinearSolver(Protocol):
+    """What makes tangents ready.
 
     Attributes:
-        matrix: what was factorised, shape (n, n).
-        negative_eigenvalues: their number, by Sylvester's law from the pivots; None where the
-            pivots were permuted away from the diagonal and the matrix is too large for another way.
+        name: what is used, in words.
+        factorisations, cg_iterations: what was spent so far.
+        memory: the most that factors or coarse levels took [bytes].
     """
 
-    matrix: SparseMatrix
-    negative_eigenvalues: int | None
-    _lu: Any
+    name: str
+    factorisations: int
+    cg_iterations: int
+    memory: int
 
-    def solve(self, right: Floats) -> Floats:
-        """Return the solution of matrix x = right, shape (n,)."""
-        return np.asarray(self._lu.solve(right))
-
-    def lowest_mode(self) -> Floats:
-        """Return the eigenvector of a negative eigenvalue, largest component +1, shape (n,).
-
-        The one nearest to zero; in tiny systems the lowest.
-        """
-        n = self.matrix.shape[0]
-        if n <= 10:
-            vector = np.linalg.eigh(self.matrix.toarray())[1][:, 0]
-        else:
-            inverse = LinearOperator((n, n), matvec=self._lu.solve, dtype=np.float64)
-            start = np.random.default_rng(9).normal(size=n)
-            try:
-                vector = eigsh(self.matrix, k=1, sigma=0.0, which="SA", OPinv=inverse, v0=start)[1][:, 0]
-            except ArpackError:  # inverse iteration needs no more than solves
-                vector = start
-                for _ in range(50):
-                    vector = self.solve(vector)
-                    vector = vector / np.linalg.norm(vector)
-        return np.asarray(vector / vector[np.abs(vector).argmax()])
+    def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
+        """Take a tangent at some positions; raise SingularMatrixError where it has no inverse."""
+        ...
 
 
-def factorise(matrix: SparseMatrix) -> Factorisation:
-    """Factorise a symmetric matrix; raise SingularMatrixError where it has no inverse."""
-    if not np.isfinite(matrix.data).all():
-        raise SingularMatrixError("the matrix holds values that are not finite")
-    try:
-        # Without row pivoting on the diagonal SuperLU's U carries D of L D L^T.
-        lu = splu(
-            sparse.csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
+#: What `linear` may be of a solver's settings.
+LINEAR = ("auto", "direct", "multigrid", *FACTORISERS)
+
+
+def check_linear(name: str) -> None:
+    """Raise ProblemError for a linear solver that does not exist or is not installed."""
+    if name not in LINEAR:
+        raise ProblemError(f"linear = '{name}' is unknown{nearest(name, LINEAR)}; allowed: {', '.join(LINEAR)}")
+    if name in FACTORISERS and not present(name):
+        raise ProblemError(f"linear = '{name}': it is not installed; try: pip install {FACTORISERS[name].package}")
+
+
+def choose(name: str, nodes: Floats, held: Bools) -> LinearSolver:
+    """Return the linear solver `name` of LINEAR; "auto" goes by size and dimension.
+
+    Raises ProblemError where a factorisation would not fit in memory, by estimate.
+    """
+    check_linear(name)
+    n_free, dim = int((~held).sum()), nodes.shape[1]
+    if name == "auto":
+        name = "direct" if dim not in _DIRECT or n_free <= _DIRECT[dim] else "multigrid"
+    if name == "multigrid":
+        return Multigrid(nodes, held)
+    needed, there = direct_bytes(nodes.shape), available_memory()
+    if needed > there:
+        raise ProblemError(
+            f"linear = '{name}': a factorisation for {len(nodes):,} nodes needs about {needed / 2**30:,.0f} GiB, "
+            f"{there / 2**30:,.1f} GiB are there: take linear = 'multigrid' or fewer elements"
         )
-    except RuntimeError as error:
-        raise SingularMatrixError(str(error)) from None
-    return Factorisation(matrix, _negative_eigenvalues(lu, matrix), lu)
-
-
-def _negative_eigenvalues(lu: Any, matrix: SparseMatrix) -> int | None:
-    if (lu.perm_r == lu.perm_c).all():
-        return int((lu.U.diagonal() < 0).sum())
-    if matrix.shape[0] <= _DENSE:
-        return int((np.linalg.eigvalsh(matrix.toarray()) < 0).sum())
-    return None
+    return Direct(held, name)

@@ -6,10 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.errors import ProblemError
-from truespring.potential import Loading, Potential
+from truespring.errors import ProblemError, nearest
+from truespring.potential import Loading, Potential, Stressed
+from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
+from truespring.solvers.cost import Cost
+from truespring.solvers.line_search import descend
+from truespring.solvers.linear import check_linear, choose
+
+#: What `method` may be: how balance is found at a load level.
+METHODS = ("auto", "mixed", "line-search")
 
 # A body that moves so many times as far as the step before lets expect may have snapped.
 _SNAP = 5.0
@@ -24,18 +31,30 @@ class Newton:
         tolerance: relative residual at which a state counts as balanced [-].
         max_iterations: Newton iterations at one level before its step is cut back.
         max_cutbacks: how often a load step may be halved.
+        method: "auto" takes Newton's method with mixed integration points where the potential has a stress
+            and, where that finds no stable state nearby, line search on the energy; "mixed" and
+            "line-search" take nothing else.
+        linear: "auto" by size and dimension; "multigrid"; "direct", the best library there is; or one of
+            them by name: "scipy", "rslab", "pardiso".
     """
 
     load_steps: int = 10
     tolerance: float = 1e-10
     max_iterations: int = 50
     max_cutbacks: int = 6
+    method: str = "auto"
+    linear: str = "auto"
 
     def __post_init__(self) -> None:
         if self.load_steps < 1 or self.max_iterations < 1 or self.max_cutbacks < 0:
             raise ProblemError("load_steps and max_iterations must be at least 1, max_cutbacks at least 0")
         if not 0 < self.tolerance < 1:
             raise ProblemError(f"tolerance = {self.tolerance}: a relative residual between 0 and 1 is wanted")
+        if self.method not in METHODS:
+            raise ProblemError(
+                f"method = '{self.method}' is unknown{nearest(self.method, METHODS)}; allowed: {', '.join(METHODS)}"
+            )
+        check_linear(self.linear)
 
     def follow(
         self,
@@ -50,16 +69,17 @@ class Newton:
         Equilibria whose positions are not `admissible` (an inverted element) are taken only from where
         the smallest load step leads to no other. A body unstable without load ends there.
         """
-        balance = Balance(potential, loading, self.tolerance, self.max_iterations, report)
-        last = balance.descend(0.0, potential.nodes)
-        yield last.state
+        linear = choose(self.linear, potential.nodes, loading.held)
+        balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
+        last = descend(balance, 0.0, potential.nodes)
+        yield self._with_cost(last.state, balance)
         if last.state.negative_eigenvalues:
             return
         previous: Equilibrium | None = None
         step, spent = 1.0 / self.load_steps, 0
         smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
-            reached = _find(balance, self._next_level(last.state.load_factor, step), last, previous)
+            reached = self._find(balance, self._next_level(last.state.load_factor, step), last, previous)
             spent += reached.state.iterations
             refused = reached.state.converged and strict and not admissible(reached.state.positions)
             ever_refused = ever_refused or refused
@@ -74,7 +94,46 @@ class Newton:
             state = replace(reached.state, iterations=spent, snapped=snapped)
             previous, last, spent = last.state, reached._replace(state=state), 0
             step = min(2 * step, 1.0 / self.load_steps)
-            yield state
+            yield self._with_cost(state, balance)
+
+    def _with_cost(self, state: Equilibrium, balance: Balance) -> Equilibrium:
+        """Add what was spent so far."""
+        from truespring.kernels.threads import n_threads
+
+        return replace(
+            state,
+            cost=Cost(
+                newton="line search" if self._searches(balance) else "mixed integration points",
+                linear=balance.linear.name,
+                newton_iterations=balance.spent,
+                cg_iterations=balance.linear.cg_iterations,
+                factorisations=balance.linear.factorisations,
+                memory=balance.linear.memory,
+                threads=n_threads(),
+                notes=tuple(balance.notes),
+            ),
+        )
+
+    def _searches(self, balance: Balance) -> bool:
+        """Whether line search is the first choice."""
+        return self.method == "line-search" or not isinstance(balance.potential, Stressed)
+
+    def _find(self, balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
+        """Return the equilibrium at `level`: by mixed integration points, else by line search."""
+        found = None
+        if not self._searches(balance):
+            found = self._find_mixed(balance, level, last.state, previous)
+            if self.method == "mixed" or _trusted(found.state, last.state, previous):
+                return found
+            balance.note(f"line search at load factor {level:.6g}: {_doubt(found.state)}")
+        searched = _find_by_search(balance, level, last, previous)
+        spent = searched.state.iterations + (found.state.iterations if found else 0)
+        return searched._replace(state=replace(searched.state, iterations=spent))
+
+    def _find_mixed(self, balance: Balance, level: float, last: Equilibrium, previous: Equilibrium | None) -> Found:
+        start = mixed.start_from(balance, level, last, previous)
+        assert start is not None  # the potential has a stress
+        return mixed.converge(balance, level, start)
 
     def _next_level(self, load_factor: float, step: float) -> float:
         """Return the level a step further, but no further than the next requested one."""
@@ -82,8 +141,20 @@ class Newton:
         return float(requested if load_factor + step > requested - 1e-9 else load_factor + step)
 
 
-def _find(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
-    """Return the equilibrium at `level`, from the prediction with the least unbalanced force."""
+def _trusted(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None) -> bool:
+    """Whether a state may be taken without line search: one that is not on the path may be anywhere."""
+    return state.converged and not state.negative_eigenvalues and not _snapped(state, last, previous)
+
+
+def _doubt(state: Equilibrium) -> str:
+    """Why a state was not taken."""
+    if not state.converged:
+        return "mixed integration points did not converge"
+    return "they led to an unstable state" if state.negative_eigenvalues else "they led far away"
+
+
+def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
+    """Return the equilibrium at `level` by line search, from the prediction with the least unbalanced force."""
     guesses = [
         guess
         for guess in _predictions(balance, level, last, previous)
@@ -93,7 +164,7 @@ def _find(balance: Balance, level: float, last: Found, previous: Equilibrium | N
         state = last.state
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))
     start = min(guesses, key=lambda guess: float(np.linalg.norm(balance.force(guess, level))))
-    return stabilised(balance, balance.descend(level, start))
+    return stabilised(balance, descend(balance, level, start))
 
 
 def _predictions(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Iterator[Floats]:
@@ -105,8 +176,9 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
     if last.tangent is not None:
         push = advance * loading.external_force.ravel()
         if motion.any():
-            push = push - balance.potential.hessian(state.positions) @ motion.ravel()
-        yield balance.moved(state.positions + motion, last.tangent.solve(push[balance.free]))
+            push = push - balance.hessian(state.positions) @ motion.ravel()
+        push = np.where(balance.free, push.reshape(motion.shape), 0.0)
+        yield state.positions + motion + last.tangent.solve(push)
     if previous is not None and not state.branched:
         ratio = advance / (state.load_factor - previous.load_factor)
         extrapolated = state.positions + ratio * (state.positions - previous.positions)

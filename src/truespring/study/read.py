@@ -114,17 +114,24 @@ class _Builder:
             file=self.file,
             source=self.source,
             problem=problem,
-            solver=Newton(
-                load_steps=table.solver.load_steps,
-                tolerance=table.solver.tolerance,
-                max_iterations=table.solver.max_iterations,
-            ),
+            solver=self.solver(),
             entries=entries,
             model=model,
             references=references,
             probe=probe,
             tolerance=table.compare.tolerance,
         )
+
+    def solver(self) -> Newton:
+        table = self.table.solver
+        with self.at("solver", "linear"):
+            return Newton(
+                load_steps=table.load_steps,
+                tolerance=table.tolerance,
+                max_iterations=table.max_iterations,
+                method=table.method,
+                linear=table.linear,
+            )
 
     def problem(self) -> Problem:
         table = self.table

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -225,7 +226,10 @@ _FIGURES = ("undeformed", "curves", "error", "moduli")
 
 
 def write_overview(results: Sequence[Result], out: FilePath) -> None:
-    """Write out/report.html over all studies."""
+    """Write out/report.html over all studies, each written before; over one alone, its own page once more."""
+    if len(results) == 1:
+        shutil.copyfile(out / results[0].stem / "report.html", out / "report.html")
+        return
     from truespring.report.page import write_page
 
     write_page(results, out / "report.html", _command(results, out))

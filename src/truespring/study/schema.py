@@ -224,6 +224,8 @@ class SolverTable(Table):
     control: Literal["load"] = "load"
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
     max_iterations: Annotated[int, Field(ge=1)] = 50
+    method: Literal["auto", "mixed", "line-search"] = "auto"
+    linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = "auto"
 
 
 class StiffnessTable(Table):

@@ -1,0 +1,1 @@
+"""truespring beside other programs: `make bench` runs them and rebuilds docs/performance.md."""

@@ -1,0 +1,116 @@
+"""The cases: two bodies, two loads, several sizes; what every program is given.
+
+A rectangle 4 by 1 in plane stress (Poisson's ratio 1/3, squares) and a box 4 by 1 by 1 (1/4, cubes), lengths in
+metres, E = 1 MPa, held on the left and pulled on the right by a dead force, shared consistently over that end.
+Nothing here needs more than numpy, so that peers can read it in an environment of their own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+LENGTH = 4.0
+YOUNG = 1e6
+POISSON = {2: 1 / 3, 3: 1 / 4}
+
+#: Elements over the height of the bodies: the length has four times as many. About 1.4k, 5.4k, 51k, 503k and 1.0M
+#: nodes in the plane, 2.7k, 8.3k, 31k, 105k and 312k in space.
+SIZES = {2: (18, 36, 112, 354, 500), 3: (8, 12, 19, 29, 42)}
+
+#: What springs are solved at before they are timed: large enough for the code that runs on all threads.
+WARM_UP = {2: 36, 3: 12}
+
+#: What peers and springs are compared at.
+REFERENCE = {2: 112, 3: 19}
+
+#: The meshes of the second table, time to the same error.
+LADDER = {2: (1, 2, 3, 4, 6, 8, 12, 18, 26, 36), 3: (1, 2, 3, 4, 6, 8, 12)}
+
+#: The share of the length by which the end moves, of springs by SPRINGS at the first size: bent down, or pulled along.
+MOVED = {"bending": 0.5, "stretching": 0.25}
+SPRINGS = {2: "lloyd", 3: "isotropic"}
+
+#: The total force [N] that moves them so, found by benchmarks/find_loads.py, with five digits.
+LOADS = {(2, "bending"): -8835.4, (2, "stretching"): 246730.0, (3, "bending"): -10088.0, (3, "stretching"): 287850.0}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body and its load, as plain arrays.
+
+    Attributes:
+        nodes: [m], shape (n_nodes, dim), x running fastest.
+        elements: corners in VTK's order, shape (n_elements, 4 or 8).
+        held: true where the displacement is zero, shape (n_nodes, dim).
+        force: dead load [N], shape (n_nodes, dim).
+        young, poisson: [Pa], [-]; the thickness in the plane is 1 m.
+    """
+
+    nodes: NDArray[np.float64]
+    elements: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    force: NDArray[np.float64]
+    young: float
+    poisson: float
+
+    @classmethod
+    def read(cls, file: Path | str) -> Self:
+        """Return what `write` wrote."""
+        with np.load(file) as stored:
+            arrays = dict(stored)
+        return cls(**arrays | {name: float(arrays[name]) for name in ("young", "poisson")})
+
+    def write(self, file: Path) -> None:
+        """Write the arrays to an .npz file."""
+        np.savez(file, **vars(self))
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return self.nodes.shape[1]
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé constants lam, mu [Pa]."""
+        mu = self.young / (2 * (1 + self.poisson))
+        return self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson)), mu
+
+    def tip(self, displacement: NDArray[np.float64]) -> float:
+        """Return how far the loaded end moves along the load [m]: its mean, weighted as the force is shared."""
+        total = np.linalg.norm(self.force.sum(axis=0))
+        return float((self.force * displacement).sum() / total)
+
+
+def bar(dim: int, load: str, depth: int, force: float | None = None) -> Case:
+    """Return the body of `depth` elements over its height under a load of MOVED, or under another total `force` [N]."""
+    counts = (4 * depth, *(depth,) * (dim - 1))
+    nodes, elements = grid([LENGTH, *(1.0,) * (dim - 1)], counts)
+    held = np.repeat(nodes[:, :1] == 0.0, dim, axis=1)
+    total = np.zeros(dim)
+    total[0 if load == "stretching" else 1] = LOADS[dim, load] if force is None else force
+    end = nodes[:, 0] == LENGTH
+    shares = np.ones(end.sum())
+    for axis in range(1, dim):  # linear along each edge: half a weight at its two ends
+        outer = np.isin(nodes[end, axis], (0.0, 1.0))
+        shares *= np.where(outer, 0.5, 1.0) / depth
+    applied = np.zeros_like(nodes)
+    applied[end] = shares[:, None] * total
+    return Case(nodes, elements, held, applied, YOUNG, POISSON[dim])
+
+
+def grid(size: Sequence[float], counts: Sequence[int]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return nodes and rectangles or boxes of a regular grid, x running fastest."""
+    axes = [np.linspace(0, length, count + 1) for length, count in zip(size, counts, strict=True)]
+    nodes = np.stack([axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij")][::-1], axis=1)
+    numbers = np.arange(len(nodes)).reshape([count + 1 for count in counts[::-1]])
+    ring = ((0, 0), (0, 1), (1, 1), (1, 0))  # of y and x, counter-clockwise
+    corners = ring if len(counts) == 2 else [(layer, *corner) for layer in (0, 1) for corner in ring]
+    cells = [
+        numbers[tuple(slice(start, start + count) for start, count in zip(corner, counts[::-1], strict=True))].ravel()
+        for corner in corners
+    ]
+    return nodes, np.stack(cells, axis=1)

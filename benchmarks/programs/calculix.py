@@ -1,0 +1,108 @@
+"""CalculiX: NLGEOM, which makes *ELASTIC the St. Venant-Kirchhoff law; its own direct solver on all threads.
+
+Space has elements C3D8. Plane stress of this law is plane strain of another material, and as such is given to the
+elements CPE4: the same discrete problem as the others solve. CPS4, one layer of bricks with free faces, is another
+one, and dearer.
+"""
+
+import os
+import pty
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cases import Case
+from benchmarks.programs.common import Run, in_few_increments, main, peak_bytes
+
+# By default it stops at a residual of 0.5 % of the mean force and a correction of 1 % of the displacement.
+_CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7"
+
+
+def solve(case: Case) -> Run:
+    """Solve in one load increment, or in as few more as it takes."""
+    version = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout.split()[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        twin = Twin(case, Path(folder))
+        tip, iterations, seconds, notes = in_few_increments(twin.attempt)
+        return Run(version, seconds, tip, iterations, twin.peak_bytes, notes=notes)
+
+
+class Twin:
+    """The deck of a case and what running it gave."""
+
+    def __init__(self, case: Case, folder: Path) -> None:
+        self.case, self.folder, self.peak_bytes = case, folder, 0
+
+    def attempt(self, increments: int) -> tuple[float, int, float] | None:
+        """Return tip, iterations and seconds, from when the deck is read; None where it did not converge."""
+        (self.folder / "twin.inp").write_text("\n".join(deck(self.case, increments)))
+        read, ended, converged = self._run()
+        if not converged:
+            return None
+        rows = np.loadtxt(self.folder / "twin.dat", skiprows=3)
+        displacement = np.zeros_like(self.case.nodes)
+        displacement[rows[:, 0].astype(int) - 1] = rows[:, 1 : 1 + self.case.dim]
+        steps = np.loadtxt(self.folder / "twin.sta", skiprows=2, ndmin=2)
+        return self.case.tip(displacement), int(steps[:, 3].sum()), ended - read
+
+    def _run(self) -> tuple[float, float, bool]:
+        """Run ccx; return when it had read its deck, when it ended, and whether it converged.
+
+        What it prints comes line by line to a terminal only.
+        """
+        ours, theirs = pty.openpty()
+        process = subprocess.Popen(["ccx", "twin"], cwd=self.folder, stdout=theirs, stderr=theirs)
+        os.close(theirs)
+        read, printed = None, b""
+        for chunk in _chunks(ours):
+            printed += chunk
+            if read is None and b"Determining the structure of the matrix" in printed:
+                read = time.perf_counter()
+            self.peak_bytes = max(self.peak_bytes, peak_bytes(process.pid))
+        return read or 0.0, time.perf_counter(), process.wait() == 0
+
+
+def _chunks(terminal: int) -> Iterator[bytes]:
+    """What comes from a terminal until the process at its other end is gone."""
+    while True:
+        try:
+            chunk = os.read(terminal, 65536)
+        except OSError:  # how Linux says so
+            chunk = b""
+        if not chunk:
+            os.close(terminal)
+            return
+        yield chunk
+
+
+def deck(case: Case, increments: int) -> Iterator[str]:
+    """Yield the lines of the input."""
+    young, poisson, kind = case.young, case.poisson, "C3D8"
+    if case.dim == 2:  # Timoshenko and Goodier, Theory of Elasticity: the exchange between the plane problems
+        young, poisson, kind = young * (1 + 2 * poisson) / (1 + poisson) ** 2, poisson / (1 + poisson), "CPE4"
+    yield "*NODE"
+    yield from (f"{number}, {_joined(node)}" for number, node in enumerate(case.nodes.tolist(), 1))
+    yield f"*ELEMENT, TYPE={kind}, ELSET=BODY"
+    yield from (f"{number}, {_joined(element)}" for number, element in enumerate((case.elements + 1).tolist(), 1))
+    yield "*NSET, NSET=END"
+    yield from (f"{node + 1}," for node in np.flatnonzero(case.force.any(axis=1)))
+    yield f"*MATERIAL, NAME=M\n*ELASTIC\n{young:.12e}, {poisson:.12e}"
+    yield "*SOLID SECTION, ELSET=BODY, MATERIAL=M" + ("\n1." if case.dim == 2 else "")
+    yield f"*STEP, NLGEOM, INC={increments}\n{_CONTROLS}\n*STATIC, DIRECT\n{1 / increments:.12e}, 1.\n*BOUNDARY"
+    yield from (f"{node + 1}, {axis + 1}, {axis + 1}" for node, axis in np.argwhere(case.held))
+    yield "*CLOAD"
+    yield from (f"{node + 1}, {axis + 1}, {case.force[node, axis]:.12e}" for node, axis in np.argwhere(case.force))
+    yield f"*NODE PRINT, NSET=END, FREQUENCY={increments}\nU\n*END STEP\n"
+
+
+def _joined(values: list) -> str:
+    """ccx reads twenty characters of a number."""
+    return ", ".join(f"{value:.12e}" if isinstance(value, float) else str(value) for value in values)
+
+
+if __name__ == "__main__":
+    main(solve)

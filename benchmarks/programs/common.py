@@ -1,0 +1,69 @@
+"""What the programs share: each reads a case, solves it, and prints one line of JSON."""
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from benchmarks.cases import Case
+
+#: The relative residual that is asked of every program, each in its own norm.
+TOLERANCE = 1e-8
+
+#: Equal load increments that are tried one after another until the program converges.
+INCREMENTS = (1, 2, 4, 8, 16)
+
+
+#: What the attempt to solve in so many increments gives: tip [m], iterations, seconds.
+Attempt = tuple[float, int, float]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one run of a program says of itself.
+
+    Attributes:
+        version: of the program.
+        seconds: from the built mesh to equilibrium, wall time.
+        tip: how far the loaded end moves along the load [m].
+        iterations: of Newton, or of what the program does instead.
+        peak_bytes: the largest resident memory of the process.
+        linear_iterations: of conjugate gradients, over all Newton iterations; None for a direct solver.
+        notes: what else should be known.
+    """
+
+    version: str
+    seconds: float
+    tip: float
+    iterations: int
+    peak_bytes: int
+    linear_iterations: int | None = None
+    notes: str = ""
+
+
+def peak_bytes(process: int | str = "self") -> int:
+    """Return the largest resident memory so far of this process or of another [bytes], 0 of one that is gone."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text()
+    except OSError:
+        return 0
+    # Not getrusage: it counts what the parent had when it started the process.
+    return next((int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmHWM")), 0)
+
+
+def main(solve: Callable[[Case], Run]) -> None:
+    """Run `solve` on the case named on the command line and print what it found."""
+    sys.stdout.write(json.dumps(asdict(solve(Case.read(sys.argv[1])))) + "\n")
+
+
+def in_few_increments(attempt: Callable[[int], Attempt | None]) -> tuple[float, int, float, str]:
+    """Return what `attempt` finds in as few equal load increments as it takes, and a note of their number.
+
+    It finds tip, iterations and seconds, or None where it does not converge: only the one that does is timed.
+    """
+    for increments in INCREMENTS:
+        found = attempt(increments)
+        if found is not None:
+            return *found, f"{increments} load steps" if increments > 1 else ""
+    raise SystemExit(f"no equilibrium in {INCREMENTS[-1]} load steps")

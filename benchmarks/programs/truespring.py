@@ -1,0 +1,46 @@
+"""truespring: springs by a rule, or finite elements by a law; `model` is the name of either."""
+
+import sys
+from functools import partial
+from importlib.metadata import version
+
+import truespring as ts
+from benchmarks.cases import WARM_UP, Case, bar
+from benchmarks.programs.common import TOLERANCE, Run, main, peak_bytes
+
+
+def problem_of(case: Case) -> ts.Problem:
+    """Return the case as a problem: the same nodes, the same elements, the same shares of the force."""
+    mesh = ts.Mesh(case.nodes, case.elements, "quadrilateral" if case.dim == 2 else "hexahedron")
+    return ts.Problem(
+        mesh=mesh,
+        material=ts.Material(case.young, case.poisson),
+        section=ts.PlaneStress(1.0) if case.dim == 2 else None,
+        supports=[ts.Fixed("left")],
+        loads=[ts.Force("right", case.force.sum(axis=0).tolist())],
+    )
+
+
+def solve(case: Case, model: str) -> Run:
+    """Solve in one load step, after an untimed solve of a smaller mesh that loads compiled code from its cache."""
+    chosen = ts.Fem(model) if model in ts.LAWS else ts.Springs(model)
+    newton = ts.Newton(load_steps=1, tolerance=TOLERANCE)
+    ts.solve(problem_of(bar(case.dim, "bending", WARM_UP[case.dim])), chosen, newton)
+    path = ts.solve(problem_of(case), chosen, newton)
+    if path.status is not ts.Status.CONVERGED:
+        raise SystemExit(f"{path.status}: {path.status.advice}")
+    cost = getattr(path, "cost", None)
+    notes = [str(getattr(cost, name)) for name in ("newton", "linear") if getattr(cost, name, None)]
+    return Run(
+        version=version("truespring"),
+        seconds=path.seconds,
+        tip=case.tip(path.states[-1].displacement),
+        iterations=path.newton_iterations,
+        peak_bytes=peak_bytes(),
+        linear_iterations=getattr(cost, "cg_iterations", 0) or None,
+        notes=", ".join(notes),
+    )
+
+
+if __name__ == "__main__":
+    main(partial(solve, model=sys.argv[2]))

@@ -1,0 +1,241 @@
+"""Runs: each program on each case in a process of its own, several times, with results kept so that a break costs little."""
+
+import hashlib
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from benchmarks.cases import LADDER, LOADS, SIZES, bar
+from benchmarks.machine import hardware
+
+ROOT = Path(__file__).parent.parent
+CACHE = Path(__file__).parent / ".cache"
+
+#: What a solve may take [s]; larger meshes of that load are then not given to the program.
+LIMIT = 180.0
+
+# Failing attempts, warming up and reading come on top of what is timed.
+_PROCESS_LIMIT = 3 * LIMIT
+
+# Solves shorter than this [s] are run REPEATS times, for their median.
+_SHORT, REPEATS = 60.0, 3
+
+
+@dataclass(frozen=True)
+class Program:
+    """What is run.
+
+    Attributes:
+        label: how tables and the figure call it.
+        law: what it takes matter for.
+        module: of benchmarks.programs.
+        arguments: after the case.
+        dims: of the bodies whose SIZES it is run on.
+        ladder: of the bodies whose LADDER it is run on, bending only.
+        peer: whether it lives in the environment of the peers.
+    """
+
+    label: str
+    law: str
+    module: str
+    arguments: tuple[str, ...] = ()
+    dims: tuple[int, ...] = (2, 3)
+    ladder: tuple[int, ...] = (2, 3)
+    peer: bool = False
+
+
+PROGRAMS = {
+    "lloyd": Program("truespring, springs (lloyd)", "springs", "truespring", ("lloyd",), (2,), (2,)),
+    "isotropic": Program("truespring, springs (isotropic)", "springs", "truespring", ("isotropic",), (3,), (2, 3)),
+    "biquadratic": Program("truespring, springs (biquadratic)", "St. Venant-Kirchhoff", "truespring", ("biquadratic",)),
+    "fem-svk": Program(
+        "truespring, FEM (St. Venant-Kirchhoff)", "St. Venant-Kirchhoff", "truespring", ("saint-venant-kirchhoff",)
+    ),
+    "fem-nh": Program("truespring, FEM (neo-Hookean)", "neo-Hookean", "truespring", ("neo-hookean",)),
+    "calculix": Program("CalculiX", "St. Venant-Kirchhoff", "calculix", peer=True),
+    "felupe": Program("FElupe", "neo-Hookean", "felupe", peer=True),
+    "skfem": Program("scikit-fem", "St. Venant-Kirchhoff", "skfem", peer=True),
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One program on one mesh."""
+
+    program: str
+    dim: int
+    load: str
+    depth: int
+
+    @property
+    def n_nodes(self) -> int:
+        """Of the mesh of `cases.bar`."""
+        return (4 * self.depth + 1) * (self.depth + 1) ** (self.dim - 1)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What all runs of a job gave: `seconds` has one value a run, and none where `failure` says why.
+
+    The other values are of the last run, `peak_bytes` over that of an empty Python process.
+    """
+
+    program: str
+    dim: int
+    load: str
+    depth: int
+    n_nodes: int
+    seconds: tuple[float, ...] = ()
+    tip: float = float("nan")
+    iterations: int = 0
+    linear_iterations: int | None = None
+    peak_bytes: int = 0
+    version: str = ""
+    notes: str = ""
+    failure: str = ""
+
+    @property
+    def median(self) -> float:
+        """Of the seconds."""
+        return statistics.median(self.seconds)
+
+
+def jobs(sizes: dict[int, tuple[int, ...]], ladder: dict[int, tuple[int, ...]]) -> Iterator[Job]:
+    """Yield all jobs; those of one program and load from small to large."""
+    for dim, load in LOADS:
+        for name, program in PROGRAMS.items():
+            rungs = ladder[dim] if load == "bending" and dim in program.ladder else ()
+            wanted = sizes[dim] if dim in program.dims else ()
+            yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *wanted}))
+
+
+def measure_all(wanted: Iterable[Job], repeats: int = REPEATS) -> list[Measured]:
+    """Run jobs, from the cache where they were run before; leave out what would take longer than LIMIT."""
+    empty, last, found = empty_process(), None, []
+    for job in wanted:
+        same = last is not None and (last.program, last.dim, last.load) == (job.program, job.dim, job.load)
+        reason = too_slow(last, job) if same else ""
+        last = _nothing(job, reason) if reason else measure(job, repeats)
+        found.append(replace(last, peak_bytes=max(0, last.peak_bytes - empty)))
+        told = f"{last.median:.3g} s, tip {last.tip:.7g} m {last.notes}" if last.seconds else last.failure
+        sys.stderr.write(f"{job.program:12} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {told}\n")
+    return found
+
+
+def too_slow(last: Measured, job: Job) -> str:
+    """Return why a job is left out after what a smaller mesh took, if it is: the time at best grows with the nodes."""
+    if not last.seconds:
+        return last.failure
+    if last.median * job.n_nodes / last.n_nodes > LIMIT:
+        return f"would take longer than {LIMIT:g} s: {last.median:.0f} s at {last.n_nodes:,} nodes"
+    return ""
+
+
+def measure(job: Job, repeats: int) -> Measured:
+    """Run a job once, and again where that was short."""
+    runs = []
+    while len(runs) < repeats and (not runs or runs[0]["seconds"] < _SHORT):
+        run = cached(job, len(runs))
+        if "failure" in run:
+            return _nothing(job, run["failure"])
+        runs.append(run)
+    seconds = tuple(run["seconds"] for run in runs)
+    return Measured(**asdict(job), n_nodes=job.n_nodes, **runs[-1] | {"seconds": seconds})
+
+
+def _nothing(job: Job, failure: str) -> Measured:
+    return Measured(**asdict(job), n_nodes=job.n_nodes, failure=failure)
+
+
+def cached(job: Job, repeat: int) -> dict:
+    """Return one run of a job, from the cache if the code and the machine are still the same."""
+    file = CACHE / f"{job.program}-{job.dim}d-{job.load}-{job.depth}-{repeat}-{fingerprint(job.program)}.json"
+    if not file.is_file():
+        run = execute(job)
+        CACHE.mkdir(exist_ok=True)
+        file.write_text(json.dumps(run))
+    return json.loads(file.read_text())
+
+
+def fingerprint(name: str) -> str:
+    """A digest of what a program's times depend on: its code here, the cases, the machine."""
+    program, here = PROGRAMS[name], ROOT / "benchmarks"
+    ours = [] if program.peer else sorted((ROOT / "src" / "truespring").rglob("*.py"))
+    files = [here / "cases.py", here / "programs" / "common.py", here / "programs" / f"{program.module}.py", *ours]
+    files += [here / "peers.txt"] if program.peer else []
+    digest = hashlib.sha256(repr((program, hardware())).encode())
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def execute(job: Job) -> dict:
+    """Run a job in a process of its own; return what it printed, or {"failure": why}."""
+    program = PROGRAMS[job.program]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "case.npz"
+        bar(job.dim, job.load, job.depth).write(file)
+        command = [python(program.peer), "-m", f"benchmarks.programs.{program.module}", str(file), *program.arguments]
+        process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        try:
+            printed, complaint = process.communicate(timeout=_PROCESS_LIMIT)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, 9)
+            process.communicate()
+            return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
+    if process.returncode:
+        return {"failure": (complaint.strip().splitlines() or ["no message"])[-1]}
+    return json.loads(printed.splitlines()[-1])
+
+
+def python(peer: bool) -> str:
+    """Return the interpreter of the peers' environment or of this one."""
+    return str(ROOT / ".venv-peers" / "bin" / "python") if peer else sys.executable
+
+
+def environment() -> dict[str, str]:
+    """Return what processes see: every core, and no choice of kernels made for another program."""
+    unwanted = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "PYTHONPATH")
+    kept = {name: value for name, value in os.environ.items() if name not in unwanted}
+    return kept | {"OMP_NUM_THREADS": str(os.cpu_count())}
+
+
+def empty_process() -> int:
+    """Return the peak memory of a Python process that imports nothing [bytes]."""
+    told = "print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')).split()[1])"
+    done = subprocess.run([sys.executable, "-I", "-S", "-c", told], capture_output=True, text=True, check=False)
+    return int(done.stdout or 0) * 1024
+
+
+def command_line(repeats: int = REPEATS) -> dict[str, float]:
+    """Return the wall times [s] of two commands, from a warm cache: medians."""
+    program = str(Path(sys.executable).parent / "truespring")
+    study = str(ROOT / "examples" / "bending.toml")
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, command in {
+            "truespring verify examples/bending.toml": [program, "verify", study, "--quiet", "--out", folder],
+            "truespring --help": [program, "--help"],
+        }.items():
+            times = []
+            for _ in range(1 + repeats):
+                started = time.perf_counter()
+                subprocess.run(command, cwd=ROOT, env=environment(), capture_output=True, check=True)
+                times.append(time.perf_counter() - started)
+            found[name] = statistics.median(times[1:])
+    return found

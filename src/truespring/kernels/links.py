@@ -1,0 +1,122 @@
+"""Loops over elements and their links, one for every pair of an element's nodes, whose squared lengths are coupled.
+
+`number` tells the link of each pair of an element's nodes, shape (k, k).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from truespring.kernels.small import dot, minus, row
+from truespring.kernels.sums import add_times
+from truespring.kernels.threads import kernel
+
+
+@kernel
+def squared_lengths(first: int, last: int, x: Any, elements: Any, number: Any, squared: Any, zero: Any) -> None:
+    """The squared length of each link, shape (n_elements, links)."""
+    for e in range(first, last):
+        for a in range(elements.shape[1]):
+            for b in range(a):
+                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
+                squared[e, number[a, b]] = dot(d, d)
+
+
+@kernel
+def changes(first: int, last: int, x: Any, rest: Any, elements: Any, number: Any, change: Any, zero: Any) -> None:
+    """The change of each link's squared length from `rest` to `x`."""
+    for e in range(first, last):
+        for a in range(elements.shape[1]):
+            for b in range(a):
+                i, j = elements[e, a], elements[e, b]
+                d = minus(row(x, i, zero), row(x, j, zero))
+                D = minus(row(rest, i, zero), row(rest, j, zero))
+                change[e, number[a, b]] = dot(d, d) - dot(D, D)
+
+
+@kernel
+def carry_on(first: int, last: int, x: Any, step: Any, elements: Any, number: Any, change: Any, zero: Any) -> None:
+    """Add to it what is linear in a further step."""
+    for e in range(first, last):
+        for a in range(elements.shape[1]):
+            for b in range(a):
+                i, j = elements[e, a], elements[e, b]
+                d = minus(row(x, i, zero), row(x, j, zero))
+                change[e, number[a, b]] += 2 * dot(d, minus(row(step, i, zero), row(step, j, zero)))
+
+
+@kernel
+def couple(first: int, last: int, coupling: Any, change: Any, pull: Any) -> None:
+    """2 M q of each element; there is one symmetric M, or each has its own."""
+    for e in range(first, last):
+        M = coupling[e % len(coupling)]
+        pull[e] = 0.0
+        for t in range(len(M)):
+            for s in range(len(M)):
+                pull[e, s] += 2 * change[e, t] * M[t, s]
+
+
+@kernel
+def forces(first: int, last: int, x: Any, elements: Any, number: Any, pull: Any, force: Any, zero: Any) -> None:
+    """The derivative of each element's energy by its nodes, shape (n_elements, k * dim)."""
+    dim, k = len(zero), elements.shape[1]
+    for e in range(first, last):
+        force[e] = 0.0
+        for a in range(k):
+            for b in range(a):
+                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
+                for c in range(dim):
+                    force[e, a * dim + c] += 2 * pull[e, number[a, b]] * d[c]
+                    force[e, b * dim + c] -= 2 * pull[e, number[a, b]] * d[c]
+
+
+@kernel
+def stiffnesses(
+    first: int,
+    last: int,
+    x: Any,
+    elements: Any,
+    number: Any,
+    coupling: Any,
+    pull: Any,
+    blocks: Any,
+    zero: Any,
+) -> None:
+    """Write J^T 2M J, J the derivative of the squared lengths, and the geometric part, shape (n, k * dim, k * dim).
+
+    By each link J has but the vectors to both its nodes, so that M J is summed over the links at each node, and
+    J^T (M J) likewise.
+    """
+    dim, k = len(zero), elements.shape[1]
+    vectors, coupled = np.empty((k, k, dim)), np.empty((coupling.shape[1], k, dim))
+    for e in range(first, last):
+        M = coupling[e % len(coupling)]
+        for a in range(k):
+            for b in range(k):
+                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
+                for c in range(dim):
+                    vectors[a, b, c] = d[c]
+        for s in range(len(M)):
+            for b in range(k):
+                total = zero
+                for other in range(k):
+                    if other != b:
+                        total = add_times(total, 8 * M[s, number[b, other]], vectors, b, other)
+                for c in range(dim):
+                    coupled[s, b, c] = total[c]
+        for a in range(k):
+            for b in range(a, k):
+                for i in range(dim):
+                    total = zero
+                    for other in range(k):
+                        if other != a:
+                            total = add_times(total, vectors[a, other, i], coupled, number[a, other], b)
+                    for j in range(dim):
+                        blocks[e, a * dim + i, b * dim + j] = total[j]
+                        blocks[e, b * dim + j, a * dim + i] = total[j]
+        for a in range(k):
+            for b in range(k):
+                if a != b:
+                    for i in range(dim):
+                        blocks[e, a * dim + i, a * dim + i] += 2 * pull[e, number[a, b]]
+                        blocks[e, a * dim + i, b * dim + i] -= 2 * pull[e, number[a, b]]

@@ -1,0 +1,412 @@
+"""Loops that build and use the levels of smoothed aggregation.
+
+Vanek, Mandel, Brezina, Computing 56 (1996). Rows of a prolongation are nodes, its columns aggregates, its
+blocks of shape (directions, modes).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from truespring.kernels.small import plus, row, times, times_transposed
+from truespring.kernels.threads import kernel
+
+
+@kernel
+def strong(first: int, last: int, starts: Any, columns: Any, diagonal: Any, data: Any, share: float, keep: Any) -> None:
+    """Mark blocks whose size is at least `share` of the geometric mean of the diagonal ones'."""
+    size = data.shape[1]
+    for i in range(first, last):
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[p]
+            block, here, there = 0.0, 0.0, 0.0
+            for c in range(size):
+                for e in range(size):
+                    block += data[p, c, e] ** 2
+                    here += data[diagonal[i], c, e] ** 2
+                    there += data[diagonal[j], c, e] ** 2
+            keep[p] = block * block >= share**4 * here * there and block > 0.0
+
+
+@kernel
+def tentative(
+    first: int, last: int, member_starts: Any, members: Any, modes: Any, basis: Any, coarse_modes: Any
+) -> None:
+    """Orthonormal modes within each aggregate, and the modes in terms of these: modes = basis coarse_modes."""
+    size, n_modes = modes.shape[1], modes.shape[2]
+    for aggregate in range(first, last):
+        begin, end = member_starts[aggregate], member_starts[aggregate + 1]
+        for k in range(n_modes):
+            whole = 0.0
+            for q in range(begin, end):
+                for c in range(size):
+                    value = modes[members[q], c, k]
+                    basis[members[q], c, k] = value
+                    whole += value * value
+            for _ in range(2):  # twice is enough
+                for m in range(k):
+                    s = 0.0
+                    for q in range(begin, end):
+                        for c in range(size):
+                            s += basis[members[q], c, m] * basis[members[q], c, k]
+                    coarse_modes[aggregate, m, k] += s
+                    for q in range(begin, end):
+                        for c in range(size):
+                            basis[members[q], c, k] -= s * basis[members[q], c, m]
+            left = 0.0
+            for q in range(begin, end):
+                for c in range(size):
+                    left += basis[members[q], c, k] ** 2
+            # A mode that the aggregate cannot tell from the former ones has no column: a node does not turn.
+            scale = 1.0 / np.sqrt(left) if left > 1e-12 * whole else 0.0
+            coarse_modes[aggregate, k, k] = np.sqrt(left) if scale > 0.0 else 0.0
+            for q in range(begin, end):
+                for c in range(size):
+                    basis[members[q], c, k] *= scale
+
+
+@kernel
+def count_smoothed(
+    first: int, last: int, starts: Any, columns: Any, aggregate: Any, n_aggregates: int, counts: Any
+) -> None:
+    """Count the aggregates that the neighbours of each node belong to."""
+    seen = np.full(n_aggregates, -1, np.int32)
+    for i in range(first, last):
+        count = 0
+        for p in range(starts[i], starts[i + 1]):
+            c = aggregate[columns[p]]
+            if c >= 0 and seen[c] != i:
+                seen[c] = i
+                count += 1
+        counts[i] = count
+
+
+@kernel
+def smooth(
+    first: int,
+    last: int,
+    starts: Any,
+    columns: Any,
+    off: Any,
+    rest: Any,
+    inverse: Any,
+    aggregate: Any,
+    basis: Any,
+    n_aggregates: int,
+    omega: float,
+    p_starts: Any,
+    p_columns: Any,
+    p_data: Any,
+) -> None:
+    """Write the rows of P = (I - omega D^-1 A) T, T the basis."""
+    size, n_modes = basis.shape[1], basis.shape[2]
+    where = np.full(n_aggregates, -1, np.int32)
+    image = np.empty((size, n_modes))
+    for i in range(first, last):
+        begin = p_starts[i]
+        end = begin
+        for p in range(starts[i], starts[i + 1]):
+            c = aggregate[columns[p]]
+            if c >= 0 and (where[c] < begin or where[c] >= end or p_columns[where[c]] != c):
+                place = end
+                while place > begin and p_columns[place - 1] > c:
+                    p_columns[place] = p_columns[place - 1]
+                    where[p_columns[place]] = place
+                    place -= 1
+                p_columns[place] = c
+                where[c] = place
+                end += 1
+        for q in range(begin, end):
+            for r in range(size):
+                for k in range(n_modes):
+                    p_data[q, r, k] = 0.0
+        # A T of the row: rest and the sum of the other blocks make the diagonal one.
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[p]
+            here = aggregate[i]
+            there = aggregate[j]
+            for r in range(size):
+                for s in range(size):
+                    a = off[p, r, s]
+                    if there >= 0:
+                        for k in range(n_modes):
+                            p_data[where[there], r, k] += a * basis[j, s, k]
+                    if here >= 0:
+                        for k in range(n_modes):
+                            p_data[where[here], r, k] -= a * basis[i, s, k]
+        if aggregate[i] >= 0:
+            q = where[aggregate[i]]
+            for r in range(size):
+                for s in range(size):
+                    for k in range(n_modes):
+                        p_data[q, r, k] += rest[i, r, s] * basis[i, s, k]
+        for q in range(begin, end):
+            for r in range(size):
+                for k in range(n_modes):
+                    value = 0.0
+                    for s in range(size):
+                        value += inverse[i, r, s] * p_data[q, s, k]
+                    image[r, k] = -omega * value
+                    if p_columns[q] == aggregate[i]:
+                        image[r, k] += basis[i, r, k]
+            for r in range(size):
+                for k in range(n_modes):
+                    p_data[q, r, k] = image[r, k]
+
+
+@kernel
+def transpose(p_starts: Any, p_columns: Any, p_data: Any, n_aggregates: int) -> Any:
+    """The rows of P^T: starts, the node of each block, and the transposed blocks in single precision."""
+    starts = np.zeros(n_aggregates + 1, np.int32)
+    for q in range(len(p_columns)):
+        starts[p_columns[q] + 1] += 1
+    for c in range(n_aggregates):
+        starts[c + 1] += starts[c]
+    node = np.empty(len(p_columns), np.int32)
+    data = np.empty((len(p_columns), p_data.shape[2], p_data.shape[1]), np.float32)
+    filled = starts[:-1].copy()
+    for i in range(len(p_starts) - 1):
+        for q in range(p_starts[i], p_starts[i + 1]):
+            at = filled[p_columns[q]]
+            node[at] = i
+            for r in range(p_data.shape[1]):
+                for k in range(p_data.shape[2]):
+                    data[at, k, r] = p_data[q, r, k]
+            filled[p_columns[q]] += 1
+    return starts, node, data
+
+
+@kernel
+def count_product(
+    first: int, last: int, a_starts: Any, a_columns: Any, b_starts: Any, b_columns: Any, n: int, counts: Any
+) -> None:
+    """Count the blocks in each row of a product of two sparse matrices, the second of `n` columns."""
+    seen = np.full(n, -1, np.int32)
+    for i in range(first, last):
+        count = 0
+        for p in range(a_starts[i], a_starts[i + 1]):
+            j = a_columns[p]
+            for q in range(b_starts[j], b_starts[j + 1]):
+                c = b_columns[q]
+                if seen[c] != i:
+                    seen[c] = i
+                    count += 1
+        counts[i] = count
+
+
+@kernel
+def fill_product(
+    first: int,
+    last: int,
+    a_starts: Any,
+    a_columns: Any,
+    b_starts: Any,
+    b_columns: Any,
+    n: int,
+    starts: Any,
+    columns: Any,
+) -> None:
+    """Write the columns of these rows, ascending."""
+    seen = np.full(n, -1, np.int32)
+    for i in range(first, last):
+        begin = starts[i]
+        end = begin
+        for p in range(a_starts[i], a_starts[i + 1]):
+            j = a_columns[p]
+            for q in range(b_starts[j], b_starts[j + 1]):
+                c = b_columns[q]
+                if seen[c] != i:
+                    seen[c] = i
+                    place = end
+                    while place > begin and columns[place - 1] > c:
+                        columns[place] = columns[place - 1]
+                        place -= 1
+                    columns[place] = c
+                    end += 1
+
+
+@kernel
+def multiply(
+    first: int,
+    last: int,
+    starts: Any,
+    columns: Any,
+    off: Any,
+    rest: Any,
+    p_starts: Any,
+    p_columns: Any,
+    p_data: Any,
+    n: int,
+    ap_starts: Any,
+    ap_columns: Any,
+    ap_data: Any,
+) -> None:
+    """Rows of A P; the diagonal of A is rest less the row's other blocks."""
+    size, n_modes = p_data.shape[1], p_data.shape[2]
+    where = np.empty(n, np.int32)
+    own = np.empty((size, size))
+    for i in range(first, last):
+        for q in range(ap_starts[i], ap_starts[i + 1]):
+            where[ap_columns[q]] = q
+            for r in range(size):
+                for k in range(n_modes):
+                    ap_data[q, r, k] = 0.0
+        for r in range(size):
+            for s in range(size):
+                own[r, s] = rest[i, r, s]
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[p]
+            for r in range(size):
+                for s in range(size):
+                    own[r, s] -= off[p, r, s]
+            if j != i:
+                for t in range(p_starts[j], p_starts[j + 1]):
+                    q = where[p_columns[t]]
+                    for r in range(size):
+                        for s in range(size):
+                            a = np.float64(off[p, r, s])
+                            for k in range(n_modes):
+                                ap_data[q, r, k] += a * p_data[t, s, k]
+        for t in range(p_starts[i], p_starts[i + 1]):
+            q = where[p_columns[t]]
+            for r in range(size):
+                for s in range(size):
+                    a = own[r, s]
+                    for k in range(n_modes):
+                        ap_data[q, r, k] += a * p_data[t, s, k]
+
+
+@kernel
+def multiply_transposed(
+    first: int,
+    last: int,
+    r_starts: Any,
+    r_node: Any,
+    r_data: Any,
+    ap_starts: Any,
+    ap_columns: Any,
+    ap_data: Any,
+    starts: Any,
+    columns: Any,
+    n: int,
+    data: Any,
+) -> None:
+    """Rows of P^T (A P)."""
+    n_modes, size = r_data.shape[1], r_data.shape[2]
+    where = np.empty(n, np.int32)
+    for c in range(first, last):
+        for q in range(starts[c], starts[c + 1]):
+            where[columns[q]] = q
+            for k in range(n_modes):
+                for m in range(n_modes):
+                    data[q, k, m] = 0.0
+        for p in range(r_starts[c], r_starts[c + 1]):
+            i = r_node[p]
+            for u in range(ap_starts[i], ap_starts[i + 1]):
+                q = where[ap_columns[u]]
+                for r in range(size):
+                    for k in range(n_modes):
+                        a = np.float64(r_data[p, k, r])
+                        for m in range(n_modes):
+                            data[q, k, m] += a * ap_data[u, r, m]
+
+
+@kernel
+def restrict(
+    first: int, last: int, r_starts: Any, r_node: Any, r_data: Any, fine: Any, coarse: Any, zero: Any, none: Any
+) -> None:
+    """P^T fine; `none` is a fine row of zeros, `zero` a coarse one."""
+    for c in range(first, last):
+        s = zero
+        for p in range(r_starts[c], r_starts[c + 1]):
+            s = plus(s, times(r_data, p, row(fine, r_node[p], none), zero))
+        for k in range(len(zero)):
+            coarse[c, k] = s[k]
+
+
+@kernel
+def prolong(
+    first: int, last: int, p_starts: Any, p_columns: Any, p_data: Any, coarse: Any, fine: Any, zero: Any, none: Any
+) -> None:
+    """Add P coarse."""
+    for i in range(first, last):
+        s = none
+        for p in range(p_starts[i], p_starts[i + 1]):
+            s = plus(s, times(p_data, p, row(coarse, p_columns[p], zero), none))
+        for c in range(len(none)):
+            fine[i, c] += s[c]
+
+
+@kernel
+def turn_back(first: int, last: int, turns: Any, x: Any, zero: Any) -> None:
+    """x = Q^T x at each node."""
+    for i in range(first, last):
+        s = times_transposed(turns, i, row(x, i, zero), zero)
+        for c in range(len(zero)):
+            x[i, c] = s[c]
+
+
+@kernel
+def add_turned(first: int, last: int, turns: Any, x: Any, result: Any, zero: Any) -> None:
+    """Add Q x."""
+    for i in range(first, last):
+        s = times(turns, i, row(x, i, zero), zero)
+        for c in range(len(zero)):
+            result[i, c] += s[c]
+
+
+@kernel
+def rotations(first: int, last: int, starts: Any, columns: Any, rest: Any, x: Any, held: Any, turns: Any) -> None:
+    """The rotation Q of each node: the orthogonal factor of the sum of d D^T over the nodes joined to it.
+
+    D is the vector to the other node at rest, d now. In three dimensions by Newton's iteration for the polar
+    factor (Higham 1986). Rows of held directions are zero: what is brought up from coarser levels does not move them.
+    """
+    dim = x.shape[1]
+    F = np.empty((dim, dim))
+    G = np.empty((dim, dim))
+    for i in range(first, last):
+        F[:] = 0.0
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[p]
+            for c in range(dim):
+                for e in range(dim):
+                    F[c, e] += (x[j, c] - x[i, c]) * (rest[j, e] - rest[i, e])
+        if dim == 2:
+            cosine, sine = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
+            size = np.sqrt(cosine * cosine + sine * sine)
+            if size > 0.0:
+                cosine, sine = cosine / size, sine / size
+            else:
+                cosine, sine = 1.0, 0.0
+            F[0, 0], F[0, 1], F[1, 0], F[1, 1] = cosine, -sine, sine, cosine
+        else:
+            for _ in range(20):
+                for c in range(3):
+                    for e in range(3):
+                        a, b = (c + 1) % 3, (c + 2) % 3
+                        u, v = (e + 1) % 3, (e + 2) % 3
+                        G[c, e] = F[a, u] * F[b, v] - F[a, v] * F[b, u]
+                det = F[0, 0] * G[0, 0] + F[0, 1] * G[0, 1] + F[0, 2] * G[0, 2]
+                size, other = 0.0, 0.0
+                for c in range(3):
+                    for e in range(3):
+                        size += F[c, e] ** 2
+                        other += G[c, e] ** 2
+                if not det > 1e-9 * size**1.5:  # flat or turned inside out: no rotation to be had
+                    for c in range(3):
+                        for e in range(3):
+                            F[c, e] = 1.0 if c == e else 0.0
+                    break
+                scale = np.sqrt(np.sqrt(other / size) / det)
+                change = 0.0
+                for c in range(3):
+                    for e in range(3):
+                        value = 0.5 * (scale * F[c, e] + G[c, e] / (scale * det))
+                        change += (value - F[c, e]) ** 2
+                        F[c, e] = value
+                if change < 1e-8:
+                    break
+        for c in range(dim):
+            for e in range(dim):
+                turns[i, c, e] = 0.0 if held[i, c] else F[c, e]

@@ -1,0 +1,132 @@
+"""Vectors of two, three or six numbers as tuples: compiled code keeps them in registers.
+
+The length is known from the type, so that one kernel serves every dimension: it is given a `zero`
+such as (0.0, 0.0) and compiled once for each kind. The loops of numba over short arrays would go
+through memory instead.
+"""
+
+from numba.extending import overload
+
+
+def row(x, i, zero):
+    """Row i of an array of shape (n, len(zero))."""
+
+
+@overload(row)
+def _row(x, i, zero):
+    return {
+        2: lambda x, i, zero: (x[i, 0], x[i, 1]),
+        3: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2]),
+        6: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4], x[i, 5]),
+    }[len(zero)]
+
+
+def plus(a, b):
+    """a + b."""
+
+
+@overload(plus)
+def _plus(a, b):
+    return {
+        2: lambda a, b: (a[0] + b[0], a[1] + b[1]),
+        3: lambda a, b: (a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        6: lambda a, b: (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]),
+    }[len(a)]
+
+
+def minus(a, b):
+    """a - b."""
+
+
+@overload(minus)
+def _minus(a, b):
+    return {
+        2: lambda a, b: (a[0] - b[0], a[1] - b[1]),
+        3: lambda a, b: (a[0] - b[0], a[1] - b[1], a[2] - b[2]),
+        6: lambda a, b: (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5]),
+    }[len(a)]
+
+
+def dot(a, b):
+    """The scalar product of a and b."""
+
+
+@overload(dot)
+def _dot(a, b):
+    return {
+        2: lambda a, b: a[0] * b[0] + a[1] * b[1],
+        3: lambda a, b: a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
+        6: lambda a, b: (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5]),
+    }[len(a)]
+
+
+def along(blocks, p, i, v):
+    """Row i of block p times v."""
+
+
+@overload(along)
+def _along(blocks, p, i, v):
+    return {
+        2: lambda blocks, p, i, v: blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1],
+        3: lambda blocks, p, i, v: blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1] + blocks[p, i, 2] * v[2],
+        6: lambda blocks, p, i, v: (
+            (blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1] + blocks[p, i, 2] * v[2])
+            + (blocks[p, i, 3] * v[3] + blocks[p, i, 4] * v[4] + blocks[p, i, 5] * v[5])
+        ),
+    }[len(v)]
+
+
+def across(blocks, p, j, v):
+    """Column j of block p times v."""
+
+
+@overload(across)
+def _across(blocks, p, j, v):
+    return {
+        2: lambda blocks, p, j, v: blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1],
+        3: lambda blocks, p, j, v: blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1] + blocks[p, 2, j] * v[2],
+        6: lambda blocks, p, j, v: (
+            (blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1] + blocks[p, 2, j] * v[2])
+            + (blocks[p, 3, j] * v[3] + blocks[p, 4, j] * v[4] + blocks[p, 5, j] * v[5])
+        ),
+    }[len(v)]
+
+
+def times(blocks, p, v, zero):
+    """Block p times v, as long as `zero`."""
+
+
+@overload(times)
+def _times(blocks, p, v, zero):
+    return {
+        2: lambda blocks, p, v, zero: (along(blocks, p, 0, v), along(blocks, p, 1, v)),
+        3: lambda blocks, p, v, zero: (along(blocks, p, 0, v), along(blocks, p, 1, v), along(blocks, p, 2, v)),
+        6: lambda blocks, p, v, zero: (
+            along(blocks, p, 0, v),
+            along(blocks, p, 1, v),
+            along(blocks, p, 2, v),
+            along(blocks, p, 3, v),
+            along(blocks, p, 4, v),
+            along(blocks, p, 5, v),
+        ),
+    }[len(zero)]
+
+
+def times_transposed(blocks, p, v, zero):
+    """The transposed block p times v, as long as `zero`."""
+
+
+@overload(times_transposed)
+def _times_transposed(blocks, p, v, zero):
+    return {
+        2: lambda blocks, p, v, zero: (across(blocks, p, 0, v), across(blocks, p, 1, v)),
+        3: lambda blocks, p, v, zero: (across(blocks, p, 0, v), across(blocks, p, 1, v), across(blocks, p, 2, v)),
+        6: lambda blocks, p, v, zero: (
+            across(blocks, p, 0, v),
+            across(blocks, p, 1, v),
+            across(blocks, p, 2, v),
+            across(blocks, p, 3, v),
+            across(blocks, p, 4, v),
+            across(blocks, p, 5, v),
+        ),
+    }[len(zero)]

@@ -1,0 +1,78 @@
+"""Running kernels on several threads, and what compiling them costs."""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba.core import event
+
+#: Flags under which sums stay fast and stay the same: `fastmath=True` would reorder them, which is slower here.
+FASTMATH = {"contract", "nsz", "arcp"}
+
+#: How every kernel is compiled: serially, released from the interpreter's lock, kept on disk.
+kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(nogil=True, cache=True, fastmath=FASTMATH)
+
+# Pieces smaller than so many rows, springs or elements are not worth the hand-over to another thread.
+_SMALLEST_PIECE = 4000
+
+Array = TypeVar("Array", bound=np.ndarray[Any, Any])
+
+_chosen: int | None = None
+
+
+def n_threads() -> int:
+    """Return how many threads kernels take: as set, else the cores that this process may use."""
+    if _chosen is not None:
+        return _chosen
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def set_threads(count: int | None) -> None:
+    """Set how many threads kernels take; None goes back to all cores."""
+    global _chosen
+    _chosen = count
+
+
+def pieces(n: int, smallest: int = _SMALLEST_PIECE) -> list[tuple[int, int]]:
+    """Cut the range 0..n into at most one piece a thread, none smaller than `smallest` but the only one."""
+    count = max(1, min(n_threads(), n // max(smallest, 1)))
+    bounds = [n * piece // count for piece in range(count + 1)]
+    return list(pairwise(bounds))
+
+
+def run(function: Callable[..., Any], n: int, *arguments: Any, smallest: int = _SMALLEST_PIECE) -> list[Any]:
+    """Call function(first, last, *arguments) on all pieces of 0..n and return what each returned, in order."""
+    (first, *others) = pieces(n, smallest)
+    if not others:
+        return [function(*first, *arguments)]
+    started = [_pool(len(others)).submit(function, *piece, *arguments) for piece in others]
+    return [function(*first, *arguments), *(one.result() for one in started)]
+
+
+def writable(array: Array) -> Array:
+    """Return a contiguous array that is not frozen: kernels are compiled anew for frozen ones."""
+    writable: Array = np.require(array, requirements=["C", "W"])
+    return writable
+
+
+@lru_cache(maxsize=1)
+def _pool(count: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(count, thread_name_prefix="truespring")
+
+
+@contextmanager
+def compiling() -> Iterator[Callable[[], float]]:
+    """Yield a function that tells the seconds spent on compiling kernels so far within the block."""
+    spent = [0.0]
+
+    def add(duration: float) -> None:
+        spent[0] += duration
+
+    with event.install_timer("numba:compile", add):
+        yield lambda: spent[0]

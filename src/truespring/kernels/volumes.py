@@ -1,0 +1,143 @@
+"""Loops over elements whose volume is a weighted sum of determinants over their simplices.
+
+The determinant is that of the edges which leave a simplex' first node; of a triangle, of its two
+edges and the unit vector across the plane. Its second derivative by two nodes a, b takes v to v x w,
+w that unit vector, or of a tetrahedron abcd the edge d - c.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from truespring.kernels.small import dot, minus
+from truespring.kernels.threads import kernel
+
+# Pairs of a triangle's nodes; pairs of a tetrahedron's, each before the opposite one, all four in even permutation.
+_CYCLE = ((0, 1), (1, 2), (2, 0))
+_OPPOSITE = ((0, 1, 2, 3), (0, 2, 3, 1), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 2, 0), (2, 3, 0, 1))
+
+
+def _place(x, i, zero):
+    """Row i of an array of shape (n, len(zero)), in space."""
+
+
+@overload(_place, inline="always")
+def _place_in_space(x, i, zero):
+    return {2: lambda x, i, zero: (x[i, 0], x[i, 1], 0.0), 3: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2])}[len(zero)]
+
+
+@kernel
+def _cross(a: Any, b: Any) -> Any:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def _edges(x: Any, nodes: Any, simplex: Any, zero: Any) -> Any:
+    """The edges that leave a simplex' first node."""
+    o = _place(x, nodes[simplex[0]], zero)
+    first = minus(_place(x, nodes[simplex[1]], zero), o)
+    second = minus(_place(x, nodes[simplex[2]], zero), o)
+    third = minus(_place(x, nodes[simplex[-1]], zero), o) if len(zero) == 3 else (0.0, 0.0, 1.0)
+    return first, second, third
+
+
+@kernel
+def _slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero: Any) -> None:
+    """The derivative of an element's volume by its nodes, shape (k * dim,)."""
+    dim = len(zero)
+    slope[:] = 0.0
+    for simplex in simplices:
+        first, second, third = _edges(x, nodes, simplex, zero)
+        by_edge = _cross(second, third), _cross(third, first), _cross(first, second)
+        for place in range(dim):
+            for c in range(dim):
+                slope[simplex[place + 1] * dim + c] += weight * by_edge[place][c]
+                slope[simplex[0] * dim + c] -= weight * by_edge[place][c]
+
+
+@kernel
+def volumes(
+    first: int, last: int, x: Any, elements: Any, simplices: Any, weight: float, volume: Any, zero: Any
+) -> None:
+    """The volume of each element."""
+    for e in range(first, last):
+        total = 0.0
+        for simplex in simplices:
+            one, two, three = _edges(x, elements[e], simplex, zero)
+            total += dot(one, _cross(two, three))
+        volume[e] = weight * total
+
+
+@kernel
+def growths(
+    first: int, last: int, x: Any, step: Any, elements: Any, simplices: Any, weight: float, growth: Any, zero: Any
+) -> None:
+    """The change of each element's volume that is linear in a step."""
+    dim, k = len(zero), elements.shape[1]
+    slope = np.empty(k * dim)
+    for e in range(first, last):
+        _slopes(x, elements[e], simplices, weight, slope, zero)
+        growth[e] = 0.0
+        for a in range(k):
+            for c in range(dim):
+                growth[e] += slope[a * dim + c] * step[elements[e, a], c]
+
+
+@kernel
+def forces(
+    first: int, last: int, x: Any, elements: Any, simplices: Any, weight: float, pressure: Any, force: Any, zero: Any
+) -> None:
+    """The pressure times the derivative of each element's volume, shape (n_elements, k * dim)."""
+    for e in range(first, last):
+        _slopes(x, elements[e], simplices, weight, force[e], zero)
+        force[e] *= pressure[e]
+
+
+@kernel
+def _turns(x: Any, nodes: Any, simplices: Any, weight: float, turn: Any, zero: Any) -> None:
+    """The vector w of each pair of an element's nodes, shape (k, k, 3)."""
+    turn[:] = 0.0
+    for simplex in simplices:
+        if len(zero) == 2:
+            for a, b in _CYCLE:
+                turn[simplex[a], simplex[b], 2] += weight
+                turn[simplex[b], simplex[a], 2] -= weight
+        else:
+            for a, b, c, d in _OPPOSITE:
+                w = minus(_place(x, nodes[simplex[d]], zero), _place(x, nodes[simplex[c]], zero))
+                for axis in range(3):
+                    turn[simplex[a], simplex[b], axis] += weight * w[axis]
+                    turn[simplex[b], simplex[a], axis] -= weight * w[axis]
+
+
+@kernel
+def stiffnesses(
+    first: int,
+    last: int,
+    x: Any,
+    elements: Any,
+    simplices: Any,
+    weight: float,
+    stiffness: Any,
+    pressure: Any,
+    blocks: Any,
+    zero: Any,
+) -> None:
+    """Write s s^T times a stiffness, s the derivative of the volume, and the geometric part."""
+    dim, k = len(zero), elements.shape[1]
+    slope, turn = np.empty(k * dim), np.empty((k, k, 3))
+    for e in range(first, last):
+        block = blocks[e]
+        _slopes(x, elements[e], simplices, weight, slope, zero)
+        _turns(x, elements[e], simplices, weight * pressure[e], turn, zero)
+        for i in range(k * dim):
+            for j in range(k * dim):
+                block[i, j] = stiffness[e] * slope[i] * slope[j]
+        for a in range(k):
+            for b in range(k):
+                for c in range(3):
+                    i, j = (c + 1) % 3, (c + 2) % 3
+                    if i < dim and j < dim:
+                        block[a * dim + i, b * dim + j] += turn[a, b, c]
+                        block[a * dim + j, b * dim + i] -= turn[a, b, c]

@@ -1,0 +1,73 @@
+"""Forms: elements that a translation carries into each other, node by node, are of one form."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.mesh.corners import corners_in_slices
+from truespring.mesh.rows import distinct_rows
+
+# Places in elements that differ by less than this share of the mean element's size are the same.
+_SAME_PLACE = 1e-5
+
+# Coordinates that come from the same formula differ by so many roundings of the largest of them, and few more.
+_ROUNDINGS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """The forms of a mesh's elements.
+
+    Attributes:
+        of: the form of each element, shape (n_elements,).
+        first: the first element of each form, shape (n_forms,).
+        size: the longest extent of the elements along an axis, their mean [m].
+        exact: whether elements of one form differ by no more than the rounding of their coordinates.
+    """
+
+    of: Ints
+    first: Ints
+    size: float
+    exact: bool
+
+    @property
+    def few(self) -> bool:
+        """Whether what is computed of one element of each form and handed to the others is exact and saves work."""
+        return self.exact and 4 * len(self.first) <= len(self.of)
+
+
+def find_forms(nodes: Floats, elements: Ints) -> Forms:
+    """Find the forms of elements; nodes [m] of shape (n_nodes, dim)."""
+    n_local, dim = elements.shape[1], nodes.shape[1]
+    total = 0.0
+    for _, at in corners_in_slices(nodes, elements):
+        extents = [np.maximum.reduce(along) - np.minimum.reduce(along) for along in zip(*at, strict=True)]
+        total += float(np.maximum.reduce(extents).sum())
+    size = total / len(elements)
+    columns = np.empty(((n_local - 1) * dim, len(elements)), dtype=np.int64)
+    for part, at in corners_in_slices(nodes, elements):
+        for number in range(len(columns)):
+            node, axis = divmod(number, dim)
+            columns[number, part] = rounded(at[node + 1][axis] - at[0][axis], size)
+    found = distinct_rows(columns)
+    of, first = found.of, found.first
+    del columns, found
+    models = nodes[elements[first]]
+    models = np.ascontiguousarray((models - models[:, :1]).T)  # axes (direction, node, form)
+    apart = 0.0
+    for part, at in corners_in_slices(nodes, elements):
+        for node in range(1, n_local):
+            for axis in range(dim):
+                off = at[node][axis] - at[0][axis]
+                off -= models[axis, node, of[part]]
+                apart = max(apart, -float(off.min()), float(off.max()))
+    return Forms(of, first, size, apart <= _ROUNDINGS * np.finfo(float).eps * float(np.abs(nodes).max()))
+
+
+def rounded(places: Floats, size: float) -> Ints:
+    """Return places [m] in elements of a size [m] as integers, the same for those that count as the same.
+
+    The offset keeps places on the border of two roundings, as halves and quarters lie, on one side.
+    """
+    return np.asarray(np.rint(places / (size * _SAME_PLACE) + 0.3137).astype(np.int64))
