@@ -79,6 +79,12 @@ class Case:
         mu = self.young / (2 * (1 + self.poisson))
         return self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson)), mu
 
+    @property
+    def lam_within(self) -> float:
+        """The first Lamé constant of a quadratic law within the body's dimensions [Pa]: 2 lam mu / (lam + 2 mu) in 2."""
+        lam, mu = self.lame
+        return lam if self.dim == 3 else 2 * lam * mu / (lam + 2 * mu)
+
     def tip(self, displacement: NDArray[np.float64]) -> float:
         """Return how far the loaded end moves along the load [m]: its mean, weighted as the force is shared."""
         total = np.linalg.norm(self.force.sum(axis=0))

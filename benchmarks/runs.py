@@ -60,8 +60,11 @@ PROGRAMS = {
     ),
     "fem-nh": Program("truespring, FEM (neo-Hookean)", "neo-Hookean", "truespring", ("neo-hookean",)),
     "calculix": Program("CalculiX", "St. Venant-Kirchhoff", "calculix", peer=True),
-    "felupe": Program("FElupe", "neo-Hookean", "felupe", peer=True),
-    "skfem": Program("scikit-fem", "St. Venant-Kirchhoff", "skfem", peer=True),
+    "felupe-svk": Program(
+        "FElupe (St. Venant-Kirchhoff)", "St. Venant-Kirchhoff", "felupe", ("saint-venant-kirchhoff",), peer=True
+    ),
+    "felupe-nh": Program("FElupe (neo-Hookean)", "neo-Hookean", "felupe", ("neo-hookean",), peer=True),
+    "skfem": Program("scikit-fem", "neo-Hookean", "skfem", peer=True),
 }
 
 

@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 import truespring as ts
 from tests.closed_forms import difference_errors, observed_orders
+from truespring import potential as potential_module
 from truespring.arrays import Floats
+from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings
+from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings, biquadratic, fem, volume
 from truespring.potential import Potential, Projectable, Refined, Stressed, Stretched
 
 THIN, LONG = ts.PlaneStress(0.4), ts.PlaneStrain(0.4)
@@ -34,6 +36,7 @@ class Case:
         quadratic: the energy is quadratic, and not frame invariant.
         springs: it tells how far its springs are stretched.
         geometric: a stress given to the Hessian makes its geometric part.
+        quadratic_stress: the stress is at most quadratic in the positions.
         cuts: the projection does no more than cut negative eigenvalues off, of springs or of elements.
         barrier: an inverted element has infinite energy.
         mirrored: a mirror image has no energy: only lengths, or C, are seen.
@@ -45,6 +48,7 @@ class Case:
     quadratic: bool = False
     springs: bool = False
     geometric: bool = True
+    quadratic_stress: bool = False
     cuts: bool = True
     barrier: bool = False
     mirrored: bool = False
@@ -95,7 +99,15 @@ def truss() -> ts.SpringNetwork:
 
 def _spring_case(model: ts.Springs, problem: ts.Problem) -> Case:
     plain = not model.volume
-    return Case(lambda: model.potential(problem), model, problem, springs=True, cuts=plain, mirrored=plain)
+    return Case(
+        lambda: model.potential(problem),
+        model,
+        problem,
+        springs=True,
+        quadratic_stress=model.coupled,
+        cuts=plain,
+        mirrored=plain,
+    )
 
 
 def _springs() -> dict[str, Case]:
@@ -147,7 +159,8 @@ def _fem() -> dict[str, Case]:
                         model,
                         problem,
                         quadratic=not entry.finite,
-                        geometric=entry.finite and not mean,
+                        geometric=entry.finite,
+                        quadratic_stress=law == "linear" or (law == "saint-venant-kirchhoff" and not mean),
                         barrier=entry.finite and (entry.barrier or mean),
                         mirrored=entry.finite and not entry.barrier and not mean,
                     )
@@ -419,6 +432,65 @@ def test_a_given_stress_makes_the_geometric_part(name: str) -> None:
             assert np.linalg.eigvalsh(material)[0] >= -1e-12 * size or not CASES[name].springs or below_zero
         else:
             assert np.abs(hessian - material).max() == 0
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_stress_is_carried_on_by_its_derivative(name: str) -> None:
+    """Central differences along a step meet it with order 2, or exactly where the stress is quadratic."""
+    potential = potential_of(name)
+    assert isinstance(potential, Stressed)
+    positions = deformed(potential.nodes, 31)
+    stress = potential.stress(positions)
+    assert potential.extrapolated_stress(positions, 0 * positions) == pytest.approx(stress, rel=1e-13)
+    directions = np.random.default_rng(32).normal(size=(6, *positions.shape))
+    directions /= np.linalg.norm(directions, axis=(1, 2), keepdims=True)
+    slopes = np.array([potential.extrapolated_stress(positions, one) - stress for one in directions])
+
+    def stresses(step: float) -> Floats:
+        return np.array([potential.stress(positions + step * one) for one in directions])
+
+    errors = difference_errors(stresses, slopes, STEPS)
+    if CASES[name].quadratic_stress:
+        assert errors.max() < 1e-11
+    else:
+        assert errors[0] > 1e-8, "there is nothing to see an order in"
+        assert observed_orders(errors, STEPS) == pytest.approx(2, abs=0.1)
+    twice = potential.extrapolated_stress(positions, 2 * directions[0])
+    assert twice - stress == pytest.approx(2 * slopes[0], abs=1e-12 * np.abs(twice).max())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An element at a time on three threads: the same but for the order of sums."""
+    potential = potential_of(name)
+    positions = deformed(potential.nodes, 31)
+
+    def answers() -> list[Floats]:
+        assert isinstance(potential, Projectable) and isinstance(potential, Stressed)
+        stress = potential.stress(positions)
+        return [
+            np.array(potential.energy(positions)),
+            stress,
+            potential.extrapolated_stress(positions, positions),
+            potential.gradient(positions),
+            potential.hessian(positions, 2 * stress).toarray(),
+            potential.projected_hessian(positions).toarray(),
+            *potential.cell_fields(positions).values(),
+        ]
+
+    at_once = answers()
+    for module in (biquadratic, fem, volume):
+        monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
+    monkeypatch.setattr(fem, "_SLICE_POINTS", 1)
+    monkeypatch.setattr(potential_module, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(potential_module, "_SMALLEST_SLAB", 1)
+    set_threads(3)
+    try:
+        one_by_one = answers()
+    finally:
+        set_threads(None)
+    for one, other in zip(one_by_one, at_once, strict=True):
+        assert one == pytest.approx(other, rel=1e-12, abs=1e-13 * np.abs(other).max())
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -23,6 +23,7 @@ from truespring.report.page import render_page, write_page
 from truespring.report.plots import _apart, _uncrossed
 from truespring.report.quantity import given, percent, quantity, round_factor, significant
 from truespring.report.result import Result
+from truespring.report.summary import summary
 from truespring.report.verdict import (
     closest_sentence,
     drive,
@@ -32,6 +33,7 @@ from truespring.report.verdict import (
     verdict,
 )
 from truespring.report.words import draw_words, text_width
+from truespring.solvers import Cost
 
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 LABELS = {"linear": "linear FEM", "svk": "St. Venant-Kirchhoff FEM", "hencky": "Hencky FEM"}
@@ -428,7 +430,7 @@ def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Re
         (-10, 50, ["−10", "0", "10", "20", "30", "40", "50"]),
         (0, 1.02, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]),
         (-0.013, 0.031, ["−0.01", "0.00", "0.01", "0.02", "0.03"]),
-        (0, 0.11, ["0.000", "0.025", "0.050", "0.075", "0.100"]),
+        (0, 0.13, ["0.000", "0.025", "0.050", "0.075", "0.100", "0.125"]),
         (0, 4.1e8, ["0", "1e+08", "2e+08", "3e+08", "4e+08"]),
         (1e-9, 3e-9, ["1e-09", "1.5e-09", "2e-09", "2.5e-09", "3e-09"]),
     ],
@@ -446,11 +448,11 @@ def test_words_stand_where_they_are_put() -> None:
     draw_words(axes, 5, 5, "IHI", 20, align=0.5, upright=True)
     draw_words(figure, 1, 2, " ")
     left, right, up = (words(figure)[text].get_window_extent() for text in ("HIH", "HHI", "IHI"))
-    assert (left.y0 + left.y1) / 2 == pytest.approx(2 * 72) and left.x0 == pytest.approx(72, abs=3)
-    assert (right.y0 + right.y1) / 2 == pytest.approx(1.5 * 72) and right.x1 == pytest.approx(72, abs=1e-6)
-    assert (up.y0 + up.y1) / 2 == pytest.approx(1.5 * 72, abs=2) and (up.x0 + up.x1) / 2 == pytest.approx(2 * 72)
-    assert left.height == pytest.approx(0.729 * 20, abs=0.1) == up.width
-    assert left.width == pytest.approx(72 * text_width("HIH", 20), rel=0.1)
+    assert left.y0 + left.y1 == pytest.approx(288, abs=0.02) and right.y0 + right.y1 == pytest.approx(216, abs=0.02)
+    assert up.x0 + up.x1 == pytest.approx(288, abs=0.02) and up.y0 + up.y1 == pytest.approx(216, abs=3)
+    assert left.x0 == pytest.approx(72, abs=3) and right.x1 == pytest.approx(72)
+    assert left.height == pytest.approx(0.729 * 20, abs=0.01) and up.width == pytest.approx(left.height)
+    assert left.width == pytest.approx(72 * text_width("HIH", 20), abs=5)
     assert len(words(figure)) == 3
 
 
@@ -695,6 +697,21 @@ def test_page_tells_verdict_law_advice_and_how_to_run_it_again(solved: Result) -
     for words in ("Hencky FEM a/b", "truespring verify soft.toml --out out", "scikit-fem", "1 element deep this mesh"):
         assert words in told
     assert all(warning in told for path in solved.paths.values() for warning in path.warnings)
+
+
+def test_page_and_summary_tell_how_a_path_was_solved_and_what_it_took(page_of: Callable[[Result], "Page"]) -> None:
+    problem = stretched()
+    cost = Cost("line search", "multigrid", 21, 120, 3, 10**6, 2, ("mixed integration points were given up",))
+    springs = path(problem, kind="springs", label="springs (lloyd)", cost=cost)
+    once = replace(cost, newton_iterations=1, cg_iterations=0, notes=())
+    found = result(springs, {"linear": path(problem, cost=once), "read": path(problem, label="read")})
+    told = "".join(page_of(found).said)
+    assert "line search, multigrid, 21 Newton iterations, 120 CG iterations; mixed integration points were" in told
+    assert "linear FEM: line search, multigrid, 1 Newton iteration\n" in told and "read: " not in told
+    models = summary(found)["models"]
+    assert models["springs"]["solver"]["memory"] == 10**6 and models["linear"]["solver"]["newton"] == "line search"
+    assert models["read"]["solver"] is None
+    json.dumps(models, allow_nan=False)
 
 
 def test_names_are_tags_wherever_the_label_does_not_begin_with_them(page_of: Callable[[Result], "Page"]) -> None:

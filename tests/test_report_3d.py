@@ -531,8 +531,8 @@ def test_the_bundle_is_that_of_its_source_and_carries_the_licence() -> None:
     text = source.read_text("utf-8")
     said = re.findall(r'"([#\w][^"\n]{5,})"', re.sub(r"^import .*?;$", "", text, flags=re.DOTALL | re.MULTILINE))
     assert len(said) > 20
-    for words in said:
-        assert words in bundle(), f"{words}: build the bundle anew, npm run build in viewer/"
+    for line in said:
+        assert line in bundle(), f"{line}: build the bundle anew, npm run build in viewer/"
     assert "The MIT License" in bundle() and "three.js authors" in bundle()
     assert "</script" not in bundle().lower()
 

@@ -168,12 +168,23 @@ def test_volume_of_deformed_elements(seed: int) -> None:
         potential = ts.Springs(rule, volume=True).potential(problem)
         assert isinstance(potential, VolumeSprings)
         positions = mesh.nodes + generator.uniform(-0.002, 0.002, mesh.nodes.shape)
-        fem = ts.Fem("linear", "linear").potential(problem)
-        F = np.einsum("eai,ajeq->eqij", positions[mesh.elements], fem.shape_gradients)
-        ratio = (np.linalg.det(F) * fem.volumes).sum(axis=1) / fem.volumes.sum(axis=1)
-        energies = potential.term.kappa / 2 * fem.volumes.sum(axis=1) * (ratio - 1) ** 2
+        gradients, volumes = ts.Fem("linear", "linear").potential(problem).quadrature()
+        F = np.einsum("eai,eqaj->eqij", positions[mesh.elements], gradients)
+        ratio = (np.linalg.det(F) * volumes).sum(axis=1) / volumes.sum(axis=1)
+        energies = potential.term.kappa / 2 * volumes.sum(axis=1) * (ratio - 1) ** 2
         assert potential.term.element_energies(positions) == pytest.approx(energies, rel=1e-9, abs=1e-18)
         assert mesh.measures_at(positions) / mesh.measures == pytest.approx(ratio, rel=1e-12)
+
+
+def test_springs_and_term_are_on_the_same_elements() -> None:
+    problem = pulled(SQUARES, 0.4, ts.PlaneStress(0.005), 1.0)
+    right = ts.Springs("isotropic", volume=True)
+    network = ts.Springs("isotropic").potential(problem)
+    fewer = ts.SpringNetwork(SQUARES.nodes, network.springs[1:], network.stiffness[1:])
+    wrong = VolumeSprings(fewer, VolumeTerm(problem, right.kappa(problem)))
+    for hessian in (wrong.hessian, wrong.projected_hessian):
+        with pytest.raises(ts.TruespringError, match="the very nodes that share an element"):
+            hessian(SQUARES.nodes)
 
 
 def test_two_materials_have_terms_of_their_own() -> None:

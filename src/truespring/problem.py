@@ -191,6 +191,24 @@ class Problem:
             )
 
 
+def sample(problem: Problem, elements: Ints) -> Problem:
+    """Return the elements of these numbers alone, each apart from the others, as a problem: held, moved somehow."""
+    mesh, numbers = problem.mesh, problem.material_numbers[elements]
+    nodes = np.arange(mesh.kind.n_nodes * len(elements))
+    corners = mesh.elements[elements]
+    return replace(
+        problem,
+        mesh=Mesh(mesh.nodes[corners.ravel()], nodes.reshape(corners.shape), mesh.element),
+        supports=[Fixed(on=nodes, displacement=(1.0,) * mesh.dim)],  # type: ignore[arg-type]
+        loads=(),
+        regions=[
+            Region(np.flatnonzero(numbers == number), material)  # type: ignore[arg-type]
+            for number, material in enumerate(problem.materials)
+            if (numbers == number).any() and len(problem.materials) > 1
+        ],
+    )
+
+
 def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
     """How `nodes` [m] may move as a rigid body though some of their directions are `held`, None where they can't."""
     if held.all():
@@ -227,18 +245,14 @@ def _n_modes(nodes: Floats) -> int:
     return dim * (dim + 1) // 2
 
 
-def rigid_body_modes(nodes: Floats) -> Floats:
-    """Return translations, then infinitesimal rotations about the centre, shape (n_dof, 3 or 6), each of size 1."""
-    return _modes(_centred(nodes))
-
-
 def _centred(nodes: Floats) -> Floats:
-    """Places from the centre, the farthest coordinate 1."""
+    """Places from the centre, the farthest coordinate 1: with them translations and rotations are of one size."""
     centred = nodes - nodes.mean(axis=0)
     return np.asarray(centred / max(float(np.abs(centred).max()), np.finfo(float).tiny))
 
 
 def _modes(places: Floats) -> Floats:
+    """Translations, then infinitesimal rotations of places about the origin, shape (n_dof, 3 or 6)."""
     n_nodes, dim = places.shape
     turns = [(first, second) for first in range(dim) for second in range(first + 1, dim)]
     modes = np.zeros((n_nodes, dim, dim + len(turns)))

@@ -13,7 +13,7 @@ from truespring.kernels.threads import kernel
 
 
 @kernel
-def _invert(A: Any, inverse: Any, zero: Any) -> float:
+def _invert(A: Any, inverse: Any, zero: Any) -> Any:
     """Write the inverse of a matrix and return its determinant."""
     if len(zero) == 2:
         det = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
@@ -120,8 +120,8 @@ def stiffnesses(
 ) -> None:
     """The sum over the points of F^T grad u : D : F^T grad v + S : (grad u^T grad v), shape (n, k * dim, k * dim).
 
-    A is the derivative of F S by F, axes (place in the reference, place in the reference, directions i, l), that
-    is A_mn,il = F_ij D_jm,on F_lo + S_mn I_il; `square` has a zero for each pair i, l.
+    A is the derivative of F S by F: A_mn,ij = F_il D_lm,on F_jo + S_mn I_ij, m and n directions at rest; `square`
+    has a zero for each pair i, j.
     """
     dim, n_points, k = len(zero), gradients.shape[1], gradients.shape[2]
     pulled, A = np.empty((dim, dim, len(D))), np.empty((dim, dim, dim * dim))
@@ -138,19 +138,19 @@ def stiffnesses(
                         pulled[i, m, two] = volume * value
             for i in range(dim):
                 for m in range(dim):
-                    for l in range(dim):
+                    for j in range(dim):
                         for n in range(dim):
-                            value = volume * S[voigt[m, n], e, q] if i == l else 0.0
+                            value = volume * S[voigt[m, n], e, q] if i == j else 0.0
                             for o in range(dim):
-                                value += pulled[i, m, voigt[o, n]] * F[l, o, e, q]
-                            A[m, n, i * dim + l] = value
+                                value += pulled[i, m, voigt[o, n]] * F[j, o, e, q]
+                            A[m, n, i * dim + j] = value
             for b in range(k):
                 for m in range(dim):
                     total = square
                     for n in range(dim):
                         total = add_times(total, gradients[e, q, b, n], A, m, n)
-                    for il in range(dim * dim):
-                        by_node[b, q * dim + m, il] = total[il]
+                    for ij in range(dim * dim):
+                        by_node[b, q * dim + m, ij] = total[ij]
         for a in range(k):
             for b in range(a, k):
                 total = square
@@ -158,6 +158,6 @@ def stiffnesses(
                     for m in range(dim):
                         total = add_times(total, gradients[e, q, a, m], by_node, b, q * dim + m)
                 for i in range(dim):
-                    for l in range(dim):
-                        blocks[e, a * dim + i, b * dim + l] = total[i * dim + l]
-                        blocks[e, b * dim + l, a * dim + i] = total[i * dim + l]
+                    for j in range(dim):
+                        blocks[e, a * dim + i, b * dim + j] = total[i * dim + j]
+                        blocks[e, b * dim + j, a * dim + i] = total[i * dim + j]

@@ -13,19 +13,31 @@ from truespring.kernels.threads import kernel
 
 
 @kernel
-def strong(first: int, last: int, starts: Any, columns: Any, diagonal: Any, data: Any, share: float, keep: Any) -> None:
-    """Mark blocks whose size is at least `share` of the geometric mean of the diagonal ones'."""
-    size = data.shape[1]
+def diagonal_sizes(first: int, last: int, starts: Any, off: Any, rest: Any, sizes: Any) -> None:
+    """The sum of the squares of each block on the diagonal."""
+    size = rest.shape[1]
+    for i in range(first, last):
+        total = 0.0
+        for c in range(size):
+            for e in range(size):
+                value = rest[i, c, e]
+                for p in range(starts[i], starts[i + 1]):
+                    value -= off[p, c, e]
+                total += value * value
+        sizes[i] = total
+
+
+@kernel
+def strong(first: int, last: int, starts: Any, columns: Any, off: Any, sizes: Any, share: float, keep: Any) -> None:
+    """Mark blocks beside the diagonal of at least `share` of the geometric mean of the diagonal ones' size."""
+    size = off.shape[1]
     for i in range(first, last):
         for p in range(starts[i], starts[i + 1]):
-            j = columns[p]
-            block, here, there = 0.0, 0.0, 0.0
+            block = 0.0
             for c in range(size):
                 for e in range(size):
-                    block += data[p, c, e] ** 2
-                    here += data[diagonal[i], c, e] ** 2
-                    there += data[diagonal[j], c, e] ** 2
-            keep[p] = block * block >= share**4 * here * there and block > 0.0
+                    block += off[p, c, e] ** 2
+            keep[p] = block * block >= share**4 * sizes[i] * sizes[columns[p]] and block > 0.0
 
 
 @kernel

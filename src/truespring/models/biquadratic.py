@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, ShortInts
 from truespring.models.links import link_coupling
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
@@ -56,7 +56,7 @@ class BiquadraticSprings:
         run(kernel, len(self._pattern.elements), *arguments, smallest=_SMALLEST_PIECE)
 
     @property
-    def _place(self) -> tuple[Ints, Ints]:
+    def _place(self) -> tuple[ShortInts, Ints]:
         """What kernels ask of the elements: their nodes and links."""
         return self._pattern.elements, self._links
 

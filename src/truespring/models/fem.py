@@ -370,7 +370,7 @@ class FemPotential:
         """Tangent stiffness of each element, or of a slice [N/m], shape (n, n_dof, n_dof), dofs node by node."""
         parts = []
         for begin, end in self._slices(first, last):
-            given = None if stress is None else np.ascontiguousarray(stress[:, begin:end])
+            given = None if stress is None else stress[:, begin:end]
             parts.append(self._tangent(self._points(positions, begin, end), given))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -382,11 +382,11 @@ class FemPotential:
     def _matrices(self, at: Points, stress: Floats, elasticity: Floats) -> Floats:
         """Element matrices [N/m] of a stress and an elasticity, shape (n, k * dim, k * dim)."""
         from truespring.kernels import elements
-        from truespring.kernels.threads import run
+        from truespring.kernels.threads import run, writable
 
         n, _, k, dim = at.gradients.shape
         blocks = np.empty((n, k * dim, k * dim))
-        geometric = stress if self.law.finite else np.zeros_like(stress)
+        geometric = writable(stress) if self.law.finite else np.zeros(stress.shape)
         known = (at.frame, geometric, elasticity, self._voigt, at.gradients, at.volumes)
         zeros = self._zero, self._zero * dim
         run(elements.stiffnesses, n, *known, blocks, *zeros, smallest=_SMALLEST_PIECE)
@@ -413,7 +413,8 @@ class FemPotential:
         stress = np.empty((len(self.elements), 3, 3))
         for first, last in self._slices():
             at = self._points(positions, first, last)
-            stress[first:last] = self._true_stress(self._law_gradient(at), self._respond(at)).mean(axis=-1).T
+            by_point = self._true_stress(self._law_gradient(at), self._respond(at))
+            stress[first:last] = np.moveaxis(by_point.mean(axis=-1), -1, 0)
         return stress
 
     def _law_gradient(self, at: Points) -> Floats:

@@ -18,7 +18,8 @@ from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import RULES, require_body
 from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.problem import Fixed, Problem, rigid_body_modes
+from truespring.potential import rigid_body_modes
+from truespring.problem import Fixed, Problem
 
 # Poisson's ratio of an isotropic lattice of plain springs (Cauchy's relation lam = mu), in the plane and in space.
 _CAUCHY = {2: 1 / 3, 3: 1 / 4}

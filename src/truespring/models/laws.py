@@ -212,7 +212,8 @@ def _principal(C: Floats) -> tuple[Floats, Floats]:
     for component, (i, j) in zip(C, voigt_pairs(dim), strict=True):
         full[..., i, j] = full[..., j, i] = component
     values, vectors = np.linalg.eigh(full)
-    return np.ascontiguousarray(np.moveaxis(values, -1, 0)), np.ascontiguousarray(np.moveaxis(vectors, (-2, -1), (0, 1)))
+    first = np.moveaxis(values, -1, 0), np.moveaxis(vectors, (-2, -1), (0, 1))
+    return np.ascontiguousarray(first[0]), np.ascontiguousarray(first[1])
 
 
 def _log_difference(a: Floats, b: Floats) -> Floats:

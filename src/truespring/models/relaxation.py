@@ -7,7 +7,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import cg, splu
 
 from truespring.arrays import Floats, Ints
-from truespring.problem import rigid_body_modes
+from truespring.potential import rigid_body_modes
 
 FreeMatrix = sparse.csr_array[Any, tuple[int, int]]
 

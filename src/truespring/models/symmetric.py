@@ -43,13 +43,13 @@ def outer(left: Floats, right: Floats) -> Floats:
 
 
 def swapped(tensor: Floats) -> Floats:
-    """Return tensor_ik tensor_jl + tensor_il tensor_jk, axes (component, component, ...)."""
+    """Return tensor_im tensor_jn + tensor_in tensor_jm, axes (component ij, component mn, ...)."""
     at = voigt_places(dimensions(tensor))
     pairs = voigt_pairs(dimensions(tensor))
     result = np.empty((len(pairs), *tensor.shape))
     for one, (i, j) in enumerate(pairs):
-        for two, (k, l) in enumerate(pairs[: one + 1]):
-            result[one, two] = tensor[at[i, k]] * tensor[at[j, l]] + tensor[at[i, l]] * tensor[at[j, k]]
+        for two, (m, n) in enumerate(pairs[: one + 1]):
+            result[one, two] = tensor[at[i, m]] * tensor[at[j, n]] + tensor[at[i, n]] * tensor[at[j, m]]
             result[two, one] = result[one, two]
     return result
 

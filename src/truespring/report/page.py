@@ -266,12 +266,27 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "advice": path.status.advice if solved else "read from a file, not solved here",
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
+        "effort": _effort(path),
         "seconds": f"{path.seconds:.2f}" if solved else "–",
         "unknowns": str(path.n_unknowns) if solved else "–",
         "area": f"{min(areas):.3f}" if areas else "–",
         "stretch": stretch,
         "stability": _stability(path) if solved else "–",
     }
+
+
+def _effort(path: Path) -> str | None:
+    """By which choices a path was solved, what they cost, and where a first choice was given up."""
+    cost = path.cost
+    if cost is None:
+        return None
+    parts = [cost.newton, cost.linear, _counted(cost.newton_iterations, "Newton iteration")]
+    parts += [_counted(cost.cg_iterations, "CG iteration")] if cost.cg_iterations else []
+    return "; ".join([", ".join(parts), *cost.notes])
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}{'s' * (count != 1)}"
 
 
 def _stability(path: Path) -> str:

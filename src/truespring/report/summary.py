@@ -1,6 +1,7 @@
 """summary.json: status, cost, warnings and errors of one study in plain values."""
 
 import math
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
@@ -39,6 +40,7 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "negative_eigenvalues": last.negative_eigenvalues if last else None,
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),
         "warnings": list(path.warnings),
+        "solver": None if path.cost is None else asdict(path.cost),
     }
     if isinstance(path.potential, FemPotential):
         values["element"] = path.potential.interpolation

@@ -176,7 +176,12 @@ def _draw_surface(axes: "Axes", corners: Floats, share: Floats, color: Callable[
     light = across[order] @ (_LIGHT / np.linalg.norm(_LIGHT)) / np.linalg.norm(across[order], axis=1)
     shade = _DIMMEST + (1 - _DIMMEST) * np.clip(light, 0, 1)
     shown = np.asarray(color(share[order]))[:, :3] * shade[:, None]
-    surface = PolyCollection(list(corners[order, :, :2]), facecolors=shown, edgecolors=shown, lw=0.4)
+    surface = PolyCollection(
+        corners[order, :, :2],  # type: ignore[arg-type]
+        facecolors=shown,
+        edgecolors=shown,
+        lw=0.4,
+    )
     surface.set_rasterized(True)
     axes.add_collection(surface)
 

@@ -11,8 +11,8 @@ from truespring.arrays import Floats
 from truespring.errors import ProblemError
 from truespring.potential import Loading, Potential, SparseMatrix
 from truespring.solvers.cost import Cost
-from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError
+from truespring.solvers.direct import Direct, SingularMatrixError
+from truespring.solvers.gradients import IndefiniteError, SlowError
 from truespring.solvers.linear import LinearSolver, Tangent, choose
 
 #: Called after each iteration with load factor, iteration and relative residual.
@@ -142,26 +142,45 @@ class Balance:
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
         try:
-            tangent = self.linear.ready(self.hessian(state.positions), state.positions)
+            tangent = self.ready(self.hessian(state.positions), state.positions)
         except SingularMatrixError:
             return Found(replace(state, negative_eigenvalues=None))
-        judged = replace(state, negative_eigenvalues=tangent.negative_eigenvalues)
+        negative = tangent.negative_eigenvalues
+        if negative is None and not tangent.lasting and self.go_direct("stability could not be told"):
+            return self.judged(state)
+        judged = replace(state, negative_eigenvalues=negative)
         return Found(judged, tangent if tangent.lasting else None)
+
+    def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
+        """Make a tangent ready; where there are no coarse levels for it, by a factorisation.
+
+        Raises SingularMatrixError where it has no inverse.
+        """
+        try:
+            return self.linear.ready(matrix, positions)
+        except SingularMatrixError:
+            if isinstance(self.linear, Direct) or not self.go_direct("no coarse levels could be built"):
+                raise
+            return self.linear.ready(matrix, positions)
 
     def factorised(self, found: Found) -> Found:
         """Return an equilibrium with its tangent factorised, as far as memory allows."""
         if found.tangent is not None:
             return found
+        return self.judged(found.state) if self.go_direct("an unstable state was met") else found
+
+    def go_direct(self, reason: str) -> bool:
+        """Take a factorisation from here on; tell whether that fits in memory."""
         try:
             directly = choose("direct", self.potential.nodes, self.loading.held)
         except ProblemError:
-            self.note(
-                "an unstable state was kept: a factorisation, which would lead away from it, does not fit in memory"
-            )
-            return found
-        self.note(f"{directly.name} instead of {self.linear.name} from an unstable state on")
+            self.note(f"{reason}: a factorisation, which would help, does not fit in memory")
+            return False
+        self.note(f"{reason}: {directly.name} from there on instead of {self.linear.name}")
+        directly.cg_iterations, directly.memory = self.linear.cg_iterations, self.linear.memory
+        directly.factorisations = self.linear.factorisations
         self.linear = directly
-        return self.judged(found.state)
+        return True
 
     def note(self, text: str) -> None:
         """Keep in words, once, that a first choice was given up."""
@@ -230,10 +249,23 @@ def stepped(
     if not np.isfinite(tangent.data).all():
         return None
     try:
-        ready = balance.linear.ready(tangent, positions)
-        if ready.lasting and ready.negative_eigenvalues != 0:
-            return None
-        step = ready.solve(right, accuracy)
+        step = _solved(balance, tangent, positions, right, accuracy)
     except (SingularMatrixError, IndefiniteError):
         return None
-    return step if np.isfinite(step).all() else None
+    return step if step is not None and np.isfinite(step).all() else None
+
+
+def _solved(
+    balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
+) -> Floats | None:
+    """Solve; where that is slow even on coarse levels of the state itself, by a factorisation if that fits."""
+    for attempt in range(3):
+        ready = balance.ready(tangent, positions)
+        if ready.lasting and ready.negative_eigenvalues != 0:
+            return None
+        try:
+            return ready.solve(right, accuracy)
+        except SlowError as slow:
+            if attempt and not balance.go_direct("conjugate gradients were slow"):
+                return slow.best
+    return None

@@ -21,12 +21,19 @@ class IndefiniteError(ArithmeticError):
     """A direction was met along which the matrix is not positive."""
 
 
+class SlowError(ArithmeticError):
+    """The iterations allowed were not enough; `best` is what was reached."""
+
+    def __init__(self, best: Floats) -> None:
+        super().__init__("conjugate gradients did not reach the accuracy")
+        self.best = best
+
+
 class Solved(NamedTuple):
-    """What conjugate gradients found: the solution, iterations spent, and whether the accuracy was reached."""
+    """What conjugate gradients found, and the iterations that took."""
 
     solution: Floats
     iterations: int
-    reached: bool
 
 
 def conjugate_gradients(
@@ -35,7 +42,8 @@ def conjugate_gradients(
     """Solve A x = right until the residual is `accuracy` of `right` in size, shapes (n, k).
 
     `product(x, result)` writes A x and returns x . A x; `precondition(r)` returns an approximate solution.
-    Raises IndefiniteError where either is not positive along a direction that was met.
+    Raises IndefiniteError where either is not positive along a direction that was met, SlowError where the
+    iterations do not suffice.
     """
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
@@ -56,9 +64,9 @@ def conjugate_gradients(
             raise IndefiniteError("the matrix is not positive")
         size = float(np.sqrt(sum(run(blocks.advance, n, slope / curvature, p, q, x, r))))
         if size <= wanted:
-            return Solved(x, iteration, True)
+            return Solved(x, iteration)
         previous = slope
-    return Solved(x, max_iterations, False)
+    raise SlowError(x)
 
 
 class Lowest(NamedTuple):

@@ -9,12 +9,12 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Singles
 from truespring.potential import SparseMatrix, rigid_body_modes
 from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError, conjugate_gradients, lowest_eigenvalue
+from truespring.solvers.gradients import IndefiniteError, SlowError, conjugate_gradients, lowest_eigenvalue
 from truespring.solvers.multigrid import Hierarchy, Level, build, condense, empty_level
 
 # Coarse levels that need more iterations than this for two digits are built anew for the state at hand.
 _STALE = 25
-_MAX_ITERATIONS = 400
+_MAX_ITERATIONS = 150
 
 
 class Multigrid:
@@ -44,7 +44,7 @@ class Multigrid:
             raise SingularMatrixError("the matrix holds values that are not finite")
         positive = condense(level, matrix.data, self._held, self._scale)
         if positive and (self._coarse is None or self._stale):
-            self._build(level, matrix, positions)
+            self._build(level, positions)
         if self._coarse is None:
             raise SingularMatrixError("the matrix is not positive on the directions of a single node")
         turns = np.empty(matrix.data[: len(positions)].shape, np.float32)
@@ -56,13 +56,13 @@ class Multigrid:
         """The level that tangents are written to, made for their sparsity."""
         level = self._level
         if level is None or not (level.columns is matrix.indices or np.array_equal(level.columns, matrix.indices)):
-            self._level = level = empty_level(matrix.indptr, matrix.indices, matrix.blocksize[0])
+            self._level = level = empty_level(matrix.indptr, matrix.indices, matrix.blocksize[0], np.float32)
         return level
 
-    def _build(self, level: Level, matrix: SparseMatrix, positions: Floats) -> None:
+    def _build(self, level: Level, positions: Floats) -> None:
         modes = rigid_body_modes(positions).reshape(*positions.shape, -1)
         modes = np.where(self._held[:, :, None], 0.0, modes)
-        self._coarse = build(level, matrix.data, modes)
+        self._coarse = build(level, modes)
         self._built_at, self._stale = positions, False
         self.factorisations += 1
         self.memory = max(self.memory, self._coarse.n_bytes + level.n_bytes)
@@ -92,14 +92,20 @@ class Preconditioned:
         return np.multiply(z, size, dtype=np.float64)
 
     def solve(self, right: Floats, accuracy: float = 1e-10) -> Floats:
-        """Return the solution of matrix x = right; raise IndefiniteError where a negative direction is met."""
+        """Return the solution of matrix x = right; raise IndefiniteError where a negative direction is met.
+
+        SlowError where the accuracy is not reached: the next tangent gets new coarse levels.
+        """
         if not self.positive:
             raise IndefiniteError("a block of the diagonal is not positive")
         if not right.any():
             return np.zeros(right.shape)
-        found = conjugate_gradients(
-            self.level.product, self._precondition, self.scale * right, accuracy, _MAX_ITERATIONS
-        )
+        wanted = (self.scale * right, accuracy, _MAX_ITERATIONS)
+        try:
+            found = conjugate_gradients(self.level.product, self._precondition, *wanted)
+        except SlowError:
+            self.solver.spent(_MAX_ITERATIONS, 0.0)
+            raise
         self.solver.spent(found.iterations, -np.log10(accuracy))
         return found.solution
 

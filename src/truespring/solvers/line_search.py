@@ -58,7 +58,7 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
 def _leap(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
     """Return where Newton's full step leads, None where there is no energy."""
     try:
-        moved = positions - balance.linear.ready(tangent, positions).solve(force)
+        moved = positions - balance.ready(tangent, positions).solve(force)
     except (SingularMatrixError, IndefiniteError):
         return None
     return moved if np.isfinite(balance.total_energy(moved, 0.0)[0]) else None

@@ -3,17 +3,20 @@
 Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the rigid-body modes of the nodes, built for the
 tangent of one state. At another state the coarse levels are asked through the rotations Q of the nodes
 since then, P -> Q P, while the finest level, where the body is smoothed, is that of the state itself.
-One V-cycle is symmetric: a forward sweep of Gauss and Seidel down, a backward one up. It works in single
-precision: it only ever improves a direction.
+One V-cycle is symmetric: a forward sweep of Gauss and Seidel down, a backward one up. On the finest level it
+works in single precision: it only ever improves a direction.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, ShortInts, Singles
 from truespring.solvers.direct import SingularMatrixError
+
+Real = Floats | Singles
 
 # A level of no more unknowns than this is solved with by its inverse.
 _COARSEST = 400
@@ -32,9 +35,9 @@ class Level:
     starts: ShortInts
     columns: ShortInts
     diagonal: ShortInts
-    off: Singles
+    off: Real
     rest: Floats
-    inverse: Singles
+    inverse: Real
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -57,7 +60,7 @@ class Level:
         )
 
 
-def empty_level(starts: ShortInts, columns: ShortInts, size: int) -> Level:
+def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: type[np.floating[Any]]) -> Level:
     """Return room for a matrix of this sparsity, with blocks of `size` rows."""
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
@@ -67,8 +70,8 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int) -> Level:
     run(blocks.find_diagonal, n, starts, columns, diagonal)
     if (diagonal < 0).any():
         raise SingularMatrixError(f"the matrix has nothing on the diagonal of node {int(diagonal.argmin())}")
-    off = np.empty((len(columns), size, size), np.float32)
-    return Level(starts, columns, diagonal, off, np.empty((n, size, size)), np.empty((n, size, size), np.float32))
+    off = np.empty((len(columns), size, size), precision)
+    return Level(starts, columns, diagonal, off, np.empty((n, size, size)), np.empty((n, size, size), precision))
 
 
 def condense(level: Level, data: Floats, held: Bools, scale: float) -> bool:
@@ -109,7 +112,7 @@ class Hierarchy:
 
     transfers: list[Transfer]
     levels: list[Level]
-    inverse: Singles
+    inverse: Floats
 
     @property
     def n_bytes(self) -> int:
@@ -117,18 +120,18 @@ class Hierarchy:
         transfers = sum(transfer.n_bytes for transfer in self.transfers)
         return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
 
-    def cycle(self, finest: Level, turns: Singles, residual: Singles) -> Singles:
+    def cycle(self, finest: Level, turns: Singles, residual: Singles) -> Real:
         """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim)."""
         return self._cycle(0, finest, residual, turns)
 
-    def _cycle(self, depth: int, level: Level, r: Singles, turns: Singles | None) -> Singles:
+    def _cycle(self, depth: int, level: Level, r: Real, turns: Singles | None) -> Real:
         from truespring.kernels import blocks, multigrid
         from truespring.kernels.threads import run
 
         if depth == len(self.transfers):
             return (self.inverse @ r.ravel()).reshape(r.shape)
         n, size = level.shape
-        zero = (np.float32(0),) * size
+        zero = (r.dtype.type(0),) * size
         matrix = (level.starts, level.columns, level.diagonal, level.off)
         z, left = np.empty_like(r), np.empty_like(r)
         run(blocks.sweep_forward, n, *matrix, level.inverse, r, z, zero)
@@ -137,8 +140,8 @@ class Hierarchy:
             run(multigrid.turn_back, n, turns, left, zero)
         transfer = self.transfers[depth]
         n_coarse, n_modes = len(transfer.column_starts) - 1, transfer.data.shape[2]
-        modes = (np.float32(0),) * n_modes
-        coarse = np.empty((n_coarse, n_modes), np.float32)
+        modes = (0.0,) * n_modes
+        coarse = np.empty((n_coarse, n_modes))
         by_column = (transfer.column_starts, transfer.node, transfer.column_data)
         run(multigrid.restrict, n_coarse, *by_column, left, coarse, modes, zero)
         coarser = self.levels[depth] if depth < len(self.levels) else level
@@ -154,22 +157,22 @@ class Hierarchy:
         return z
 
 
-def build(finest: Level, data: Floats, modes: Floats) -> Hierarchy:
-    """Return the coarser levels of a matrix, given in both forms, with near-kernel `modes` of shape (n, k, n_modes)."""
+def build(finest: Level, modes: Floats) -> Hierarchy:
+    """Return the coarser levels of a matrix with near-kernel `modes` of shape (n, k, n_modes)."""
     transfers: list[Transfer] = []
     levels: list[Level] = []
     level = finest
     while level.shape[0] * level.shape[1] > _COARSEST and len(transfers) < _MAX_LEVELS:
-        coarsened = _coarsen(level, data, modes)
+        coarsened = _coarsen(level, modes)
         if coarsened is None:
             break
-        transfer, data, modes, level = coarsened
+        transfer, modes, level = coarsened
         transfers.append(transfer)
         levels.append(level)
     return Hierarchy(transfers, levels[:-1], _inverse(level))
 
 
-def _inverse(level: Level) -> Singles:
+def _inverse(level: Level) -> Floats:
     """The inverse of the coarsest matrix; of directions that it does not know, zero."""
     n, size = level.shape
     matrix = np.empty((n * size, n * size))
@@ -181,20 +184,19 @@ def _inverse(level: Level) -> Singles:
         unit.flat[column] = 0.0
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     kept = values > 1e-7 * values[-1]
-    return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T, dtype=np.float32)
+    return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
 
 
-def _coarsen(level: Level, data: Floats, modes: Floats) -> tuple[Transfer, Floats, Floats, Level] | None:
-    """Return the prolongation, the coarse matrix in both forms and the coarse modes; None where nothing is gained."""
+def _coarsen(level: Level, modes: Floats) -> tuple[Transfer, Floats, Level] | None:
+    """Return the prolongation, the coarse modes and the coarse matrix; None where nothing is gained."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
     n = level.shape[0]
     n_modes = modes.shape[2]
-    aggregate, n_coarse = _aggregates(level, data)
+    aggregate, n_coarse = _aggregates(level)
     if not 0 < n_coarse < n:
         return None
-    aggregate[~modes.any(axis=(1, 2))] = -1  # nodes that are held
     members = np.argsort(aggregate, kind="stable").astype(np.int32)
     member_starts = np.searchsorted(aggregate[members], np.arange(n_coarse + 1)).astype(np.int32)
     basis, coarse_modes = np.zeros(modes.shape), np.zeros((n_coarse, n_modes, n_modes))
@@ -203,14 +205,14 @@ def _coarsen(level: Level, data: Floats, modes: Floats) -> tuple[Transfer, Float
     omega = 4 / 3 / _largest_eigenvalue(level)
     transfer = _smoothed(level, aggregate, basis, n_coarse, omega)
     coarse_data, starts, columns = _galerkin(level, transfer, n_coarse)
-    coarse = empty_level(starts, columns, n_modes)
+    coarse = empty_level(starts, columns, n_modes, np.float64)
     # Modes that an aggregate does not know leave rows of zeros: ones on the diagonal keep them out.
     unknown = coarse_modes[:, np.arange(n_modes), np.arange(n_modes)] == 0
     condense(coarse, coarse_data, unknown, 1.0)
-    return transfer, coarse_data, coarse_modes, coarse
+    return transfer, coarse_modes, coarse
 
 
-def _aggregates(level: Level, data: Floats) -> tuple[ShortInts, int]:
+def _aggregates(level: Level) -> tuple[ShortInts, int]:
     """The aggregate of each node, -1 where it stands alone, and their number."""
     from pyamg.aggregation import standard_aggregation
 
@@ -218,8 +220,9 @@ def _aggregates(level: Level, data: Floats) -> tuple[ShortInts, int]:
     from truespring.kernels.threads import run
 
     n = level.shape[0]
-    keep = np.zeros(len(level.columns), bool)
-    run(multigrid.strong, n, level.starts, level.columns, level.diagonal, data, _STRONG, keep)
+    keep, sizes = np.zeros(len(level.columns), bool), np.empty(n)
+    run(multigrid.diagonal_sizes, n, level.starts, level.off, level.rest, sizes)
+    run(multigrid.strong, n, level.starts, level.columns, level.off, sizes, _STRONG, keep)
     counts = np.add.reduceat(keep, level.starts[:-1], dtype=np.int32)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     graph = sparse.csr_array((np.ones(starts[-1], np.int8), level.columns[keep], starts), shape=(n, n))

@@ -1,0 +1,79 @@
+"""The loops in which springs are solved, beside the bytes that they must move: python -m benchmarks.kernels CASE.npz RULE."""
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+
+import numpy as np
+
+import truespring as ts
+from benchmarks.cases import Case
+from benchmarks.limits import Kernel, Moved, bandwidth, measure
+from benchmarks.programs.common import TOLERANCE
+from benchmarks.programs.truespring import problem_of
+from truespring.solvers.iterative import Multigrid, Preconditioned
+from truespring.solvers.multigrid import Hierarchy, Level
+
+# How much of a copy of the vectors conjugate gradients read and write an iteration beside product and preconditioner:
+# x, r, p, q read and x, r, p written, and to and from single precision.
+_VECTORS = 9
+
+
+def kernels(potential: ts.SpringNetwork, positions: np.ndarray, ready: Preconditioned) -> Iterator[Kernel]:
+    """Yield assembly, product and V-cycle at a state of a network."""
+    stress = potential.stress(positions)
+    matrix = potential.hessian(positions, stress)
+    springs = potential.springs.size * 4 + potential.stiffness.nbytes + stress.nbytes
+    yield Kernel(
+        "assembly", lambda: potential.hessian(positions, stress), positions.nbytes + springs + matrix.data.nbytes
+    )
+    x, result = np.ascontiguousarray(positions), np.empty_like(positions)
+    yield Kernel("matrix product", lambda: ready.level.product(x, result), _once(ready.level) + 2 * x.nbytes)
+    residual = (x - potential.nodes).astype(np.float32)
+    yield Kernel(
+        "V-cycle",
+        lambda: ready.coarse.cycle(ready.level, ready.turns, residual),
+        cycle_bytes(ready.level, ready.coarse) + 2 * residual.nbytes + ready.turns.nbytes,
+    )
+
+
+def _once(level: Level) -> int:
+    """The bytes of a matrix as it is read once for a product."""
+    return level.columns.nbytes + level.off.nbytes + level.rest.nbytes
+
+
+def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
+    """What a V-cycle reads: each matrix twice (down by halves, up as a whole), each transfer once each way."""
+    levels = [finest, *coarse.levels]
+    matrices = sum(2 * (level.columns.nbytes + level.off.nbytes + level.inverse.nbytes) for level in levels)
+    return matrices + sum(transfer.n_bytes for transfer in coarse.transfers) + coarse.inverse.nbytes
+
+
+def measured(case: Case, rule: str) -> list[Moved]:
+    """Return the kernels at the equilibrium of a case, and the whole solve."""
+    problem = problem_of(case)
+    model, newton = ts.Springs(rule), ts.Newton(load_steps=1, tolerance=TOLERANCE, linear="multigrid")
+    ts.solve(problem, model, newton)
+    path = ts.solve(problem, model, newton)
+    positions = path.states[-1].positions
+    solver = Multigrid(path.potential.nodes, problem.loading.held)
+    ready = solver.ready(path.potential.hessian(positions), positions)
+    found = [measure(kernel) for kernel in kernels(path.potential, positions, ready)]
+    assembly, product, cycle = (one.bytes_moved for one in found)
+    step = product + cycle + _VECTORS * positions.nbytes
+    whole = path.newton_iterations * assembly + path.cost.cg_iterations * step
+    return [*found, Moved("whole solve", path.seconds, whole)]
+
+
+def main() -> None:
+    """Print the rows of a case as JSON, or without one the bandwidth."""
+    if len(sys.argv) == 1:
+        found = bandwidth()
+    else:
+        found = [asdict(one) for one in measured(Case.read(sys.argv[1]), sys.argv[2])]
+    sys.stdout.write(json.dumps(found) + "\n")
+
+
+if __name__ == "__main__":
+    main()

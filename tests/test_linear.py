@@ -1,0 +1,187 @@
+"""Linear solvers: multigrid against factorisations, what they tell of stability, and what they fall back on."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+import truespring as ts
+from truespring.errors import ProblemError
+from truespring.kernels import threads
+from truespring.solvers import direct, linear
+from truespring.solvers.gradients import IndefiniteError
+
+SOFT, THIN = ts.Material(young=1e4, poisson=0.3), ts.PlaneStress(thickness=0.01)
+LIBRARIES = [name for name in direct.FACTORISERS if direct.present(name)]
+
+
+def cantilever(
+    mesh: ts.Mesh, force: float, material: ts.Material = SOFT, regions: list[ts.Region] | None = None
+) -> ts.Problem:
+    total = (0.0, -force, 0.0)[: mesh.dim]
+    section = THIN if mesh.dim == 2 else None
+    return ts.Problem(mesh, material, section, [ts.Fixed("left")], [ts.Force("right", total)], regions or [])
+
+
+def strip(n: int = 12) -> ts.Problem:
+    return cantilever(ts.rectangle((4, 1), (4 * n, n)), 0.4)
+
+
+def block() -> ts.Problem:
+    return cantilever(ts.box((4, 1, 1), (20, 5, 5)), 25.0)
+
+
+def ragged() -> ts.Problem:
+    """Voxels with a ragged boundary: cubes of a ball with bites taken out, held at one end."""
+    whole = ts.box((1, 1, 1), (12, 12, 12))
+    centres = whole.nodes[whole.elements].mean(axis=1)
+    inside = np.linalg.norm(centres - 0.5, axis=1) < 0.5
+    bitten = (np.linalg.norm(centres - [0.5, 0.95, 0.5], axis=1) < 0.25) | (np.abs(centres[:, 2] - 0.7) < 0.04)
+    kept = whole.elements[inside & ~(bitten & (centres[:, 0] > 0.3))]
+    used, numbers = np.unique(kept, return_inverse=True)
+    mesh = ts.Mesh(whole.nodes[used], numbers.reshape(kept.shape), "hexahedron")
+    left = np.flatnonzero(mesh.nodes[:, 0] <= mesh.lower[0] + 1e-9)
+    right = np.flatnonzero(mesh.nodes[:, 0] >= mesh.upper[0] - 1e-9)
+    return ts.Problem(mesh, SOFT, None, [ts.Fixed(left)], [ts.Force(right, (20.0, -20.0, 0.0))])
+
+
+def shaken() -> ts.Problem:
+    """Tetrahedra with nodes moved about, so that none is like another."""
+    mesh = ts.box((4, 1, 1), (16, 4, 4), "tetrahedron")
+    inner = ((mesh.nodes > mesh.lower + 1e-9) & (mesh.nodes < mesh.upper - 1e-9)).all(axis=1)
+    moved = mesh.nodes + inner[:, None] * np.random.default_rng(2).uniform(-0.05, 0.05, mesh.nodes.shape)
+    return cantilever(ts.Mesh(moved, mesh.elements, "tetrahedron"), 25.0)
+
+
+def contrast() -> ts.Problem:
+    """A third of the elements ten thousand times as stiff as the others, anywhere."""
+    mesh = ts.rectangle((4, 1), (48, 12))
+    stiff = np.flatnonzero(np.random.default_rng(1).random(len(mesh.elements)) < 0.3)
+    return cantilever(mesh, 0.3, regions=[ts.Region(stiff, ts.Material(young=1e8, poisson=0.3))])
+
+
+ILL_CONDITIONED: dict[str, tuple[Callable[[], ts.Problem], ts.Springs | ts.Fem]] = {
+    "slender": (lambda: cantilever(ts.rectangle((40, 1), (320, 8)), 2e-3), ts.Springs(rule="isotropic")),
+    "contrast": (contrast, ts.Springs(rule="isotropic")),
+    "volume": (
+        lambda: cantilever(ts.box((4, 1, 1), (16, 4, 4)), 25.0, ts.Material(1e4, 0.49)),
+        ts.Springs(rule="isotropic", volume=True),
+    ),
+    "tetrahedra": (shaken, ts.Springs(rule="biquadratic")),
+    "ragged": (ragged, ts.Springs(rule="isotropic")),
+    "mean dilatation": (
+        lambda: cantilever(ts.box((4, 1, 1), (12, 3, 3)), 25.0, ts.Material(1e4, 0.49)),
+        ts.Fem(law="neo-hookean"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ILL_CONDITIONED)
+def test_multigrid_converges_or_falls_back_and_says_so(name: str) -> None:
+    build, model = ILL_CONDITIONED[name]
+    problem = build()
+    tip = ts.solve(problem, model, ts.Newton(load_steps=1, linear="scipy"))
+    path = ts.solve(problem, model, ts.Newton(load_steps=1, linear="multigrid"))
+    assert path.cost is not None and tip.cost is not None
+    assert path.status is tip.status is ts.Status.CONVERGED
+    exact, found = tip.states[-1].displacement, path.states[-1].displacement
+    assert np.abs(exact).max() > 0.05 * problem.mesh.diameter, "it bends"
+    assert np.abs(found - exact).max() <= 1e-8 * np.abs(exact).max()
+    assert path.states[-1].negative_eigenvalues == 0
+    assert path.cost.cg_iterations > 0
+    assert path.cost.linear == "multigrid" or any("instead of multigrid" in note for note in path.cost.notes)
+
+
+@pytest.mark.parametrize("build", [strip, block])
+def test_multigrid_needs_few_iterations_at_every_size(build: Callable[..., ts.Problem]) -> None:
+    path = ts.solve(build(), ts.Springs(rule="isotropic"), ts.Newton(load_steps=1, tolerance=1e-8, linear="multigrid"))
+    assert path.cost is not None
+    assert path.newton_iterations <= 8
+    assert path.cost.factorisations == 1
+    assert path.cost.cg_iterations <= 15 * (path.newton_iterations + 2), "two more for what tells of stability"
+
+
+@pytest.mark.parametrize("name", ["scipy", "rslab", "pardiso", "multigrid"])
+def test_every_linear_solver_solves(name: str) -> None:
+    if name != "multigrid" and name not in LIBRARIES:
+        pytest.skip(f"{name} is not installed")
+    problem = block()
+    potential = ts.Springs(rule="isotropic").potential(problem)
+    nodes, held = problem.mesh.nodes, problem.loading.held
+    turned = nodes + 0.1 * np.sin(nodes[:, ::-1])
+    right = np.where(held, 0.0, np.random.default_rng(0).normal(size=nodes.shape))
+    matrix = potential.hessian(turned)
+    solver = linear.choose(name, nodes, held)
+    found = solver.ready(matrix, turned).solve(right, 1e-10)
+    free = np.flatnonzero(~held.ravel())
+    exact = spsolve(matrix.tocsc()[free][:, free], right.ravel()[free])
+    assert np.abs(found.ravel()[free] - exact).max() <= 1e-7 * np.abs(exact).max()
+    assert not found[held].any()
+    assert solver.memory > matrix.data.nbytes / 4
+
+
+@pytest.mark.parametrize("name", [*LIBRARIES, "multigrid"])
+def test_a_negative_direction_is_seen(name: str) -> None:
+    """A block pressed together until it buckles: a single eigenvalue of thousands is negative, and no load points to it."""
+    problem = cantilever(ts.rectangle((10, 1), (80, 8)), 0.1)
+    potential = ts.Springs(rule="isotropic").potential(problem)
+    nodes, held = problem.mesh.nodes, problem.loading.held
+    free = np.flatnonzero(~held.ravel())
+    solver = linear.choose(name, nodes, held)
+    assert solver.ready(potential.hessian(nodes), nodes).negative_eigenvalues == 0
+    pressed = nodes * [0.99, 1.0]
+    matrix = potential.hessian(pressed)
+    eigenvalues = np.linalg.eigvalsh(matrix.toarray()[free][:, free])
+    assert (eigenvalues < 0).sum() >= 1
+    tangent = solver.ready(matrix, pressed)
+    assert tangent.negative_eigenvalues == ((eigenvalues < 0).sum() if name != "multigrid" else 1)
+    if name == "multigrid":
+        with pytest.raises(IndefiniteError):
+            tangent.solve(np.where(held, 0.0, np.random.default_rng(0).normal(size=nodes.shape)), 1e-10)
+
+
+def test_a_column_buckles_under_multigrid_too() -> None:
+    """The straight state is unstable: the path leaves it with the help of a factorisation, and says so."""
+    mesh = ts.rectangle((20, 1), (80, 4))
+    euler = np.pi**2 * 1e4 * 0.01 / 12 / (4 * 20**2)
+    problem = ts.Problem(mesh, SOFT, THIN, [ts.Fixed("left")], [ts.Force("right", (-1.3 * euler, 0.0))])
+    for name in ("scipy", "multigrid"):
+        path = ts.solve(problem, ts.Springs(rule="isotropic"), ts.Newton(load_steps=2, linear=name))
+        assert path.status is ts.Status.CONVERGED
+        assert path.states[-1].branched or path.states[1].branched
+        assert np.abs(path.states[-1].displacement[:, 1]).max() > 1
+    assert path.cost is not None
+    assert any("unstable" in note and "instead of multigrid" in note for note in path.cost.notes)
+
+
+def test_what_runs_again_is_the_same_to_the_last_bit() -> None:
+    one, two = (
+        ts.solve(strip(40), ts.Springs(rule="isotropic"), ts.Newton(load_steps=1, linear="multigrid")) for _ in range(2)
+    )
+    assert np.array_equal(one.states[-1].positions, two.states[-1].positions)
+
+
+def test_pieces_cover_the_range_once() -> None:
+    threads.set_threads(3)
+    try:
+        assert threads.pieces(10, 1) == [(0, 3), (3, 6), (6, 10)]
+        assert threads.pieces(10, 6) == [(0, 10)]
+        assert threads.pieces(0) == [(0, 0)]
+    finally:
+        threads.set_threads(None)
+
+
+def test_a_factorisation_that_does_not_fit_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(linear, "available_memory", lambda: 2**20)
+    with pytest.raises(ProblemError, match=r"needs about .* GiB.*multigrid"):
+        ts.solve(strip(), ts.Springs(rule="isotropic"), ts.Newton(linear="direct"))
+    unstable = ts.solve(strip(), ts.Springs(rule="isotropic"), ts.Newton(load_steps=1, linear="multigrid"))
+    assert unstable.complete
+
+
+def test_names_are_checked() -> None:
+    with pytest.raises(ProblemError, match=r"linear = 'multigrd'.*'multigrid'.*allowed: auto, direct"):
+        ts.Newton(linear="multigrd")
+    with pytest.raises(ProblemError, match=r"method = 'mip'.*allowed: auto, mixed, line-search"):
+        ts.Newton(method="mip")
