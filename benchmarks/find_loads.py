@@ -9,7 +9,7 @@ from benchmarks.cases import LENGTH, LOADS, MOVED, SIZES, SPRINGS, YOUNG, bar
 from benchmarks.programs.truespring import problem_of
 
 # Between which shares of E times the section the loads are sought.
-_BRACKETS = {"bending": (-0.02, -0.004), "stretching": (0.1, 0.5)}
+_BRACKETS = {"bending": (-0.005, -0.001), "stretching": (0.1, 0.5)}
 
 
 def load(dim: int, kind: str) -> float:

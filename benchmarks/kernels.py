@@ -1,4 +1,7 @@
-"""The loops in which springs are solved, beside the bytes that they must move: python -m benchmarks.kernels CASE.npz RULE."""
+"""The loops in which springs are solved, beside the bytes that they must move.
+
+python -m benchmarks.kernels CASE.npz RULE prints them, and without a case the bandwidth of memory.
+"""
 
 import json
 import sys

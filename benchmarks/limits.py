@@ -3,9 +3,10 @@
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -61,9 +62,15 @@ def bandwidth() -> dict[str, float]:
                 ("read", np.sum, (sources,), source.nbytes),
                 ("copy", np.copyto, (targets, sources), 2 * source.nbytes),
             ):
-                times = [_timed(lambda: list(pool.map(function, *arrays))) for _ in range(1 + _REPEATS)]
-                found[f"{name}, {threads} thread{'s' * (threads > 1)}"] = moved / min(times[1:])
+                run = partial(_all, pool, function, arrays)
+                best = min(_timed(run) for _ in range(_REPEATS))
+                found[f"{name}, {threads} thread{'s' * (threads > 1)}"] = moved / best
     return found
+
+
+def _all(pool: ThreadPoolExecutor, function: Callable[..., object], arrays: Sequence[list[np.ndarray]]) -> None:
+    """Call a function on the pieces of arrays, each in a thread."""
+    list(pool.map(function, *arrays))
 
 
 def _timed(function: Callable[[], object]) -> float:

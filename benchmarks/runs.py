@@ -1,22 +1,26 @@
-"""Runs: each program on each case in a process of its own, several times, with results kept so that a break costs little."""
+"""Runs: each program on each case in a process of its own; results are kept, so that a break costs little."""
 
 import hashlib
 import json
 import os
+import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from subprocess import PIPE
+from typing import Any
 
-from benchmarks.cases import LADDER, LOADS, SIZES, bar
+from benchmarks.cases import LOADS, SPRINGS, bar, n_nodes
 from benchmarks.machine import hardware
 
-ROOT = Path(__file__).parent.parent
-CACHE = Path(__file__).parent / ".cache"
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+CACHE = HERE / ".cache"
 
 #: What a solve may take [s]; larger meshes of that load are then not given to the program.
 LIMIT = 180.0
@@ -79,8 +83,8 @@ class Job:
 
     @property
     def n_nodes(self) -> int:
-        """Of the mesh of `cases.bar`."""
-        return (4 * self.depth + 1) * (self.depth + 1) ** (self.dim - 1)
+        """Of the mesh."""
+        return n_nodes(self.dim, self.depth)
 
 
 @dataclass(frozen=True)
@@ -143,9 +147,10 @@ def too_slow(last: Measured, job: Job) -> str:
 
 def measure(job: Job, repeats: int) -> Measured:
     """Run a job once, and again where that was short."""
-    runs = []
+    runs: list[dict] = []
     while len(runs) < repeats and (not runs or runs[0]["seconds"] < _SHORT):
-        run = cached(job, len(runs))
+        name = f"{job.program}-{job.dim}d-{job.load}-{job.depth}-{len(runs)}"
+        run = cached(name, fingerprint(job.program), lambda: execute(job))
         if "failure" in run:
             return _nothing(job, run["failure"])
         runs.append(run)
@@ -157,53 +162,72 @@ def _nothing(job: Job, failure: str) -> Measured:
     return Measured(**asdict(job), n_nodes=job.n_nodes, failure=failure)
 
 
-def cached(job: Job, repeat: int) -> dict:
-    """Return one run of a job, from the cache if the code and the machine are still the same."""
-    file = CACHE / f"{job.program}-{job.dim}d-{job.load}-{job.depth}-{repeat}-{fingerprint(job.program)}.json"
+def cached(name: str, code: str, run: Callable[[], Any]) -> Any:
+    """Return what `run` gives, from the cache if it is there under the same digest of its code."""
+    file = CACHE / f"{name}-{code}.json"
     if not file.is_file():
-        run = execute(job)
+        found = run()
         CACHE.mkdir(exist_ok=True)
-        file.write_text(json.dumps(run))
+        file.write_text(json.dumps(found))
     return json.loads(file.read_text())
 
 
 def fingerprint(name: str) -> str:
-    """A digest of what a program's times depend on: its code here, the cases, the machine."""
-    program, here = PROGRAMS[name], ROOT / "benchmarks"
-    ours = [] if program.peer else sorted((ROOT / "src" / "truespring").rglob("*.py"))
-    files = [here / "cases.py", here / "programs" / "common.py", here / "programs" / f"{program.module}.py", *ours]
-    files += [here / "peers.txt"] if program.peer else []
-    digest = hashlib.sha256(repr((program, hardware())).encode())
+    """A digest of what the times of a program depend on: its code here, the cases, the machine."""
+    program = PROGRAMS[name]
+    peers = [HERE / "peers.txt", *HERE.glob("programs/neo_hooke.py")]
+    files = [HERE / "cases.py", HERE / "programs" / "common.py", HERE / "programs" / f"{program.module}.py"]
+    files += peers if program.peer else [HERE / "kernels.py", *sorted((ROOT / "src" / "truespring").rglob("*.py"))]
+    digest = hashlib.sha256(repr((program.arguments, hardware())).encode())
     for file in files:
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def execute(job: Job) -> dict:
+def execute(job: Job) -> dict[str, Any]:
     """Run a job in a process of its own; return what it printed, or {"failure": why}."""
     program = PROGRAMS[job.program]
+    return in_process(f"programs.{program.module}", job, program.arguments, program.peer)
+
+
+def in_process(module: str, job: Job, arguments: tuple[str, ...], peer: bool = False) -> Any:
+    """Give the case of a job to a module of benchmarks; return what it prints, or {"failure": why}."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.npz"
         bar(job.dim, job.load, job.depth).write(file)
-        command = [python(program.peer), "-m", f"benchmarks.programs.{program.module}", str(file), *program.arguments]
-        process = subprocess.Popen(
-            command,
-            cwd=ROOT,
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-        try:
-            printed, complaint = process.communicate(timeout=_PROCESS_LIMIT)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, 9)
-            process.communicate()
-            return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
+        command = [python(peer), "-m", f"benchmarks.{module}", str(file), *arguments]
+        with subprocess.Popen(
+            command, cwd=ROOT, env=environment(), stdout=PIPE, stderr=PIPE, text=True, start_new_session=True
+        ) as process:
+            try:
+                printed, complaint = process.communicate(timeout=_PROCESS_LIMIT)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
+            except BaseException:  # also of the user, who stops all
+                os.killpg(process.pid, signal.SIGKILL)
+                raise
     if process.returncode:
         return {"failure": (complaint.strip().splitlines() or ["no message"])[-1]}
     return json.loads(printed.splitlines()[-1])
+
+
+def bandwidth() -> dict[str, float]:
+    """Return the bandwidth of the machine's memory [bytes/s], see `limits.bandwidth`; measured anew each time."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.kernels"], cwd=ROOT, env=environment(), stdout=PIPE, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def kernels(dim: int, depth: int) -> list[dict[str, Any]]:
+    """Return the kernels of springs on the bent body, see `kernels.measured`; none if that failed."""
+    rule = SPRINGS[dim]
+    job = Job(rule, dim, "bending", depth)
+    found = cached(
+        f"kernels-{dim}d-{depth}", fingerprint(rule), lambda: in_process("kernels", job, PROGRAMS[rule].arguments)
+    )
+    return [{"dim": dim, "n_nodes": job.n_nodes, **row} for row in found] if isinstance(found, list) else []
 
 
 def python(peer: bool) -> str:

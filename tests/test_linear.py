@@ -123,7 +123,7 @@ def test_every_linear_solver_solves(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*LIBRARIES, "multigrid"])
 def test_a_negative_direction_is_seen(name: str) -> None:
-    """A block pressed together until it buckles: a single eigenvalue of thousands is negative, and no load points to it."""
+    """A strip pressed together until it buckles: few eigenvalues of thousands are negative."""
     problem = cantilever(ts.rectangle((10, 1), (80, 8)), 0.1)
     potential = ts.Springs(rule="isotropic").potential(problem)
     nodes, held = problem.mesh.nodes, problem.loading.held

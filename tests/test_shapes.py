@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,11 +173,21 @@ def test_a_box_too_large_for_memory_is_refused_before_it_is_built(
 ) -> None:
     with pytest.raises(MeshError, match=r"8,012,006,001 nodes|16,012,006,001|nodes needs about .* GiB"):
         ts.box((1.0, 1.0, 1.0), (2000, 2000, 2000), element)
-    # By estimate 2500 n^(4/3) bytes: of 1 GiB 16,700 nodes.
-    monkeypatch.setattr(shapes, "psutil", SimpleNamespace(virtual_memory=lambda: SimpleNamespace(total=2**30)))
-    ts.box((1.0, 1.0, 1.0), (15, 15, 15), element)
-    with pytest.raises(MeshError, match=r"this machine has 1\.0 GiB: take fewer elements"):
-        ts.box((1.0, 1.0, 1.0), (30, 30, 30), element)
+    # By estimate 10 KiB a node: of 1 GiB 104,857 nodes.
+    monkeypatch.setattr(shapes, "available_memory", lambda: 2**30)
+    ts.box((1.0, 1.0, 1.0), (20, 20, 20), element)
+    with pytest.raises(MeshError, match=r"needs about \d GiB to be solved, .* has 1\.0 GiB: take fewer elements"):
+        ts.box((1.0, 1.0, 1.0), (47, 47, 47), element)
+
+
+def test_a_rectangle_too_large_for_memory_is_refused_before_it_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By estimate 2.5 KiB a node: of 1 GiB 419,430 nodes."""
+    with pytest.raises(MeshError, match=r"a mesh of 10,000,200,001 nodes needs about 23,842 GiB to be solved"):
+        ts.rectangle((1.0, 1.0), (100_000, 100_000))
+    monkeypatch.setattr(shapes, "available_memory", lambda: 2**30)
+    assert ts.rectangle((1.0, 1.0), (400, 400)).n_nodes == 160_801
+    with pytest.raises(MeshError, match=r"420,200 nodes needs about 1 GiB to be solved, this machine has 1\.0 GiB"):
+        ts.rectangle((1.0, 1.0), (549, 763))
 
 
 # --- the door -------------------------------------------------------------------------------------

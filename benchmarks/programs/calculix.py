@@ -7,6 +7,7 @@ the same to all digits, but its Newton then fails on fine meshes, in 16 incremen
 
 import os
 import pty
+import shutil
 import subprocess
 import tempfile
 import time
@@ -27,6 +28,8 @@ _CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7"
 
 def solve(case: Case) -> Run:
     """Solve in one load increment, or in as few more as it takes."""
+    if shutil.which("ccx") is None:
+        raise SystemExit("ccx is not installed: apt-get install calculix-ccx")
     version = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout.split()[-1]
     with tempfile.TemporaryDirectory() as folder:
         twin = Twin(case, Path(folder))
@@ -107,4 +110,4 @@ def _joined(values: list) -> str:
 
 
 if __name__ == "__main__":
-    main(solve)
+    main(solve, {})

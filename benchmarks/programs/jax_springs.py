@@ -1,4 +1,4 @@
-"""JAX: the springs of Lloyd's rule in the plane, their energy minimised by SciPy's L-BFGS. Run once, see recorded.json."""
+"""JAX: the springs of Lloyd's rule in the plane, minimised by SciPy's L-BFGS. Run once, see recorded.json."""
 
 import time
 from importlib.metadata import version

@@ -1,4 +1,4 @@
-"""torch-fem: a hyperelastic body by automatic differentiation, its own Newton and load steps. Run once, see recorded.json."""
+"""torch-fem: a neo-Hookean body by automatic differentiation and its own Newton. Run once, see recorded.json."""
 
 import time
 from importlib.metadata import version

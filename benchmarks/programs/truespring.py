@@ -5,7 +5,7 @@ from functools import partial
 from importlib.metadata import version
 
 import truespring as ts
-from benchmarks.cases import WARM_UP, Case, bar
+from benchmarks.cases import WARM_UP, Case
 from benchmarks.programs.common import TOLERANCE, Run, main, peak_bytes
 
 
@@ -22,15 +22,13 @@ def problem_of(case: Case) -> ts.Problem:
 
 
 def solve(case: Case, model: str) -> Run:
-    """Solve in one load step, after an untimed solve of a smaller mesh that loads compiled code from its cache."""
+    """Solve in one load step."""
     chosen = ts.Fem(model) if model in ts.LAWS else ts.Springs(model)
-    newton = ts.Newton(load_steps=1, tolerance=TOLERANCE)
-    ts.solve(problem_of(bar(case.dim, "bending", WARM_UP[case.dim])), chosen, newton)
-    path = ts.solve(problem_of(case), chosen, newton)
+    path = ts.solve(problem_of(case), chosen, ts.Newton(load_steps=1, tolerance=TOLERANCE))
     if path.status is not ts.Status.CONVERGED:
         raise SystemExit(f"{path.status}: {path.status.advice}")
     cost = getattr(path, "cost", None)
-    notes = [str(getattr(cost, name)) for name in ("newton", "linear") if getattr(cost, name, None)]
+    notes = [cost.newton, cost.linear, *cost.notes] if cost else []
     return Run(
         version=version("truespring"),
         seconds=path.seconds,
@@ -43,4 +41,4 @@ def solve(case: Case, model: str) -> Run:
 
 
 if __name__ == "__main__":
-    main(partial(solve, model=sys.argv[2]))
+    main(partial(solve, model=sys.argv[2]), WARM_UP)

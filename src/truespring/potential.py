@@ -4,6 +4,7 @@ A model turns a problem into a `Potential`; a solver sees potentials and a `Load
 spring, an element or a mesh.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -19,6 +20,8 @@ SparseMatrix = sparse.bsr_array[Any]
 
 # Element matrices are held in slices of so many bytes, which stay in the processor's cache.
 _SLICE_BYTES = 4 * 2**20
+# References to an array of which only its owner knows: the owner's, and that of the question.
+_UNREFERENCED = 2
 # Threads share the rows of a slice from so many on.
 _SMALLEST_SLAB = 256
 
@@ -155,6 +158,7 @@ class Pattern:
         from truespring.kernels import sparsity
         from truespring.kernels.threads import run
 
+        self._room: Floats | None = None
         self.elements = np.ascontiguousarray(elements, dtype=np.int32)
         self.n_nodes, self.dim, self.zero = n_nodes, dim, (0.0,) * dim
         self.at_starts, self.at = sparsity.incidence(self.elements, n_nodes)
@@ -169,7 +173,10 @@ class Pattern:
 
     def values(self) -> Floats:
         """Return room for the values of a matrix, one block of shape (dim, dim) a pair of nodes; not filled."""
-        return np.empty((len(self.columns), self.dim, self.dim))
+        # Room that nothing refers to any more is used again: the system takes long to give large arrays.
+        if self._room is None or sys.getrefcount(self._room) > _UNREFERENCED:
+            self._room = np.empty((len(self.columns), self.dim, self.dim))
+        return self._room
 
     def matrix(self, values: Floats) -> SparseMatrix:
         """Return values of shape (n_blocks, dim, dim) as a sparse matrix, without a copy."""

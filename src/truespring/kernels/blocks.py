@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import dot, minus, plus, row, times
+from truespring.kernels.small import dot, minus, plus, put, row, times
 from truespring.kernels.threads import kernel
 
 
@@ -94,8 +94,7 @@ def product(
         s = times(rest, i, here, zero)
         for p in range(starts[i], starts[i + 1]):
             s = plus(s, times(off, p, minus(row(x, columns[p], zero), here), zero))
-        for c in range(len(zero)):
-            result[i, c] = s[c]
+        put(result, i, s)
         total += dot(here, s)
     return total
 
@@ -145,6 +144,16 @@ def scalar_product(first: int, last: int, a: Any, b: Any) -> float:
     return total
 
 
+@kernel
+def dense(first: int, last: int, matrix: Any, x: Any, result: Any) -> None:
+    """Write matrix x, the matrix small and symmetric; numpy would wake all threads for it."""
+    for i in range(first, last):
+        result[i] = 0.0
+    for j in range(len(x)):
+        for i in range(first, last):
+            result[i] += matrix[j, i] * x[j]
+
+
 # Gauss and Seidel within the rows of one thread, Jacobi between threads: symmetric, and the same every time.
 
 
@@ -160,8 +169,7 @@ def sweep_forward(
             if j >= first:
                 s = minus(s, times(off, p, row(z, j, zero), zero))
         s = times(inverse, i, s, zero)
-        for c in range(len(zero)):
-            z[i, c] = s[c]
+        put(z, i, s)
 
 
 @kernel
@@ -177,8 +185,7 @@ def left_over(
             s = minus(s, times(off, p, row(z, columns[p], zero), zero))
         for p in range(diagonal[i] + 1, starts[i + 1]):
             s = minus(s, times(off, p, row(z, columns[p], zero), zero))
-        for c in range(len(zero)):
-            left[i, c] = s[c]
+        put(left, i, s)
 
 
 @kernel
@@ -198,15 +205,13 @@ def sweep_backward(
     """z + (D + U)^-1 (r - A z), `old` being z before the sweep."""
     for i in range(last - 1, first - 1, -1):
         s = row(r, i, zero)
-        for p in range(starts[i], diagonal[i]):
-            j = columns[p]
-            s = minus(s, times(off, p, row(old, j, zero), zero))
-        for p in range(diagonal[i] + 1, starts[i + 1]):
+        # Backwards through memory all the way: so it is fetched ahead.
+        for p in range(starts[i + 1] - 1, diagonal[i], -1):
             j = columns[p]
             if j < last:
                 s = minus(s, times(off, p, row(z, j, zero), zero))
             else:
                 s = minus(s, times(off, p, row(old, j, zero), zero))
-        s = times(inverse, i, s, zero)
-        for c in range(len(zero)):
-            z[i, c] = s[c]
+        for p in range(diagonal[i] - 1, starts[i] - 1, -1):
+            s = minus(s, times(off, p, row(old, columns[p], zero), zero))
+        put(z, i, times(inverse, i, s, zero))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.sums import add_times
+from truespring.kernels.rows import add_times, write
 from truespring.kernels.threads import kernel
 
 
@@ -50,16 +50,15 @@ def quadrature(
     reference element, `corner_slopes` of the functions that place it in space, axes (point, node, direction).
     """
     dim = len(zero)
-    J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
+    J, inverse = np.empty((1, dim, dim)), np.empty((dim, dim))
     for e in range(first, last):
         for q in range(len(weights)):
             for i in range(dim):
                 total = zero
                 for a in range(corner_slopes.shape[1]):
                     total = add_times(total, places[e, a, i], corner_slopes, q, a)
-                for j in range(dim):
-                    J[i, j] = total[j]
-            volumes[e, q] = weights[q] * _invert(J, inverse, zero)
+                write(J, 0, i, total)
+            volumes[e, q] = weights[q] * _invert(J[0], inverse, zero)
             for a in range(slopes.shape[1]):
                 for i in range(dim):
                     result = 0.0
@@ -72,6 +71,7 @@ def quadrature(
 def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero: Any) -> None:
     """The gradient of a vector field from its values at the elements' nodes, axes (i, j, element, point)."""
     dim = len(zero)
+    F = np.empty((1, dim, dim))
     for e in range(first, last):
         slopes_here = slopes[e]
         for q in range(slopes.shape[1]):
@@ -79,8 +79,10 @@ def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero
                 total = zero
                 for a in range(values.shape[1]):
                     total = add_times(total, values[e, a, i], slopes_here, q, a)
+                write(F, 0, i, total)
+            for i in range(dim):
                 for j in range(dim):
-                    result[i, j, e, q] = total[j]
+                    result[i, j, e, q] = F[0, i, j]
 
 
 @kernel
@@ -125,7 +127,7 @@ def stiffnesses(
     """
     dim, n_points, k = len(zero), gradients.shape[1], gradients.shape[2]
     pulled, A = np.empty((dim, dim, len(D))), np.empty((dim, dim, dim * dim))
-    by_node = np.empty((k, n_points * dim, dim * dim))
+    by_node, block = np.empty((k, n_points * dim, dim * dim)), np.empty((1, 1, dim * dim))
     for e in range(first, last):
         for q in range(n_points):
             volume = volumes[e, q]
@@ -149,15 +151,15 @@ def stiffnesses(
                     total = square
                     for n in range(dim):
                         total = add_times(total, gradients[e, q, b, n], A, m, n)
-                    for ij in range(dim * dim):
-                        by_node[b, q * dim + m, ij] = total[ij]
+                    write(by_node, b, q * dim + m, total)
         for a in range(k):
             for b in range(a, k):
                 total = square
                 for q in range(n_points):
                     for m in range(dim):
                         total = add_times(total, gradients[e, q, a, m], by_node, b, q * dim + m)
+                write(block, 0, 0, total)
                 for i in range(dim):
                     for j in range(dim):
-                        blocks[e, a * dim + i, b * dim + j] = total[i * dim + j]
-                        blocks[e, b * dim + j, a * dim + i] = total[i * dim + j]
+                        blocks[e, a * dim + i, b * dim + j] = block[0, 0, i * dim + j]
+                        blocks[e, b * dim + j, a * dim + i] = block[0, 0, i * dim + j]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from truespring.kernels.rows import add_times, write
 from truespring.kernels.small import dot, minus, row
-from truespring.kernels.sums import add_times
 from truespring.kernels.threads import kernel
 
 
@@ -89,21 +89,19 @@ def stiffnesses(
     """
     dim, k = len(zero), elements.shape[1]
     vectors, coupled = np.empty((k, k, dim)), np.empty((coupling.shape[1], k, dim))
+    block = np.empty((dim, 1, dim))
     for e in range(first, last):
         M = coupling[e % len(coupling)]
         for a in range(k):
             for b in range(k):
-                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
-                for c in range(dim):
-                    vectors[a, b, c] = d[c]
+                write(vectors, a, b, minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero)))
         for s in range(len(M)):
             for b in range(k):
                 total = zero
                 for other in range(k):
                     if other != b:
                         total = add_times(total, 8 * M[s, number[b, other]], vectors, b, other)
-                for c in range(dim):
-                    coupled[s, b, c] = total[c]
+                write(coupled, s, b, total)
         for a in range(k):
             for b in range(a, k):
                 for i in range(dim):
@@ -111,9 +109,11 @@ def stiffnesses(
                     for other in range(k):
                         if other != a:
                             total = add_times(total, vectors[a, other, i], coupled, number[a, other], b)
+                    write(block, i, 0, total)
+                for i in range(dim):
                     for j in range(dim):
-                        blocks[e, a * dim + i, b * dim + j] = total[j]
-                        blocks[e, b * dim + j, a * dim + i] = total[j]
+                        blocks[e, a * dim + i, b * dim + j] = block[i, 0, j]
+                        blocks[e, b * dim + j, a * dim + i] = block[i, 0, j]
         for a in range(k):
             for b in range(k):
                 if a != b:

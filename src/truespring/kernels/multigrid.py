@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import plus, row, times, times_transposed
+from truespring.kernels.small import add_line, line, plus, put, row, times, times_transposed
 from truespring.kernels.threads import kernel
 
 
@@ -109,6 +109,7 @@ def smooth(
     p_starts: Any,
     p_columns: Any,
     p_data: Any,
+    zero: Any,
 ) -> None:
     """Write the rows of P = (I - omega D^-1 A) T, T the basis."""
     size, n_modes = basis.shape[1], basis.shape[2]
@@ -139,13 +140,11 @@ def smooth(
             there = aggregate[j]
             for r in range(size):
                 for s in range(size):
-                    a = off[p, r, s]
+                    a = np.float64(off[p, r, s])
                     if there >= 0:
-                        for k in range(n_modes):
-                            p_data[where[there], r, k] += a * basis[j, s, k]
+                        add_line(p_data, where[there], r, a, line(basis, j, s, zero))
                     if here >= 0:
-                        for k in range(n_modes):
-                            p_data[where[here], r, k] -= a * basis[i, s, k]
+                        add_line(p_data, where[here], r, -a, line(basis, i, s, zero))
         if aggregate[i] >= 0:
             q = where[aggregate[i]]
             for r in range(size):
@@ -241,6 +240,7 @@ def fill_product(
 def multiply(
     first: int,
     last: int,
+    begin: int,
     starts: Any,
     columns: Any,
     off: Any,
@@ -252,20 +252,20 @@ def multiply(
     ap_starts: Any,
     ap_columns: Any,
     ap_data: Any,
+    zero: Any,
 ) -> None:
-    """Rows of A P; the diagonal of A is rest less the row's other blocks."""
-    size, n_modes = p_data.shape[1], p_data.shape[2]
+    """Rows begin + first to begin + last of A P, stored from row `begin` on.
+
+    The diagonal block of A is rest less the row's other blocks.
+    """
+    size = p_data.shape[1]
     where = np.empty(n, np.int32)
     own = np.empty((size, size))
-    for i in range(first, last):
-        for q in range(ap_starts[i], ap_starts[i + 1]):
-            where[ap_columns[q]] = q
-            for r in range(size):
-                for k in range(n_modes):
-                    ap_data[q, r, k] = 0.0
-        for r in range(size):
-            for s in range(size):
-                own[r, s] = rest[i, r, s]
+    for i in range(begin + first, begin + last):
+        for q in range(ap_starts[i] - ap_starts[begin], ap_starts[i + 1] - ap_starts[begin]):
+            where[ap_columns[q + ap_starts[begin]]] = q
+            ap_data[q] = 0.0
+        own[:] = rest[i]
         for p in range(starts[i], starts[i + 1]):
             j = columns[p]
             for r in range(size):
@@ -274,53 +274,50 @@ def multiply(
             if j != i:
                 for t in range(p_starts[j], p_starts[j + 1]):
                     q = where[p_columns[t]]
-                    for r in range(size):
-                        for s in range(size):
-                            a = np.float64(off[p, r, s])
-                            for k in range(n_modes):
-                                ap_data[q, r, k] += a * p_data[t, s, k]
+                    for s in range(size):
+                        modes = line(p_data, t, s, zero)
+                        for r in range(size):
+                            add_line(ap_data, q, r, np.float64(off[p, r, s]), modes)
         for t in range(p_starts[i], p_starts[i + 1]):
             q = where[p_columns[t]]
-            for r in range(size):
-                for s in range(size):
-                    a = own[r, s]
-                    for k in range(n_modes):
-                        ap_data[q, r, k] += a * p_data[t, s, k]
+            for s in range(size):
+                modes = line(p_data, t, s, zero)
+                for r in range(size):
+                    add_line(ap_data, q, r, own[r, s], modes)
 
 
 @kernel
-def multiply_transposed(
+def add_transposed(
     first: int,
     last: int,
-    r_starts: Any,
-    r_node: Any,
-    r_data: Any,
+    low: int,
+    begin: int,
+    end: int,
+    p_starts: Any,
+    p_columns: Any,
+    p_data: Any,
     ap_starts: Any,
     ap_columns: Any,
     ap_data: Any,
     starts: Any,
     columns: Any,
-    n: int,
     data: Any,
+    zero: Any,
 ) -> None:
-    """Rows of P^T (A P)."""
-    n_modes, size = r_data.shape[1], r_data.shape[2]
-    where = np.empty(n, np.int32)
-    for c in range(first, last):
-        for q in range(starts[c], starts[c + 1]):
-            where[columns[q]] = q
-            for k in range(n_modes):
-                for m in range(n_modes):
-                    data[q, k, m] = 0.0
-        for p in range(r_starts[c], r_starts[c + 1]):
-            i = r_node[p]
-            for u in range(ap_starts[i], ap_starts[i + 1]):
-                q = where[ap_columns[u]]
-                for r in range(size):
-                    for k in range(n_modes):
-                        a = np.float64(r_data[p, k, r])
-                        for m in range(n_modes):
-                            data[q, k, m] += a * ap_data[u, r, m]
+    """Add what the rows `begin` to `end` of A P make of the rows low + first to low + last of P^T (A P)."""
+    size, n_modes = p_data.shape[1], p_data.shape[2]
+    for i in range(begin, end):
+        for t in range(p_starts[i], p_starts[i + 1]):
+            c = p_columns[t]
+            if low + first <= c < low + last:
+                q = starts[c]
+                for u in range(ap_starts[i], ap_starts[i + 1]):
+                    while columns[q] < ap_columns[u]:
+                        q += 1
+                    for r in range(size):
+                        modes = line(ap_data, u - ap_starts[begin], r, zero)
+                        for k in range(n_modes):
+                            add_line(data, q, k, np.float64(p_data[t, r, k]), modes)
 
 
 @kernel
@@ -332,8 +329,7 @@ def restrict(
         s = zero
         for p in range(r_starts[c], r_starts[c + 1]):
             s = plus(s, times(r_data, p, row(fine, r_node[p], none), zero))
-        for k in range(len(zero)):
-            coarse[c, k] = s[k]
+        put(coarse, c, s)
 
 
 @kernel
@@ -342,29 +338,24 @@ def prolong(
 ) -> None:
     """Add P coarse."""
     for i in range(first, last):
-        s = none
+        s = row(fine, i, none)
         for p in range(p_starts[i], p_starts[i + 1]):
             s = plus(s, times(p_data, p, row(coarse, p_columns[p], zero), none))
-        for c in range(len(none)):
-            fine[i, c] += s[c]
+        put(fine, i, s)
 
 
 @kernel
 def turn_back(first: int, last: int, turns: Any, x: Any, zero: Any) -> None:
     """x = Q^T x at each node."""
     for i in range(first, last):
-        s = times_transposed(turns, i, row(x, i, zero), zero)
-        for c in range(len(zero)):
-            x[i, c] = s[c]
+        put(x, i, times_transposed(turns, i, row(x, i, zero), zero))
 
 
 @kernel
 def add_turned(first: int, last: int, turns: Any, x: Any, result: Any, zero: Any) -> None:
     """Add Q x."""
     for i in range(first, last):
-        s = times(turns, i, row(x, i, zero), zero)
-        for c in range(len(zero)):
-            result[i, c] += s[c]
+        put(result, i, plus(row(result, i, zero), times(turns, i, row(x, i, zero), zero)))
 
 
 @kernel

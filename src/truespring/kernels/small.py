@@ -1,8 +1,8 @@
-"""Vectors of two, three or six numbers as tuples: compiled code keeps them in registers.
+"""Vectors of two, three or six numbers, and small matrices, as tuples: compiled code keeps them in registers.
 
 The length is known from the type, so that one kernel serves every dimension: it is given a `zero`
 such as (0.0, 0.0) and compiled once for each kind. The loops of numba over short arrays would go
-through memory instead.
+through memory instead, and an index that is not a constant would be looked up.
 """
 
 from numba.extending import overload
@@ -130,3 +130,131 @@ def _times_transposed(blocks, p, v, zero):
             across(blocks, p, 5, v),
         ),
     }[len(zero)]
+
+
+def put(x, i, v):
+    """Write v to row i of an array of shape (n, len(v))."""
+
+
+@overload(put)
+def _put(x, i, v):
+    def two(x, i, v):
+        x[i, 0], x[i, 1] = v[0], v[1]
+
+    def three(x, i, v):
+        x[i, 0], x[i, 1], x[i, 2] = v[0], v[1], v[2]
+
+    def six(x, i, v):
+        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4], x[i, 5] = v[0], v[1], v[2], v[3], v[4], v[5]
+
+    return {2: two, 3: three, 6: six}[len(v)]
+
+
+def scaled(a, v):
+    """a v."""
+
+
+@overload(scaled)
+def _scaled(a, v):
+    return {
+        2: lambda a, v: (a * v[0], a * v[1]),
+        3: lambda a, v: (a * v[0], a * v[1], a * v[2]),
+        6: lambda a, v: (a * v[0], a * v[1], a * v[2], a * v[3], a * v[4], a * v[5]),
+    }[len(v)]
+
+
+def line(blocks, p, i, zero):
+    """Row i of block p, as long as `zero`."""
+
+
+@overload(line)
+def _line(blocks, p, i, zero):
+    return {
+        2: lambda blocks, p, i, zero: (blocks[p, i, 0], blocks[p, i, 1]),
+        3: lambda blocks, p, i, zero: (blocks[p, i, 0], blocks[p, i, 1], blocks[p, i, 2]),
+        6: lambda blocks, p, i, zero: (
+            blocks[p, i, 0],
+            blocks[p, i, 1],
+            blocks[p, i, 2],
+            blocks[p, i, 3],
+            blocks[p, i, 4],
+            blocks[p, i, 5],
+        ),
+    }[len(zero)]
+
+
+def add_line(blocks, p, i, a, v):
+    """Add a v to row i of block p."""
+
+
+@overload(add_line)
+def _add_line(blocks, p, i, a, v):
+    def two(blocks, p, i, a, v):
+        blocks[p, i, 0] += a * v[0]
+        blocks[p, i, 1] += a * v[1]
+
+    def three(blocks, p, i, a, v):
+        blocks[p, i, 0] += a * v[0]
+        blocks[p, i, 1] += a * v[1]
+        blocks[p, i, 2] += a * v[2]
+
+    def six(blocks, p, i, a, v):
+        blocks[p, i, 0] += a * v[0]
+        blocks[p, i, 1] += a * v[1]
+        blocks[p, i, 2] += a * v[2]
+        blocks[p, i, 3] += a * v[3]
+        blocks[p, i, 4] += a * v[4]
+        blocks[p, i, 5] += a * v[5]
+
+    return {2: two, 3: three, 6: six}[len(v)]
+
+
+def along_and_across(u, v, d):
+    """The upper half of u d d^T + v I by rows."""
+
+
+@overload(along_and_across)
+def _along_and_across(u, v, d):
+    def two(u, v, d):
+        return (u * d[0] * d[0] + v, u * d[0] * d[1], u * d[1] * d[1] + v)
+
+    def three(u, v, d):
+        a, b = u * d[0], u * d[1]
+        return (a * d[0] + v, a * d[1], a * d[2], b * d[1] + v, b * d[2], u * d[2] * d[2] + v)
+
+    return {2: two, 3: three}[len(d)]
+
+
+def nothing(zero):
+    """The upper half of a matrix of zeros, as many rows as `zero`."""
+
+
+@overload(nothing)
+def _nothing(zero):
+    return {2: lambda zero: (0.0, 0.0, 0.0), 3: lambda zero: (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)}[len(zero)]
+
+
+def take_symmetric(blocks, p, m, zero):
+    """Subtract the symmetric matrix of upper half m from block p."""
+
+
+@overload(take_symmetric)
+def _take_symmetric(blocks, p, m, zero):
+    def two(blocks, p, m, zero):
+        blocks[p, 0, 0] -= m[0]
+        blocks[p, 0, 1] -= m[1]
+        blocks[p, 1, 0] -= m[1]
+        blocks[p, 1, 1] -= m[2]
+
+    def three(blocks, p, m, zero):
+        blocks[p, 0, 0] -= m[0]
+        blocks[p, 0, 1] -= m[1]
+        blocks[p, 0, 2] -= m[2]
+        blocks[p, 1, 0] -= m[1]
+        blocks[p, 1, 1] -= m[3]
+        blocks[p, 1, 2] -= m[4]
+        blocks[p, 2, 0] -= m[2]
+        blocks[p, 2, 1] -= m[4]
+        blocks[p, 2, 2] -= m[5]
+
+    return {2: two, 3: three}[len(zero)]

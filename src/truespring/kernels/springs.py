@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import dot, minus, row
+from truespring.kernels.small import along_and_across, dot, minus, nothing, plus, put, row, scaled, take_symmetric
 from truespring.kernels.threads import kernel
 
 
@@ -58,19 +58,16 @@ def pulls(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any
 
 
 @kernel
-def forces(
-    first: int, last: int, x: Any, springs: Any, at_starts: Any, at: Any, pull: Any, force: Any, zero: Any
+def internal_forces(
+    first: int, last: int, x: Any, springs: Any, at_starts: Any, at: Any, pull: Any, forces: Any, zero: Any
 ) -> None:
     """The derivative of the energy by the nodes first to last."""
     for i in range(first, last):
-        here = row(x, i, zero)
-        for c in range(len(zero)):
-            force[i, c] = 0.0
+        here, force = row(x, i, zero), zero
         for q in range(at_starts[i], at_starts[i + 1]):
             s = at[q] // 2
-            d = minus(here, row(x, springs[s, 1 - at[q] % 2], zero))
-            for c in range(len(zero)):
-                force[i, c] += pull[s] * d[c]
+            force = plus(force, scaled(pull[s], minus(here, row(x, springs[s, 1 - at[q] % 2], zero))))
+        put(forces, i, force)
 
 
 @kernel
@@ -106,23 +103,14 @@ def hessian(
     zero: Any,
 ) -> None:
     """Write the rows first to last: every block is added to by its own row only."""
-    dim = len(zero)
     for i in range(first, last):
         for p in range(starts[i], starts[i + 1]):
-            for c in range(dim):
-                for e in range(dim):
-                    data[p, c, e] = 0.0
-        here = row(x, i, zero)
+            data[p] = 0.0
+        here, whole, own = row(x, i, zero), nothing(zero), starts[i]
         for q in range(at_starts[i], at_starts[i + 1]):
-            s = at[q] // 2
-            a = at[q] % 2
-            d = minus(row(x, springs[s, 1 - a], zero), here)
-            own, other = slots[s, a, a], slots[s, a, 1 - a]
-            u, v = lengthwise[s], sideways[s]
-            for c in range(dim):
-                for e in range(dim):
-                    value = u * d[c] * d[e]
-                    if c == e:
-                        value += v
-                    data[own, c, e] += value
-                    data[other, c, e] -= value
+            s, a = at[q] // 2, at[q] % 2
+            block = along_and_across(lengthwise[s], sideways[s], minus(row(x, springs[s, 1 - a], zero), here))
+            take_symmetric(data, slots[s, a, 1 - a], block, zero)
+            whole = minus(whole, block)
+            own = slots[s, a, a]
+        take_symmetric(data, own, whole, zero)

@@ -22,7 +22,7 @@ def _place(x, i, zero):
     """Row i of an array of shape (n, len(zero)), in space."""
 
 
-@overload(_place, inline="always")
+@overload(_place)
 def _place_in_space(x, i, zero):
     return {2: lambda x, i, zero: (x[i, 0], x[i, 1], 0.0), 3: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2])}[len(zero)]
 
@@ -43,17 +43,27 @@ def _edges(x: Any, nodes: Any, simplex: Any, zero: Any) -> Any:
 
 
 @kernel
+def _add(rows: Any, i: int, factor: float, v: Any) -> None:
+    rows[i, 0] += factor * v[0]
+    rows[i, 1] += factor * v[1]
+    rows[i, 2] += factor * v[2]
+
+
+@kernel
 def _slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero: Any) -> None:
-    """The derivative of an element's volume by its nodes, shape (k * dim,)."""
-    dim = len(zero)
+    """The derivative of an element's volume by its nodes, shape (k, 3)."""
     slope[:] = 0.0
     for simplex in simplices:
         first, second, third = _edges(x, nodes, simplex, zero)
-        by_edge = _cross(second, third), _cross(third, first), _cross(first, second)
-        for place in range(dim):
-            for c in range(dim):
-                slope[simplex[place + 1] * dim + c] += weight * by_edge[place][c]
-                slope[simplex[0] * dim + c] -= weight * by_edge[place][c]
+        by_first, by_second = _cross(second, third), _cross(third, first)
+        _add(slope, simplex[1], weight, by_first)
+        _add(slope, simplex[2], weight, by_second)
+        _add(slope, simplex[0], -weight, by_first)
+        _add(slope, simplex[0], -weight, by_second)
+        if len(zero) == 3:
+            by_third = _cross(first, second)
+            _add(slope, simplex[3], weight, by_third)
+            _add(slope, simplex[0], -weight, by_third)
 
 
 @kernel
@@ -75,13 +85,13 @@ def growths(
 ) -> None:
     """The change of each element's volume that is linear in a step."""
     dim, k = len(zero), elements.shape[1]
-    slope = np.empty(k * dim)
+    slope = np.empty((k, 3))
     for e in range(first, last):
         _slopes(x, elements[e], simplices, weight, slope, zero)
         growth[e] = 0.0
         for a in range(k):
             for c in range(dim):
-                growth[e] += slope[a * dim + c] * step[elements[e, a], c]
+                growth[e] += slope[a, c] * step[elements[e, a], c]
 
 
 @kernel
@@ -89,9 +99,13 @@ def forces(
     first: int, last: int, x: Any, elements: Any, simplices: Any, weight: float, pressure: Any, force: Any, zero: Any
 ) -> None:
     """The pressure times the derivative of each element's volume, shape (n_elements, k * dim)."""
+    dim, k = len(zero), elements.shape[1]
+    slope = np.empty((k, 3))
     for e in range(first, last):
-        _slopes(x, elements[e], simplices, weight, force[e], zero)
-        force[e] *= pressure[e]
+        _slopes(x, elements[e], simplices, weight, slope, zero)
+        for a in range(k):
+            for c in range(dim):
+                force[e, a * dim + c] = pressure[e] * slope[a, c]
 
 
 @kernel
@@ -106,9 +120,8 @@ def _turns(x: Any, nodes: Any, simplices: Any, weight: float, turn: Any, zero: A
         else:
             for a, b, c, d in _OPPOSITE:
                 w = minus(_place(x, nodes[simplex[d]], zero), _place(x, nodes[simplex[c]], zero))
-                for axis in range(3):
-                    turn[simplex[a], simplex[b], axis] += weight * w[axis]
-                    turn[simplex[b], simplex[a], axis] -= weight * w[axis]
+                _add(turn[simplex[a]], simplex[b], weight, w)
+                _add(turn[simplex[b]], simplex[a], -weight, w)
 
 
 @kernel
@@ -126,18 +139,17 @@ def stiffnesses(
 ) -> None:
     """Write s s^T times a stiffness, s the derivative of the volume, and the geometric part."""
     dim, k = len(zero), elements.shape[1]
-    slope, turn = np.empty(k * dim), np.empty((k, k, 3))
+    slope, turn = np.empty((k, 3)), np.empty((k, k, 3))
     for e in range(first, last):
-        block = blocks[e]
         _slopes(x, elements[e], simplices, weight, slope, zero)
         _turns(x, elements[e], simplices, weight * pressure[e], turn, zero)
-        for i in range(k * dim):
-            for j in range(k * dim):
-                block[i, j] = stiffness[e] * slope[i] * slope[j]
         for a in range(k):
             for b in range(k):
+                for i in range(dim):
+                    for j in range(dim):
+                        blocks[e, a * dim + i, b * dim + j] = stiffness[e] * slope[a, i] * slope[b, j]
                 for c in range(3):
                     i, j = (c + 1) % 3, (c + 2) % 3
                     if i < dim and j < dim:
-                        block[a * dim + i, b * dim + j] += turn[a, b, c]
-                        block[a * dim + j, b * dim + i] -= turn[a, b, c]
+                        blocks[e, a * dim + i, b * dim + j] += turn[a, b, c]
+                        blocks[e, a * dim + j, b * dim + i] -= turn[a, b, c]

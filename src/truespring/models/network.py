@@ -142,7 +142,7 @@ class SpringNetwork:
         pull, force = np.empty(len(self.springs)), np.empty(self.nodes.shape)
         self._run(springs.pulls, x, *self._law, pull)
         rows = (pattern.elements, pattern.at_starts, pattern.at)
-        run(springs.forces, len(self.nodes), x, *rows, pull, force, pattern.zero)
+        run(springs.internal_forces, len(self.nodes), x, *rows, pull, force, pattern.zero)
         return force
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:

@@ -12,7 +12,7 @@ from truespring.errors import ProblemError
 from truespring.potential import Loading, Potential, SparseMatrix
 from truespring.solvers.cost import Cost
 from truespring.solvers.direct import Direct, SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError, SlowError
+from truespring.solvers.gradients import IndefiniteError, SlowError, norm
 from truespring.solvers.linear import LinearSolver, Tangent, choose
 
 #: Called after each iteration with load factor, iteration and relative residual.
@@ -104,7 +104,7 @@ class Balance:
     def unbalanced(self, internal: Floats, load_factor: float) -> tuple[Floats, float]:
         """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
         applied = load_factor * self.loading.external_force
-        scale = max(float(np.linalg.norm(applied)), float(np.linalg.norm(internal)))
+        scale = max(norm(applied), norm(internal))
         return np.where(self.free, internal - applied, 0.0), scale
 
     def hessian(self, positions: Floats, *stress: Floats) -> SparseMatrix:
@@ -208,7 +208,7 @@ class Watch:
         """
         internal = self._balance.potential.gradient(positions)
         self.force, self._scale = self._balance.unbalanced(internal, self._load_factor)
-        self._size = float(np.linalg.norm(self.force))
+        self._size = norm(self.force)
         self.residual = self._size / self._scale if self._scale else 0.0
         if self._balance.report:
             self._balance.report(self._load_factor, iteration, self.residual)

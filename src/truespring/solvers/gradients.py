@@ -36,6 +36,14 @@ class Solved(NamedTuple):
     iterations: int
 
 
+def norm(x: Floats) -> float:
+    """Return the Euclidean norm of an array of shape (n, k)."""
+    from truespring.kernels import blocks
+    from truespring.kernels.threads import run
+
+    return float(np.sqrt(sum(run(blocks.scalar_product, len(x), x, x))))
+
+
 def conjugate_gradients(
     product: Product, precondition: Preconditioner, right: Floats, accuracy: float, max_iterations: int
 ) -> Solved:
@@ -50,7 +58,7 @@ def conjugate_gradients(
 
     n = len(right)
     x, r = np.zeros(right.shape), right.copy()
-    wanted = accuracy * float(np.linalg.norm(right))
+    wanted = accuracy * norm(right)
     p, q = np.zeros(right.shape), np.empty(right.shape)
     previous = np.inf
     for iteration in range(1, max_iterations + 1):

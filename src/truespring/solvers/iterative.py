@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats, Singles
+from truespring.arrays import Bools, Floats
 from truespring.potential import SparseMatrix, rigid_body_modes
 from truespring.solvers.direct import SingularMatrixError
 from truespring.solvers.gradients import IndefiniteError, SlowError, conjugate_gradients, lowest_eigenvalue
@@ -47,7 +47,7 @@ class Multigrid:
             self._build(level, positions)
         if self._coarse is None:
             raise SingularMatrixError("the matrix is not positive on the directions of a single node")
-        turns = np.empty(matrix.data[: len(positions)].shape, np.float32)
+        turns = np.empty(matrix.data[: len(positions)].shape)
         around = (level.starts, level.columns, writable(self._built_at), writable(positions), self._held)
         run(multigrid.rotations, len(positions), *around, turns)
         return Preconditioned(self, level, self._coarse, turns, self._scale, positive)
@@ -80,16 +80,14 @@ class Preconditioned:
     solver: Multigrid
     level: Level
     coarse: Hierarchy
-    turns: Singles
+    turns: Floats
     scale: float
     positive: bool
 
     lasting: ClassVar[bool] = False
 
     def _precondition(self, r: Floats) -> Floats:
-        size = float(np.linalg.norm(r)) or 1.0
-        z = self.coarse.cycle(self.level, self.turns, (r / size).astype(np.float32))
-        return np.multiply(z, size, dtype=np.float64)
+        return self.coarse.cycle(self.level, self.turns, r)
 
     def solve(self, right: Floats, accuracy: float = 1e-10) -> Floats:
         """Return the solution of matrix x = right; raise IndefiniteError where a negative direction is met.

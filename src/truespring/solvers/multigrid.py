@@ -3,8 +3,8 @@
 Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the rigid-body modes of the nodes, built for the
 tangent of one state. At another state the coarse levels are asked through the rotations Q of the nodes
 since then, P -> Q P, while the finest level, where the body is smoothed, is that of the state itself.
-One V-cycle is symmetric: a forward sweep of Gauss and Seidel down, a backward one up. On the finest level it
-works in single precision: it only ever improves a direction.
+One V-cycle is symmetric: a forward sweep of Gauss and Seidel down, a backward one up. The blocks of the finest
+level are in single precision, half the memory to move.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,18 @@ from scipy import sparse
 
 from truespring.arrays import Bools, Floats, ShortInts, Singles
 from truespring.solvers.direct import SingularMatrixError
+from truespring.solvers.gradients import norm
 
 Real = Floats | Singles
 
 # A level of no more unknowns than this is solved with by its inverse.
-_COARSEST = 400
+_COARSEST = 200
 _MAX_LEVELS = 20
 # Nodes are joined to one aggregate over blocks of at least this size beside those of the diagonal.
 _STRONG = 0.04
 _POWER_ITERATIONS = 10
+# Rows of a product of matrices are made so many at a time; threads share them from so many on.
+_SLICE, _SMALLEST_SLAB = 16_384, 64
 # The largest eigenvalue of D^-1 A is estimated from below.
 _SAFETY = 1.1
 
@@ -120,18 +123,20 @@ class Hierarchy:
         transfers = sum(transfer.n_bytes for transfer in self.transfers)
         return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
 
-    def cycle(self, finest: Level, turns: Singles, residual: Singles) -> Real:
+    def cycle(self, finest: Level, turns: Floats, residual: Floats) -> Floats:
         """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim)."""
         return self._cycle(0, finest, residual, turns)
 
-    def _cycle(self, depth: int, level: Level, r: Real, turns: Singles | None) -> Real:
+    def _cycle(self, depth: int, level: Level, r: Floats, turns: Floats | None) -> Floats:
         from truespring.kernels import blocks, multigrid
         from truespring.kernels.threads import run
 
         if depth == len(self.transfers):
-            return (self.inverse @ r.ravel()).reshape(r.shape)
+            solution = np.empty(r.size)
+            blocks.dense(0, r.size, self.inverse, r.ravel(), solution)
+            return solution.reshape(r.shape)
         n, size = level.shape
-        zero = (r.dtype.type(0),) * size
+        zero = (0.0,) * size
         matrix = (level.starts, level.columns, level.diagonal, level.off)
         z, left = np.empty_like(r), np.empty_like(r)
         run(blocks.sweep_forward, n, *matrix, level.inverse, r, z, zero)
@@ -234,14 +239,18 @@ def _aggregates(level: Level) -> tuple[ShortInts, int]:
 
 def _largest_eigenvalue(level: Level) -> float:
     """Estimate that of D^-1 A by power iteration."""
+    from truespring.kernels import multigrid
+    from truespring.kernels.threads import run
+
     n, size = level.shape
     x = np.random.default_rng(3).normal(size=(n, size))
     value = 1.0
     for _ in range(_POWER_ITERATIONS):
         level.product(x, image := np.empty_like(x))
-        image = np.einsum("nij,nj->ni", level.inverse, image)
-        value = float(np.linalg.norm(image) / np.linalg.norm(x))
-        x = image / np.linalg.norm(image)
+        smoothed = np.zeros_like(x)
+        run(multigrid.add_turned, n, level.inverse, image, smoothed, (0.0,) * size)
+        grown = norm(smoothed)
+        value, x = grown / norm(x), smoothed / grown
     return _SAFETY * value
 
 
@@ -254,10 +263,22 @@ def _smoothed(level: Level, aggregate: ShortInts, basis: Floats, n_coarse: int, 
     run(multigrid.count_smoothed, n, level.starts, level.columns, aggregate, n_coarse, counts)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     columns = np.empty(starts[-1], np.int32)
-    values = np.empty((starts[-1], size, basis.shape[2]))
+    values = np.empty((starts[-1], size, basis.shape[2]), np.float32)
     matrix = (level.starts, level.columns, level.off, level.rest, level.inverse)
-    run(multigrid.smooth, n, *matrix, aggregate, basis, n_coarse, omega, starts, columns, values)
-    return Transfer(starts, columns, values.astype(np.float32), *multigrid.transpose(starts, columns, values, n_coarse))
+    run(
+        multigrid.smooth,
+        n,
+        *matrix,
+        aggregate,
+        basis,
+        n_coarse,
+        omega,
+        starts,
+        columns,
+        values,
+        (0.0,) * basis.shape[2],
+    )
+    return Transfer(starts, columns, values, *multigrid.transpose(starts, columns, values, n_coarse))
 
 
 def _galerkin(level: Level, transfer: Transfer, n_coarse: int) -> tuple[Floats, ShortInts, ShortInts]:
@@ -277,23 +298,17 @@ def _galerkin(level: Level, transfer: Transfer, n_coarse: int) -> tuple[Floats, 
         return starts, columns
 
     ap_starts, ap_columns = pattern(n, level.starts, level.columns, transfer.starts, transfer.columns)
-    ap_data = np.empty((len(ap_columns), size, n_modes))
-    a = (level.starts, level.columns, level.off, level.rest)
-    p = (transfer.starts, transfer.columns, transfer.data)
-    run(multigrid.multiply, n, *a, *p, n_coarse, ap_starts, ap_columns, ap_data)
     starts, columns = pattern(n_coarse, transfer.column_starts, transfer.node, ap_starts, ap_columns)
-    data = np.empty((len(columns), n_modes, n_modes))
-    by_column = (transfer.column_starts, transfer.node, transfer.column_data)
-    run(
-        multigrid.multiply_transposed,
-        n_coarse,
-        *by_column,
-        ap_starts,
-        ap_columns,
-        ap_data,
-        starts,
-        columns,
-        n_coarse,
-        data,
-    )
+    data = np.zeros((len(columns), n_modes, n_modes))
+    a, p = (level.starts, level.columns, level.off, level.rest), (transfer.starts, transfer.columns, transfer.data)
+    modes = (0.0,) * n_modes
+    for begin in range(0, n, _SLICE):  # A P is larger than A itself: a slice of it at a time
+        end = min(begin + _SLICE, n)
+        ap = (ap_starts, ap_columns, np.empty((ap_starts[end] - ap_starts[begin], size, n_modes)))
+        run(multigrid.multiply, end - begin, begin, *a, *p, n_coarse, *ap, modes, smallest=_SMALLEST_SLAB)
+        reached = transfer.columns[transfer.starts[begin] : transfer.starts[end]]
+        if reached.size:
+            low, n_reached = int(reached.min()), int(np.ptp(reached)) + 1
+            to = (*p, *ap, starts, columns, data, modes)
+            run(multigrid.add_transposed, n_reached, low, begin, end, *to, smallest=_SMALLEST_SLAB)
     return data, starts, columns

@@ -12,6 +12,7 @@ from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
 from truespring.solvers.cost import Cost
+from truespring.solvers.gradients import norm
 from truespring.solvers.line_search import descend
 from truespring.solvers.linear import check_linear, choose
 
@@ -163,7 +164,7 @@ def _find_by_search(balance: Balance, level: float, last: Found, previous: Equil
     if not guesses:
         state = last.state
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))
-    start = min(guesses, key=lambda guess: float(np.linalg.norm(balance.force(guess, level))))
+    start = min(guesses, key=lambda guess: norm(balance.force(guess, level)))
     return stabilised(balance, descend(balance, level, start))
 
 
@@ -190,5 +191,5 @@ def _snapped(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None
     if previous is None or state.branched:
         return False
     ratio = (state.load_factor - last.load_factor) / (last.load_factor - previous.load_factor)
-    expected = ratio * float(np.linalg.norm(last.positions - previous.positions))
-    return float(np.linalg.norm(state.positions - last.positions)) > _SNAP * expected
+    expected = ratio * norm(last.positions - previous.positions)
+    return norm(state.positions - last.positions) > _SNAP * expected

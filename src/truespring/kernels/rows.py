@@ -1,10 +1,13 @@
-"""Sums of short rows that stay in registers, as tuples; a local array would go through memory."""
+"""Rows of three-dimensional arrays as tuples, which stay in registers while they are summed.
+
+A local array would go through memory, and an index that is not a constant would be looked up.
+"""
 
 from numba.extending import overload
 
 
 def add_times(total, factor, rows, i, j):
-    """`total` + factor times the row i, j of an array of shape (n, m, len(total))."""
+    """`total` + factor times the row i, j, which is as long."""
 
 
 @overload(add_times)
@@ -37,3 +40,26 @@ def _add_times(total, factor, rows, i, j):
             total[8] + factor * rows[i, j, 8],
         ),
     }[len(total)]
+
+
+def write(rows, i, j, v):
+    """Write v to the row i, j."""
+
+
+@overload(write)
+def _write(rows, i, j, v):
+    def two(rows, i, j, v):
+        rows[i, j, 0], rows[i, j, 1] = v[0], v[1]
+
+    def three(rows, i, j, v):
+        rows[i, j, 0], rows[i, j, 1], rows[i, j, 2] = v[0], v[1], v[2]
+
+    def four(rows, i, j, v):
+        rows[i, j, 0], rows[i, j, 1], rows[i, j, 2], rows[i, j, 3] = v[0], v[1], v[2], v[3]
+
+    def nine(rows, i, j, v):
+        rows[i, j, 0], rows[i, j, 1], rows[i, j, 2] = v[0], v[1], v[2]
+        rows[i, j, 3], rows[i, j, 4], rows[i, j, 5] = v[3], v[4], v[5]
+        rows[i, j, 6], rows[i, j, 7], rows[i, j, 8] = v[6], v[7], v[8]
+
+    return {2: two, 3: three, 4: four, 9: nine}[len(v)]

@@ -1,0 +1,91 @@
+"""The figures aimed at, beside what was measured."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.cases import REFERENCE, SPRINGS
+from benchmarks.limits import Moved
+from benchmarks.runs import Measured
+
+#: Cost over size is fitted from so many nodes on.
+LARGE = 30_000
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What is wanted: at least or at most a number; `measured` is None where it was not measured."""
+
+    what: str
+    wanted: float
+    measured: float | None
+    at_least: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """Met, or by how much it is missed."""
+        if self.measured is None or math.isnan(self.measured):
+            return "not measured"
+        if self.measured >= self.wanted if self.at_least else self.measured <= self.wanted:
+            return "met"
+        high, low = max(self.measured, self.wanted), min(self.measured, self.wanted)
+        return f"missed by {high / low - 1:.0%}"
+
+
+def of_springs(runs: list[Measured], dim: int, load: str = "bending") -> list[Measured]:
+    """Return the runs of the springs of `cases.SPRINGS` that gave a result, from small to large."""
+    found = (run for run in runs if (run.program, run.dim, run.load) == (SPRINGS[dim], dim, load) and run.seconds)
+    return sorted(found, key=lambda run: run.n_nodes)
+
+
+def growth(runs: list[Measured]) -> float | None:
+    """Return p of time ~ n^p by least squares over the runs from LARGE on; None for fewer than two."""
+    large = [run for run in runs if run.n_nodes >= LARGE]
+    if len(large) < 2:
+        return None
+    return float(np.polyfit(*np.log([[run.n_nodes for run in large], [run.median for run in large]]), 1)[0])
+
+
+def faster(runs: list[Measured], dim: int, programs: tuple[str, ...], load: str = "bending") -> float | None:
+    """Return how many times faster springs are than the fastest of `programs` at the size of `cases.REFERENCE`."""
+    at = [run for run in runs if (run.dim, run.load, run.depth) == (dim, load, REFERENCE[dim]) and run.seconds]
+    ours = [run.median for run in at if run.program == SPRINGS[dim]]
+    theirs = [run.median for run in at if run.program in programs]
+    return min(theirs) / ours[0] if ours and theirs else None
+
+
+FELUPE = ("felupe-svk", "felupe-nh")
+
+
+def aims(results: dict, runs: list[Measured]) -> Iterator[Aim]:
+    """Yield all of them."""
+    for dim, size, wanted in ((2, "51 000", ((12, 25), (8, 15))), (3, "31 000", ((35, 80), (15, 30)))):
+        for name, programs, (least, best) in zip(("CalculiX", "FElupe"), (("calculix",), FELUPE), wanted, strict=True):
+            measured = faster(runs, dim, programs)
+            yield Aim(f"{dim}D, {size} nodes: times faster than {name}", least, measured, at_least=True)
+            yield Aim(f"{dim}D, {size} nodes: times faster than {name}, hoped for", best, measured, at_least=True)
+    for dim, upper, memory in ((2, "one million", 2.5), (3, "300 000", 10.0)):
+        springs = of_springs(runs, dim)
+        yield Aim(f"{dim}D: p of time ~ n^p from 30 000 to {upper} nodes", 1.1, growth(springs))
+        largest = springs[-1].peak_bytes / springs[-1].n_nodes / 1024 if springs else None
+        yield Aim(f"{dim}D, largest size: memory over an empty process, KiB a node", memory, largest)
+        newton = max((run.iterations for run in springs), default=None)
+        yield Aim(f"{dim}D: Newton iterations, most of all sizes", 8, newton)
+        per_newton = [run.linear_iterations / run.iterations for run in springs if run.linear_iterations]
+        gradients = max(per_newton, default=None)
+        yield Aim(f"{dim}D: conjugate gradients an iteration of Newton, most of all sizes", 15, gradients)
+    limit = max(results["bandwidth"].values())
+    for name, least_nodes, wanted in (
+        ("assembly", 50_000, 3.0),
+        ("assembly", 1_000_000, 6.0),
+        ("matrix product", 50_000, 1.5),
+        ("matrix product", 1_000_000, 1.5),
+    ):
+        rows = [row for row in results["kernels"] if (row["dim"], row["name"]) == (2, name)]
+        at = [row for row in rows if least_nodes <= row["n_nodes"] < 1.1 * least_nodes]
+        measured = Moved(name, at[0]["seconds"], at[0]["bytes_moved"]).over(limit) if at else None
+        yield Aim(f"2D, {least_nodes:,} nodes: {name}, times the memory limit".replace(",", " ", 1), wanted, measured)
+    for command, wanted in (("truespring verify examples/bending.toml", 4.0), ("truespring --help", 0.3)):
+        yield Aim(f"`{command}`, seconds", wanted, results["command_line"].get(command))

@@ -1,0 +1,48 @@
+"""The figure docs/performance.svg: time over nodes, one line a program."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from benchmarks.cases import SIZES, SPRINGS
+from benchmarks.runs import PROGRAMS, Measured
+
+# Springs in the colours of truespring, finite elements of its own in greys, peers in others; the dash tells the law.
+_STYLES = {
+    "lloyd": ("#1f5fa8", "-"),
+    "isotropic": ("#1f5fa8", "-"),
+    "biquadratic": ("#6ba3dc", "-"),
+    "fem-svk": ("#444444", "-"),
+    "fem-nh": ("#999999", "-"),
+    "calculix": ("#c0392b", "-"),
+    "felupe-svk": ("#2e8b57", "-"),
+    "felupe-nh": ("#2e8b57", ":"),
+    "skfem": ("#d98e04", ":"),
+}
+
+
+def draw(runs: Iterable[Measured], file: Path) -> None:
+    """Draw bending in 2D and 3D side by side."""
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    bent = [run for run in runs if run.load == "bending" and run.seconds and run.depth in SIZES[run.dim]]
+    figure = Figure(figsize=(10.5, 4.8), layout="constrained")
+    for ax, dim in zip(figure.subplots(1, 2, sharey=True), (2, 3), strict=True):
+        for name, program in PROGRAMS.items():
+            points = [(run.n_nodes, run.median) for run in bent if (run.program, run.dim) == (name, dim)]
+            if points:
+                color, dash = _STYLES[name]
+                width = 2.4 if name == SPRINGS[dim] else 1.4
+                ax.loglog(
+                    *zip(*points, strict=True), dash, marker="o", ms=4, color=color, lw=width, label=program.label
+                )
+        ax.set(xlabel="nodes", title=f"{dim}D")
+        ax.grid(which="major", color="#e5e5e5", lw=0.8)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.legend(frameon=False, fontsize=8, loc="upper left")
+    figure.axes[0].set_ylabel("seconds from the mesh to equilibrium")
+    figure.suptitle("Bent by a force that moves the end of the springs by half the length", fontsize=11)
+    with matplotlib.rc_context({"svg.hashsalt": "performance", "svg.fonttype": "path"}):
+        FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None})

@@ -1,0 +1,297 @@
+"""The page docs/performance.md from results.json: python -m benchmarks.page rebuilds it without measuring."""
+
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from benchmarks import aims, errors
+from benchmarks.cases import LENGTH, LOADS, MOVED, REFERENCE, SIZES, SPRINGS, n_nodes
+from benchmarks.figure import draw
+from benchmarks.limits import Moved
+from benchmarks.runs import HERE, PROGRAMS, ROOT, Measured
+
+# How each program solves; the rest of its row comes from the runs.
+_SOLVERS = {
+    "truespring": "one load step, residual to 1e-8 of the load",
+    "calculix": "NLGEOM, one increment, SPOOLES on all threads; residual and correction to 1e-7, in its own norms",
+    "felupe": "plain Newton, MKL Pardiso, threads; residual to 1e-8 of the reactions",
+    "skfem": "plain Newton, MKL Pardiso; residual to 1e-8 of the load",
+}
+
+
+def build(results_file: Path, folder: Path) -> str:
+    """Write performance.md and performance.svg to `folder`; return the text."""
+    results = json.loads(results_file.read_text())
+    runs = [Measured(**run | {"seconds": tuple(run["seconds"])}) for run in results["runs"]]
+    recorded = json.loads((HERE / "recorded.json").read_text())
+    text = "\n".join(_page(results, runs, recorded)) + "\n"
+    (folder / "performance.md").write_text(text, encoding="utf-8")
+    draw(runs, folder / "performance.svg")
+    return text
+
+
+def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
+    machine, versions = results["machine"], results["versions"]
+    yield "# Performance\n"
+    yield (
+        "The numbers on this page are measured by `make bench`, which rebuilds it: all on one machine, each run in a "
+        f"process of its own. {results['date']}; {machine['processor']}, {machine['cores']} cores, "
+        f"{machine['memory_bytes'] / 2**30:.0f} GiB, {machine['system']}; "
+        f"{', '.join(f'{name} {number}' for name, number in versions.items())}.\n"
+    )
+    yield from _compared(runs)
+    yield "## Time\n"
+    yield "![Time over nodes](performance.svg)\n"
+    for dim, load in LOADS:
+        yield from _times(runs, dim, load, results["limit_seconds"])
+    yield from _agreement(runs)
+    yield from _ratios(runs)
+    yield from _details(runs)
+    yield from _memory(runs)
+    yield from _limit(results)
+    yield from _accuracy(runs)
+    yield from _aims(results, runs)
+    yield from _recorded(recorded)
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
+    """Yield the lines of a table, its first column to the left."""
+    head = list(head)
+    yield f"| {' | '.join(head)} |"
+    yield f"|---|{'---:|' * (len(head) - 1)}"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+    yield ""
+
+
+def _seconds(value: float) -> str:
+    return f"{value:#.2g}" if value < 10 else f"{value:.0f}"
+
+
+def _sizes(runs: list[Measured], dim: int, load: str) -> list[int]:
+    """Those of SIZES that were run, as elements over the height."""
+    return sorted({run.depth for run in runs if (run.dim, run.load) == (dim, load)} & set(SIZES[dim]))
+
+
+def _compared(runs: list[Measured]) -> Iterator[str]:
+    bent, pulled = (f"{MOVED[load]:.0%}" for load in ("bending", "stretching"))
+    yield "## What is compared\n"
+    yield (
+        "**Springs are a cheaper model than finite elements.** A spring knows two nodes, an element integrates a law "
+        "of matter over all of its own; springs have a Poisson's ratio of their own and are right only as far as "
+        "[their error](#time-to-the-same-error) tells. The times below are those of springs beside those of finite "
+        "elements with the same nodes, supports and force, not those of two ways to solve the same equations. Where "
+        "the equations are the same, truespring's own finite elements are the comparison, and the biquadratic springs, "
+        "whose limit is St. Venant-Kirchhoff's law.\n"
+    )
+    yield (
+        f"Two bodies, held on the left, pulled on the right by a dead force: a rectangle {LENGTH:g} by 1 of squares in "
+        f"plane stress (Poisson's ratio 1/3) and a box {LENGTH:g} by 1 by 1 of cubes (1/4). Bending: the force that "
+        f"moves the end of the springs down by {bent} of the length. Stretching: that which makes them {pulled} "
+        "longer.\n"
+    )
+    yield (
+        "Seconds are wall time from the built mesh to equilibrium: pattern, assembly, factorisation or multigrid "
+        "setup, all iterations; not reading, writing and compiling (compiled code comes from its cache; each process "
+        "first solves a small mesh, untimed). The median of three runs, or one run where that takes a minute. Peers "
+        "take as few equal load steps as they need; attempts that fail are not timed.\n"
+    )
+    rows = []
+    for name, program in PROGRAMS.items():
+        version = next((run.version for run in runs if run.program == name and run.version), "not run")
+        rows.append((program.label, version, program.law, _SOLVERS[program.module]))
+    yield from table(("program", "version", "what matter is", "how it is solved"), rows)
+
+
+def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterator[str]:
+    depths = _sizes(runs, dim, load)
+    at = {(run.program, run.depth): run for run in runs if (run.dim, run.load) == (dim, load)}
+    nodes = [n_nodes(dim, depth) for depth in depths]
+    yield f"### {dim}D, {load}: seconds\n"
+    left_out = {}
+
+    def cell(program: str, depth: int) -> str:
+        run = at.get((program, depth))
+        if run is None:
+            return ""
+        if not run.seconds:
+            left_out.setdefault(PROGRAMS[program].label, run.failure)
+            return "-"
+        steps = f" ({run.notes.split()[0]} steps)" if run.notes.endswith("load steps") else ""
+        return _seconds(run.median) + steps
+
+    rows = [
+        (program.label, *(cell(name, depth) for depth in depths))
+        for name, program in PROGRAMS.items()
+        if dim in program.dims
+    ]
+    yield from table(("nodes", *(f"{count:,}" for count in nodes)), rows)
+    if left_out:
+        yield f"Left out, as no solve may take longer than {longest:g} s:\n"
+        yield from (f"* {label}: {why}" for label, why in left_out.items())
+        yield ""
+
+
+def _agreement(runs: list[Measured]) -> Iterator[str]:
+    """How far the tips of programs of one law are apart on one mesh."""
+    apart: dict[tuple[str, int], float] = {}
+    for law in ("St. Venant-Kirchhoff", "neo-Hookean"):
+        for dim in (2, 3):
+            tips: dict[tuple[str, int], list[float]] = {}
+            for run in runs:
+                if PROGRAMS[run.program].law == law and run.dim == dim and run.seconds:
+                    tips.setdefault((run.load, run.depth), []).append(run.tip)
+            spreads = [max(values) / min(values) - 1 for values in tips.values() if len(values) > 1]
+            apart[law, dim] = max(spreads, default=0.0)
+    told = "; ".join(f"{law}, {dim}D: {value:.1e}" for (law, dim), value in apart.items())
+    yield (
+        "Programs of the same law agree: the largest relative distance of two tips on one mesh, over all sizes and "
+        f"both loads: {told}. (CalculiX makes plane stress of one thin layer of bricks, and prints seven digits.)\n"
+    )
+
+
+def _ratios(runs: list[Measured]) -> Iterator[str]:
+    yield "## How many times faster springs are\n"
+    yield "At the size of each column, than:\n"
+    columns = [(dim, load) for dim, load in LOADS if _at_reference(runs, SPRINGS[dim], dim, load)]
+    rows = []
+    for name, program in PROGRAMS.items():
+        cells = []
+        for dim, load in columns:
+            theirs, ours = _at_reference(runs, name, dim, load), _at_reference(runs, SPRINGS[dim], dim, load)
+            cells.append(f"{theirs.median / ours.median:.1f}" if theirs and name != SPRINGS[dim] else "")
+        rows.append((program.label, *cells))
+    nodes = [f"{dim}D, {load}, {_at_reference(runs, SPRINGS[dim], dim, load).n_nodes:,} nodes" for dim, load in columns]
+    yield from table(("", *nodes), (row for row in rows if any(row[1:])))
+
+
+def _at_reference(runs: list[Measured], program: str, dim: int, load: str) -> Measured | None:
+    wanted = (program, dim, load, REFERENCE[dim])
+    return next((run for run in runs if (run.program, run.dim, run.load, run.depth) == wanted and run.seconds), None)
+
+
+def _details(runs: list[Measured]) -> Iterator[str]:
+    yield "## Springs by size\n"
+    for dim, load in LOADS:
+        springs = [run for run in aims.of_springs(runs, dim, load) if run.depth in _sizes(runs, dim, load)]
+        power = aims.growth(springs)
+        grown = f": time ~ n^{power:.2f} from {aims.LARGE:,} nodes on" if power is not None else ""
+        yield f"{dim}D, {load}{grown}\n"
+        yield from table(
+            ("nodes", "seconds", "Newton", "conjugate gradients", "KiB a node", "end moves, of the length", "how"),
+            (
+                (
+                    f"{run.n_nodes:,}",
+                    _seconds(run.median),
+                    f"{run.iterations}",
+                    f"{run.linear_iterations or '-'}",
+                    f"{run.peak_bytes / run.n_nodes / 1024:.3g}",
+                    f"{run.tip / LENGTH:.4f}",
+                    run.notes,
+                )
+                for run in springs
+            ),
+        )
+
+
+def _memory(runs: list[Measured]) -> Iterator[str]:
+    yield "## Memory\n"
+    yield (
+        "Peak resident memory over that of a bare Python interpreter which has imported nothing, in MiB: libraries "
+        "count, and all that the process holds. Bending.\n"
+    )
+    for dim in (2, 3):
+        depths = _sizes(runs, dim, "bending")
+        at = {(run.program, run.depth): run for run in runs if (run.dim, run.load) == (dim, "bending") and run.seconds}
+        head = [f"{n_nodes(dim, depth):,}" for depth in depths]
+        rows = (
+            (program.label, *(_mebibytes(at.get((name, depth))) for depth in depths))
+            for name, program in PROGRAMS.items()
+            if dim in program.dims
+        )
+        yield from table((f"{dim}D, nodes", *head), rows)
+
+
+def _mebibytes(run: Measured | None) -> str:
+    return f"{run.peak_bytes / 2**20:.0f}" if run else "-"
+
+
+def _limit(results: dict) -> Iterator[str]:
+    limit = max(results["bandwidth"].values())
+    yield "## The limit: memory\n"
+    told = "; ".join(f"{name}: {value / 1e9:.1f} GB/s" for name, value in results["bandwidth"].items())
+    yield f"Bandwidth of this machine's memory in the same run, arrays of 512 MiB: {told}.\n"
+    yield (
+        "What the loops of the springs take, beside the time in which memory could move the bytes that they must read "
+        "and write once, at the largest of these bandwidths. Below 1 what is moved fits into a cache.\n"
+    )
+    rows = []
+    for row in results["kernels"]:
+        moved = Moved(row["name"], row["seconds"], row["bytes_moved"])
+        where = f"{row['dim']}D, {row['n_nodes']:,} nodes: {moved.name}"
+        megabytes, least = moved.bytes_moved / 1e6, 1e3 * moved.bytes_moved / limit
+        times = f"{moved.over(limit):.1f}"
+        rows.append((where, f"{megabytes:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}", times))
+    yield from table(("", "MB", "ms", "limit, ms", "times the limit"), rows)
+
+
+def _accuracy(runs: list[Measured]) -> Iterator[str]:
+    yield "## Time to the same error\n"
+    yield (
+        "The bent bodies once more, on meshes from one element over the height on. The truth is St. Venant-Kirchhoff's "
+        "law on infinitely fine meshes (Richardson, from the three finest of truespring's finite elements): the law "
+        "that CalculiX solves and that biquadratic springs have for their limit; the neo-Hookean one is as near to it "
+        "as its floor tells. The floor is the error on infinitely fine meshes, too soft (+) or too stiff (-): what the "
+        "model itself is off, which no mesh mends. The error is that of the end's displacement; a target counts as "
+        "reached where every finer mesh meets it too; times are interpolated between meshes.\n"
+    )
+    for dim in (2, 3):
+        truth = errors.limit(errors.solved(runs, errors.TRUTH, dim))
+        rows = []
+        for name, program in PROGRAMS.items():
+            solved = errors.solved(runs, name, dim)
+            if not solved or dim not in program.ladder:
+                continue
+            found = errors.accuracy(solved, truth)
+            rows.append((program.label, f"{found.floor:+.2%}", *_reached(found)))
+        yield from table((f"{dim}D", "floor", *(f"to {target:.0%}" for target in errors.TARGETS)), rows)
+    yield (
+        "Seconds, and about how many nodes that takes; `<=` where the coarsest mesh is good enough. Bodies as plain as "
+        "these need few nodes for such errors, and every program answers at once: springs pay where a mesh is fine for "
+        "another reason, its geometry.\n"
+    )
+
+
+def _reached(found: errors.Accuracy) -> Iterator[str]:
+    for seconds, nodes, bound in zip(found.seconds, found.nodes, found.bounds, strict=True):
+        if seconds is None or nodes is None:
+            yield "never"
+        else:
+            yield f"{'<= ' * bound}{_seconds(seconds)} ({nodes:.0f})"
+
+
+def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
+    yield "## Figures aimed at\n"
+    rows = []
+    for aim in aims.aims(results, runs):
+        measured = "" if aim.measured is None else f"{aim.measured:.3g}"
+        rows.append((aim.what, f"{'at least' if aim.at_least else 'at most'} {aim.wanted:g}", measured, aim.verdict))
+    yield from table(("50 % bending, springs", "wanted", "measured", ""), rows)
+
+
+def _recorded(recorded: dict) -> Iterator[str]:
+    yield "## Recorded once\n"
+    yield (
+        f"Not part of `make bench`: {recorded['date']}, {recorded['processor']}, {recorded['cores']} cores, one run "
+        "each. Bending, the same meshes and forces.\n"
+    )
+    rows = (
+        (run["program"], run["version"], f"{run['dim']}D, {run['n_nodes']:,}", _seconds(run["seconds"]), run["notes"])
+        for run in recorded["runs"]
+    )
+    yield from table(("program", "version", "nodes", "seconds", "notes"), rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(build(HERE / "results.json", ROOT / "docs"))
