@@ -2,7 +2,7 @@
 
 A rectangle 8 by 1 in plane stress (Poisson's ratio 1/3, squares) and a box 8 by 1 by 1 (1/4, cubes), lengths in
 metres, E = 1 MPa, held on the left and pulled on the right by a dead force that is shared consistently over that end.
-They are slender enough that the corners of the held end, where stress has no bound on ever finer meshes, do not collapse.
+They are slender enough that the corners of the held end, where stress has no bound on ever finer meshes, bear it.
 Nothing here needs more than numpy, so that peers can read it in an environment of their own.
 """
 
@@ -18,8 +18,8 @@ LENGTH = 8.0
 YOUNG = 1e6
 POISSON = {2: 1 / 3, 3: 1 / 4}
 
-#: Elements over the height of the bodies, their depth: the length has eight times as many. About 1.3k, 5.2k, 52k, 502k and 1.0M
-#: nodes in the plane, 2.4k, 9.8k, 31k, 107k and 306k in space.
+#: Elements over the height of the bodies, their depth: the length has eight times as many. About 1.3k, 5.2k, 52k, 502k
+#: and 1.0M nodes in the plane, 2.4k, 9.8k, 31k, 107k and 306k in space.
 SIZES = {2: (12, 25, 80, 250, 354), 3: (6, 10, 15, 23, 33)}
 
 #: What springs are solved at before they are timed: large enough for the code that runs on all threads.

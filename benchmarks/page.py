@@ -147,7 +147,7 @@ def _agreement(runs: list[Measured]) -> Iterator[str]:
     told = "; ".join(f"{law}, {dim}D: {value:.1e}" for (law, dim), value in apart.items())
     yield (
         "Programs of the same law agree: the largest relative distance of two tips on one mesh, over all sizes and "
-        f"both loads: {told}. (CalculiX makes plane stress of one thin layer of bricks, and prints seven digits.)\n"
+        f"both loads: {told}. (CalculiX prints seven digits.)\n"
     )
 
 

@@ -421,7 +421,7 @@ def test_a_part_without_support_is_refused_by_count_and_place(model: ts.Fem | ts
     held = ts.Problem(mesh, material, None, [ts.Fixed("left"), ts.Fixed(range(16, 20)), ts.Fixed(range(8, 12))], load)
     path = ts.solve(held, model, ts.Newton(load_steps=1))
     assert path.status is ts.Status.CONVERGED
-    assert np.abs(path.states[-1].displacement[:16]).max() == 0
+    assert np.abs(path.states[-1].displacement[:16]).max() < 1e-14  # of lengths of 1: rounding
 
 
 def test_parts_that_share_less_than_a_facet_may_turn() -> None:

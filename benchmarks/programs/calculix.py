@@ -1,8 +1,7 @@
 """CalculiX: NLGEOM, which makes *ELASTIC the St. Venant-Kirchhoff law; its own direct solver on all threads.
 
-Elements C3D8 in space, CPS4 in plane stress. CalculiX makes these one layer of bricks with free faces: so thin a layer
-is within some 4e-4 of plane stress. (As plane strain, CPE4, of a material with E and nu exchanged the plane problem is
-the same to all digits, but its Newton then fails on fine meshes, in 16 increments too.)
+Elements C3D8 in space. Plane stress of a quadratic law is plane strain of another material, and as such is given to
+elements CPE4: the very problem that the others solve. CPS4, one layer of bricks with free faces, is another one.
 """
 
 import os
@@ -18,9 +17,6 @@ import numpy as np
 
 from benchmarks.cases import Case
 from benchmarks.programs.common import Run, in_few_increments, main, peak_bytes
-
-# Of the layer that stands for the plane [m]; the forces are scaled by it.
-_THICKNESS = 0.05
 
 # By default it stops at a residual of 0.5 % of the mean force and a correction of 1 % of the displacement.
 _CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7"
@@ -87,20 +83,21 @@ def _chunks(terminal: int) -> Iterator[bytes]:
 
 def deck(case: Case, increments: int) -> Iterator[str]:
     """Yield the lines of the input."""
-    kind, thickness = ("CPS4", _THICKNESS) if case.dim == 2 else ("C3D8", 1.0)
-    force = thickness * case.force
+    young, poisson, kind = case.young, case.poisson, "C3D8"
+    if case.dim == 2:  # Timoshenko and Goodier, Theory of Elasticity: the exchange between the plane problems
+        young, poisson, kind = young * (1 + 2 * poisson) / (1 + poisson) ** 2, poisson / (1 + poisson), "CPE4"
     yield "*NODE"
     yield from (f"{number}, {_joined(node)}" for number, node in enumerate(case.nodes.tolist(), 1))
     yield f"*ELEMENT, TYPE={kind}, ELSET=BODY"
     yield from (f"{number}, {_joined(element)}" for number, element in enumerate((case.elements + 1).tolist(), 1))
     yield "*NSET, NSET=END"
     yield from (f"{node + 1}," for node in np.flatnonzero(case.force.any(axis=1)))
-    yield f"*MATERIAL, NAME=M\n*ELASTIC\n{case.young:.12e}, {case.poisson:.12e}"
-    yield "*SOLID SECTION, ELSET=BODY, MATERIAL=M" + (f"\n{thickness}" if case.dim == 2 else "")
+    yield f"*MATERIAL, NAME=M\n*ELASTIC\n{young:.12e}, {poisson:.12e}"
+    yield "*SOLID SECTION, ELSET=BODY, MATERIAL=M" + ("\n1." if case.dim == 2 else "")
     yield f"*STEP, NLGEOM, INC={increments}\n{_CONTROLS}\n*STATIC, DIRECT\n{1 / increments:.12e}, 1.\n*BOUNDARY"
     yield from (f"{node + 1}, {axis + 1}, {axis + 1}" for node, axis in np.argwhere(case.held))
     yield "*CLOAD"
-    yield from (f"{node + 1}, {axis + 1}, {force[node, axis]:.12e}" for node, axis in np.argwhere(force))
+    yield from (f"{node + 1}, {axis + 1}, {case.force[node, axis]:.12e}" for node, axis in np.argwhere(case.force))
     yield f"*NODE PRINT, NSET=END, FREQUENCY={increments}\nU\n*END STEP\n"
 
 

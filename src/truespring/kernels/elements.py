@@ -50,15 +50,16 @@ def quadrature(
     reference element, `corner_slopes` of the functions that place it in space, axes (point, node, direction).
     """
     dim = len(zero)
-    J, inverse = np.empty((1, dim, dim)), np.empty((dim, dim))
+    J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
     for e in range(first, last):
         for q in range(len(weights)):
             for i in range(dim):
                 total = zero
                 for a in range(corner_slopes.shape[1]):
                     total = add_times(total, places[e, a, i], corner_slopes, q, a)
-                write(J, 0, i, total)
-            volumes[e, q] = weights[q] * _invert(J[0], inverse, zero)
+                for j in range(dim):
+                    J[i, j] = total[j]
+            volumes[e, q] = weights[q] * _invert(J, inverse, zero)
             for a in range(slopes.shape[1]):
                 for i in range(dim):
                     result = 0.0
@@ -71,7 +72,6 @@ def quadrature(
 def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero: Any) -> None:
     """The gradient of a vector field from its values at the elements' nodes, axes (i, j, element, point)."""
     dim = len(zero)
-    F = np.empty((1, dim, dim))
     for e in range(first, last):
         slopes_here = slopes[e]
         for q in range(slopes.shape[1]):
@@ -79,10 +79,8 @@ def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero
                 total = zero
                 for a in range(values.shape[1]):
                     total = add_times(total, values[e, a, i], slopes_here, q, a)
-                write(F, 0, i, total)
-            for i in range(dim):
                 for j in range(dim):
-                    result[i, j, e, q] = F[0, i, j]
+                    result[i, j, e, q] = total[j]
 
 
 @kernel
@@ -126,13 +124,14 @@ def stiffnesses(
     has a zero for each pair i, j.
     """
     dim, n_points, k = len(zero), gradients.shape[1], gradients.shape[2]
-    pulled, A = np.empty((dim, dim, len(D))), np.empty((dim, dim, dim * dim))
-    by_node, block = np.empty((k, n_points * dim, dim * dim)), np.empty((1, 1, dim * dim))
+    n_strains = dim * (dim + 1) // 2  # len(D), known when compiled
+    pulled, A = np.empty((dim, dim, n_strains)), np.empty((dim, dim, dim * dim))
+    by_node = np.empty((k, n_points * dim, dim * dim))
     for e in range(first, last):
         for q in range(n_points):
             volume = volumes[e, q]
             for m in range(dim):
-                for two in range(len(D)):
+                for two in range(n_strains):
                     for i in range(dim):
                         value = 0.0
                         for j in range(dim):
@@ -158,8 +157,7 @@ def stiffnesses(
                 for q in range(n_points):
                     for m in range(dim):
                         total = add_times(total, gradients[e, q, a, m], by_node, b, q * dim + m)
-                write(block, 0, 0, total)
                 for i in range(dim):
                     for j in range(dim):
-                        blocks[e, a * dim + i, b * dim + j] = block[0, 0, i * dim + j]
-                        blocks[e, b * dim + j, a * dim + i] = block[0, 0, i * dim + j]
+                        blocks[e, a * dim + i, b * dim + j] = total[i * dim + j]
+                        blocks[e, b * dim + j, a * dim + i] = total[i * dim + j]

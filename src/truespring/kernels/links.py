@@ -89,7 +89,6 @@ def stiffnesses(
     """
     dim, k = len(zero), elements.shape[1]
     vectors, coupled = np.empty((k, k, dim)), np.empty((coupling.shape[1], k, dim))
-    block = np.empty((dim, 1, dim))
     for e in range(first, last):
         M = coupling[e % len(coupling)]
         for a in range(k):
@@ -109,11 +108,9 @@ def stiffnesses(
                     for other in range(k):
                         if other != a:
                             total = add_times(total, vectors[a, other, i], coupled, number[a, other], b)
-                    write(block, i, 0, total)
-                for i in range(dim):
                     for j in range(dim):
-                        blocks[e, a * dim + i, b * dim + j] = block[i, 0, j]
-                        blocks[e, b * dim + j, a * dim + i] = block[i, 0, j]
+                        blocks[e, a * dim + i, b * dim + j] = total[j]
+                        blocks[e, b * dim + j, a * dim + i] = total[j]
         for a in range(k):
             for b in range(k):
                 if a != b:
