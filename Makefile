@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test verification viewer clean
+.PHONY: demo test verification bench viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -19,6 +19,11 @@ verification: .venv/test
 	$(BIN)/python -m pytest -q -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
+
+# truespring beside CalculiX (ccx on the path), FElupe and scikit-fem: rebuilds docs/performance.md, in an hour or two.
+# What was run is kept in benchmarks/.cache, and goes on where it broke off; SIZES=small is for trying it out.
+bench: .venv/test .venv-peers/installed
+	$(BIN)/python -m benchmarks $(if $(filter small,$(SIZES)),--small)
 
 # The scene of the report that turns, bundled with three.js; needs node. The result is kept in the repository.
 viewer:
@@ -37,5 +42,11 @@ viewer:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	touch $@ .venv/demo
 
+.venv-peers/installed: .venv/created benchmarks/peers.txt
+	$(PYTHON) -m venv .venv-peers
+	echo '*' > .venv-peers/.gitignore
+	.venv-peers/bin/python -m pip install --quiet --disable-pip-version-check --requirement benchmarks/peers.txt
+	touch $@
+
 clean:
-	rm -rf .venv out .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers benchmarks/.cache out .mypy_cache .pytest_cache .ruff_cache .hypothesis

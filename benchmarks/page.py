@@ -94,7 +94,7 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
     yield (
         "Seconds are wall time from the built mesh to equilibrium: pattern, assembly, factorisation or multigrid "
         "setup, all iterations; not reading, writing and compiling (compiled code comes from its cache; each process "
-        "first solves a small mesh, untimed). The median of three runs, or one run where that takes a minute. Peers "
+        "first solves a small mesh, untimed). The median of three runs, or one run where that takes 20 s. Peers "
         "take as few equal load steps as they need; attempts that fail are not timed.\n"
     )
     rows = []
@@ -244,7 +244,7 @@ def _accuracy(runs: list[Measured]) -> Iterator[str]:
         "that CalculiX solves and that biquadratic springs have for their limit; the neo-Hookean one is as near to it "
         "as its floor tells. The floor is the error on infinitely fine meshes, too soft (+) or too stiff (-): what the "
         "model itself is off, which no mesh mends. The error is that of the end's displacement; a target counts as "
-        "reached where every finer mesh meets it too; times are interpolated between meshes.\n"
+        "reached where every finer mesh meets it too; times, of one run a mesh, are interpolated.\n"
     )
     for dim in (2, 3):
         truth = errors.limit(errors.solved(runs, errors.TRUTH, dim))

@@ -28,9 +28,7 @@ def test_distinct_rows_are_those_of_numpy(rows: list[tuple[int, ...]], spread: i
     """Packed into one number each or, where the columns spread far, into several."""
     given_rows = np.array(rows, dtype=np.int64) * np.array([1, spread, 1])
     found = distinct_rows(given_rows.T)
-    unique, first, of, count = np.unique(
-        given_rows, axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
+    unique, first, of, count = np.unique(given_rows, axis=0, return_index=True, return_inverse=True, return_counts=True)
     assert found.first.tolist() == first.tolist() and found.count.tolist() == count.tolist()
     assert found.of.tolist() == of.ravel().tolist()
     assert given_rows[found.first].tolist() == unique.tolist()
@@ -38,9 +36,7 @@ def test_distinct_rows_are_those_of_numpy(rows: list[tuple[int, ...]], spread: i
 
 
 @pytest.mark.parametrize("element", KINDS)
-def test_jacobians_are_determinants_however_elements_are_sliced(
-    element: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_jacobians_are_determinants_however_elements_are_sliced(element: str, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = block(element)
     moved = mesh.nodes + np.random.default_rng(2).uniform(-0.05, 0.05, mesh.nodes.shape)
     corners = np.array(mesh.kind.corners)

@@ -29,7 +29,7 @@ ALLOWED = {
     "comparison": {"equilibrium", "mesh"},
     "reference": {"equilibrium", "problem", "mesh", "units"},
     "equilibrium": {"models", "solvers", "potential", "problem", "mesh", "material"},
-    "models": {"potential", "problem", "mesh", "material"},
+    "models": {"solvers", "potential", "problem", "mesh", "material"},
     "solvers": {"potential"},
     "problem": {"potential", "mesh", "material"},
     "potential": set(),

@@ -1,7 +1,7 @@
 """Memory: how much of it there is, work in slices so that little of it is taken, and answers that are kept."""
 
 from collections.abc import Callable, Iterator
-from functools import wraps
+from functools import update_wrapper
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
@@ -21,7 +21,7 @@ _CGROUPS = (("sys/fs/cgroup", "memory.max"), ("sys/fs/cgroup/memory", "memory.li
 
 def available_memory() -> int:
     """Return the memory that this process may come to use [bytes]: the machine's, or what its cgroup leaves of it."""
-    return min([psutil.virtual_memory().total, *_cgroup_limits(Path("/"))])
+    return min([int(psutil.virtual_memory().total), *_cgroup_limits(Path("/"))])
 
 
 def _cgroup_limits(root: Path) -> list[int]:
@@ -59,12 +59,11 @@ def remembered(function: Callable[Concatenate[Owner, Given], Answer]) -> Callabl
     """
     kept: WeakKeyDictionary[Owner, dict[object, Answer]] = WeakKeyDictionary()
 
-    @wraps(function)
-    def remembering(owner: Owner, *given: Given.args, **named: Given.kwargs) -> Answer:
+    def remembering(owner: Owner, /, *given: Given.args, **named: Given.kwargs) -> Answer:
         answers = kept.setdefault(owner, {})
         key = given, tuple(sorted(named.items()))
         if key not in answers:
             answers[key] = function(owner, *given, **named)
         return answers[key]
 
-    return remembering
+    return update_wrapper(remembering, function)

@@ -217,7 +217,7 @@ def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
     hindered = _rigid_rank(nodes, held, tolerance)
     if hindered == _n_modes(nodes) or 0 < hindered == _rigid_rank(nodes, np.ones_like(held), tolerance):
         return None
-    free = [axis for axis, there in zip(AXES, held.any(axis=0), strict=False) if not there]
+    free = [axis for axis, there in zip(AXES, held.T, strict=False) if not there.any()]
     return f"along {', '.join(free)}" if free else "by turning"
 
 
@@ -227,7 +227,8 @@ def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
     upper = np.zeros((0, _n_modes(nodes)))
     for part in slices(len(nodes), 8 * nodes.shape[1] * upper.shape[1]):
         if chosen[part].any():
-            upper = np.linalg.qr(np.concatenate([upper, _modes(places[part])[chosen[part].ravel()]]), mode="r")
+            modes = _modes(places[part])[chosen[part].ravel()]
+            upper = np.asarray(np.linalg.qr(np.concatenate([upper, modes]), mode="r"))
     return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
 
@@ -241,7 +242,7 @@ def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:
 
 def _n_modes(nodes: Floats) -> int:
     """Translations and rotations: 3 in the plane, 6 in space."""
-    dim = nodes.shape[1]
+    dim = int(nodes.shape[1])
     return dim * (dim + 1) // 2
 
 

@@ -22,14 +22,21 @@ class Forms:
     Attributes:
         of: the form of each element, shape (n_elements,).
         first: the first element of each form, shape (n_forms,).
-        size: the longest extent of the elements along an axis, their mean [m].
+        size: the extent of an element along the axis where it is longest, the mean of all [m].
+        largest: the extent of the longest element along each axis [m], shape (dim,).
         exact: whether elements of one form differ by no more than the rounding of their coordinates.
     """
 
     of: Ints
     first: Ints
     size: float
+    largest: Floats
     exact: bool
+
+    @property
+    def single(self) -> bool:
+        """Whether all elements are of one form exactly."""
+        return self.exact and len(self.first) == 1
 
     @property
     def few(self) -> bool:
@@ -40,10 +47,11 @@ class Forms:
 def find_forms(nodes: Floats, elements: Ints) -> Forms:
     """Find the forms of elements; nodes [m] of shape (n_nodes, dim)."""
     n_local, dim = elements.shape[1], nodes.shape[1]
-    total = 0.0
+    total, largest = 0.0, np.zeros(dim)
     for _, at in corners_in_slices(nodes, elements):
         extents = [np.maximum.reduce(along) - np.minimum.reduce(along) for along in zip(*at, strict=True)]
         total += float(np.maximum.reduce(extents).sum())
+        largest = np.maximum(largest, [extent.max() for extent in extents])
     size = total / len(elements)
     columns = np.empty(((n_local - 1) * dim, len(elements)), dtype=np.int64)
     for part, at in corners_in_slices(nodes, elements):
@@ -62,7 +70,7 @@ def find_forms(nodes: Floats, elements: Ints) -> Forms:
                 off = at[node][axis] - at[0][axis]
                 off -= models[axis, node, of[part]]
                 apart = max(apart, -float(off.min()), float(off.max()))
-    return Forms(of, first, size, apart <= _ROUNDINGS * np.finfo(float).eps * float(np.abs(nodes).max()))
+    return Forms(of, first, size, largest, apart <= _ROUNDINGS * float(np.finfo(float).eps * np.abs(nodes).max()))
 
 
 def rounded(places: Floats, size: float) -> Ints:

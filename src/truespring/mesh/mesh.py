@@ -149,13 +149,18 @@ class Mesh:
 
         The same for the same two nodes: the smaller node number times n_nodes plus the larger one.
         """
-        ends = [ascending((self.elements[:, one], self.elements[:, other])) for one, other in pairs]
-        return np.stack([low * self.n_nodes + high for low, high in ends])
+        keys = np.empty((len(pairs), len(self.elements)), dtype=np.int64)
+        for key, (one, other) in zip(keys, pairs, strict=True):
+            low, high = ascending((self.elements[:, one], self.elements[:, other]))
+            np.multiply(low, self.n_nodes, out=key)
+            key += high
+        return keys
 
     @cached_property
     def edges(self) -> Ints:
         """Every edge of the elements once, shape (n_edges, 2)."""
-        keys = np.sort(self.pair_keys(self.kind.edges), axis=None, kind="stable")
+        keys = self.pair_keys(self.kind.edges).ravel()
+        keys.sort(kind="stable")
         return np.stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], self.n_nodes), axis=1)
 
     @cached_property
@@ -174,13 +179,12 @@ class Mesh:
 
         With `within`, true for some nodes, only the facets all of whose nodes are among these.
         """
-        facets = [np.concatenate(column) for column in zip(*(elements.T[list(one)] for one in self.kind.facets), strict=True)]
+        local = np.array(self.kind.facets).T
+        facets = elements.T[local].reshape(len(local), -1)  # a column each, those of all elements by facet
         if within is not None:
-            whole = np.logical_and.reduce([within[column] for column in facets])
-            facets = [column[whole] for column in facets]
+            facets = facets[:, within[facets].all(axis=0)]
         found = distinct_rows(ascending(facets))
-        first = found.first
-        return np.stack([column[first] for column in facets], axis=1), np.asarray(found.count == 1)
+        return np.ascontiguousarray(facets[:, found.first].T), np.asarray(found.count == 1)
 
     @cached_property
     def forms(self) -> Forms:

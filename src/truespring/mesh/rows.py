@@ -40,7 +40,7 @@ class Distinct:
         return places
 
 
-def distinct_rows(columns: Sequence[Ints]) -> Distinct:
+def distinct_rows(columns: Ints | Sequence[Ints]) -> Distinct:
     """Find the distinct ones among rows, given as their columns, each of shape (n_rows,)."""
     keys = _packed(columns)
     # Of one key the stable order, which is quick for numbers that ascend over long stretches, as those of meshes do.
@@ -53,7 +53,7 @@ def distinct_rows(columns: Sequence[Ints]) -> Distinct:
     return Distinct(order, np.flatnonzero(new))
 
 
-def ascending(columns: Sequence[Ints]) -> list[Ints]:
+def ascending(columns: Ints | Sequence[Ints]) -> list[Ints]:
     """Return the columns of the same rows, each row sorted."""
     ordered = list(columns)
     for turn in range(len(ordered)):  # neighbours change places until none need to
@@ -63,7 +63,7 @@ def ascending(columns: Sequence[Ints]) -> list[Ints]:
     return ordered
 
 
-def _packed(columns: Sequence[Ints]) -> list[Ints]:
+def _packed(columns: Ints | Sequence[Ints]) -> list[Ints]:
     """Keys in whose lexicographic order the rows are in theirs: as many columns in each as an integer holds."""
     keys, room = [np.zeros(len(columns[0]), dtype=np.int64)], 1
     for column in columns if len(columns[0]) else ():

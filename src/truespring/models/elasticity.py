@@ -3,7 +3,10 @@
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.memory import remembered, slices
 from truespring.mesh import Mesh
+from truespring.mesh.forms import rounded
+from truespring.mesh.rows import distinct_rows
 from truespring.models.links import link_vectors
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
@@ -12,48 +15,33 @@ from truespring.problem import Problem
 # and divisions about several diagonals some more.
 _MOST_CLASSES = 48
 
-# Places in elements that differ by less than this share of the element's size are the same.
-_SAME_PLACE = 1e-5
 
-
-def affine_energies(problem: Problem, stiffness: Floats) -> Floats:
-    """Return C V of each element [J], shape (n_elements, 3 or 6, 3 or 6), in Voigt's order.
-
-    Springs of `stiffness` [N/m], shape (n_elements, links), that follow a uniform strain:
-    C_ijkl V = sum k L^2 n_i n_j n_k n_l.
-    """
-    across = link_vectors(problem.mesh)
-    length = np.linalg.norm(across, axis=2)
-    n = across / length[:, :, None]
-    strain = np.stack([n[..., i] * n[..., j] for i, j in voigt_pairs(problem.mesh.dim)], axis=-1)
-    return np.asarray(np.einsum("el,eli,elj->eij", stiffness * length**2, strain, strain, optimize=True))
-
-
+@remembered
 def lattice_classes(mesh: Mesh) -> Ints | None:
     """Return the class of each element, -1 for those at the boundary that the inside does not have; None if no lattice.
 
     Two elements are of one class where a translation carries one into the other, whatever the order of
     their nodes. A lattice has few, each all over the body; at its boundary there may be others.
     """
-    at = mesh.nodes[mesh.elements]
-    size = np.ptp(at, axis=1).max(axis=1)
-    # The offset keeps places that lie on the border of two roundings, as halves and quarters do, on one side.
-    places = np.round((at - at.mean(axis=1, keepdims=True)) / size.mean() / _SAME_PLACE + 0.3137).astype(np.int64)
+    classes = _classes(mesh)
+    # Only tetrahedra have lattices that a plane cannot cut without elements of another kind.
+    inner = ~_at_boundary(mesh) if mesh.element == "tetrahedron" else np.ones(len(classes), dtype=bool)
+    inner |= not inner.any()
+    there = np.bincount(classes[inner], minlength=int(classes.max()) + 1) > 0
+    n_kept, n_inner = int(there.sum()), int(inner.sum())
+    if n_kept > _MOST_CLASSES or (n_kept > 1 and 2 * n_kept > n_inner) or _graded(mesh, classes, there):
+        return None
+    return np.where(there, np.arange(len(there)), -1)[classes]
+
+
+def _classes(mesh: Mesh) -> Ints:
+    """The class of each element, shape (n_elements,): its form without the order of its nodes."""
+    forms = mesh.forms
+    at = mesh.nodes[mesh.elements[forms.first]]
+    places = rounded(at - at.mean(axis=1, keepdims=True), forms.size)
     order = np.lexsort(np.moveaxis(places, -1, 0)[::-1], axis=-1)
     canonical = np.take_along_axis(places, order[:, :, None], axis=1).reshape(len(at), -1)
-    _, classes, count = np.unique(canonical, axis=0, return_inverse=True, return_counts=True)
-    classes = classes.ravel()
-    # Only tetrahedra have lattices that a plane cannot cut without elements of another kind.
-    inner = ~_at_boundary(mesh) if mesh.element == "tetrahedron" else np.ones(len(at), dtype=bool)
-    kept = np.unique(classes[inner]) if inner.any() else np.arange(len(count))
-    n_inner = int(inner.sum()) or len(at)
-    if len(kept) > _MOST_CLASSES or (len(kept) > 1 and 2 * len(kept) > n_inner):
-        return None
-    centres, reach = at.mean(axis=1), np.ptp(at, axis=1).max(axis=0)
-    for one in kept:  # graded meshes have classes that fill a part of the body only
-        if (np.ptp(centres[classes == one], axis=0) < np.ptp(centres, axis=0) - 2.5 * reach).any():
-            return None
-    return np.where(np.isin(classes, kept), classes, -1)
+    return np.asarray(distinct_rows(canonical.T).of[forms.of])
 
 
 def _at_boundary(mesh: Mesh) -> Bools:
@@ -63,20 +51,41 @@ def _at_boundary(mesh: Mesh) -> Bools:
     return np.asarray(touched[mesh.elements].sum(axis=1) >= mesh.boundary.shape[1])
 
 
-def lattice_elasticity(problem: Problem, energies: Floats, classes: Ints | None) -> Floats:
-    """Return the elasticity [Pa] in Voigt's order, shape (3, 3) or (6, 6), from `affine_energies`.
+def _graded(mesh: Mesh, classes: Ints, there: Bools) -> bool:
+    """Whether a class that is `there` fills a part of the body only."""
+    if len(there) == 1:
+        return False
+    order = np.argsort(classes, kind="stable")
+    starts = np.searchsorted(classes[order], np.arange(len(there)))
+    for along, reach in zip(mesh.centres.T, mesh.forms.largest, strict=True):
+        ordered = along[order]
+        extents = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts)
+        if (extents[there] < ordered.max() - ordered.min() - 2.5 * reach).any():
+            return True
+    return False
 
+
+def lattice_elasticity(problem: Problem, stiffness: Floats, classes: Ints | None) -> Floats:
+    """Return the elasticity [Pa] in Voigt's order, shape (3, 3) or (6, 6), of springs that follow a uniform strain.
+
+    By C_ijkl V = sum k L^2 n_i n_j n_k n_l, with each element's own `stiffness` [N/m], shape (n_elements, links).
     Of a lattice the mean over its classes, each counted alike; of other meshes over all elements, a
     bound from above, since nodes that do not follow a uniform strain relax.
     """
-    section = problem.section
+    mesh, section = problem.mesh, problem.section
     assert section is not None  # require_body was asked
-    volumes = problem.mesh.measures * section.thickness
-    if classes is None:
-        return np.asarray(energies.sum(axis=0) / volumes.sum())
-    _, first = np.unique(classes, return_index=True)
-    first = first[classes[first] >= 0]
-    return np.asarray(energies[first].sum(axis=0) / volumes[first].sum())
+    chosen = np.arange(len(mesh.elements))
+    if classes is not None:
+        chosen = np.unique(classes, return_index=True)[1]
+        chosen = chosen[classes[chosen] >= 0]
+    pairs = voigt_pairs(mesh.dim)
+    energy = np.zeros((len(pairs), len(pairs)))
+    for part in slices(len(chosen), 16 * stiffness.shape[1] * len(pairs)):
+        own = chosen[part]
+        across = link_vectors(mesh, own).reshape(-1, mesh.dim)
+        strain = np.stack([across[:, i] * across[:, j] for i, j in pairs], axis=1)
+        energy += strain.T @ ((stiffness[own].ravel() / (across**2).sum(axis=1))[:, None] * strain)
+    return np.asarray(energy / (mesh.measures[chosen].sum() * section.thickness))
 
 
 def hooke(lam: float, mu: float, dim: int) -> Floats:

@@ -255,10 +255,9 @@ class FemPotential:
     def _points(self, positions: Floats, first: int, last: int) -> Points:
         gradients, volumes = self.quadrature(first, last)
         F = self._gradient_of(positions, gradients, first, last)
-        identity = np.zeros_like(F)
-        for i in range(len(F)):
-            identity[i, i] = 1.0
-        frame = F if self.law.finite else identity
+        frame = F if self.law.finite else np.zeros_like(F)
+        if not self.law.finite:
+            frame[np.diag_indices(len(F))] = 1.0
         return Points(gradients, volumes, F, frame, self.constants.part(first, last))
 
     def _gradient_of(self, field: Floats, gradients: Floats, first: int, last: int) -> Floats:

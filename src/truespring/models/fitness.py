@@ -3,17 +3,17 @@
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from scipy import sparse
 
+from truespring.arrays import Bools
 from truespring.errors import ModelError
 from truespring.material import Material, PlaneStrain, PlaneStress
-from truespring.mesh import box, rectangle
+from truespring.memory import remembered
+from truespring.mesh import Mesh, box, rectangle
 from truespring.models.elasticity import hooke, lattice_classes
 from truespring.models.fem import fem_potential, locks
-from truespring.models.moduli import Moduli, moduli
+from truespring.models.moduli import Moduli, moduli, spring_counts
 from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import RULES, require_body
 from truespring.models.springs import Springs
@@ -48,7 +48,7 @@ class Fitness:
     sentence: str
 
 
-@lru_cache(maxsize=16)
+@remembered
 def judge(problem: Problem, springs: Springs, tolerance: float = 0.05) -> Fitness:
     """Return whether springs are fit for each material of a body, and which are better where they are not.
 
@@ -122,7 +122,9 @@ class _Judge:
 
     def _is_fit(self, springs: Springs) -> bool:
         try:
-            springs.potential(self.problem)  # refuses negative springs before anything is relaxed
+            mesh, stiffness = self.problem.mesh, springs.element_stiffness(self.problem)
+            if not springs.coupled and spring_counts(mesh, stiffness).n_negative:
+                return False  # before anything is relaxed
             twins = self.problem.homogeneous
             return not any(_unbounded(twin, springs) or any(self.faults(twin, springs)) for twin in twins)
         except ModelError:
@@ -257,7 +259,7 @@ class _Patch:
     outside: bool
 
 
-@lru_cache(maxsize=16)
+@remembered
 def _patch_test(problem: Problem, springs: Springs) -> _Patch:
     """Load the free body as for a uniform stress, and see how far from uniform the strain is; the worst stress.
 
@@ -266,27 +268,31 @@ def _patch_test(problem: Problem, springs: Springs) -> _Patch:
     """
     mesh, realised = problem.mesh, moduli(problem, springs)
     material, section = require_body(problem)
-    K = springs.potential(problem).hessian(mesh.nodes).tocsr()
-    exact = fem_potential(problem, "linear").hessian(mesh.nodes).tocsr()  # passes: its forces of a uniform strain are right
+    K = springs.potential(problem).hessian(mesh.nodes)
+    exact = fem_potential(problem, "linear").hessian(mesh.nodes)  # passes: its forces of a uniform strain are right
     elasticity = hooke(*section.lame_within(material), mesh.dim)
     centred = mesh.nodes - mesh.nodes.mean(axis=0)
     strains = np.stack([uniform_strain(centred, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
     expected = strains @ np.linalg.solve(realised.elasticity, elasticity)
-    free = np.setdiff1d(np.arange(mesh.nodes.size), pinned(mesh.nodes))
-    moved = np.zeros_like(expected)
-    found = relaxed(sparse.csr_array(K[free][:, free]), (exact @ strains)[free], mesh.dim)
-    if found is None:
+    definite = not realised.n_negative and not _unbounded(problem, springs)
+    moved = relaxed(K, exact @ strains, mesh.nodes, pinned(mesh.nodes), definite)
+    if moved is None:
         return _Patch(math.inf, False)
-    moved[free] = found
     rigid, _ = np.linalg.qr(rigid_body_modes(mesh.nodes))
     apart = moved - expected
     apart -= rigid @ (rigid.T @ apart)
     worst = float((np.linalg.norm(apart, axis=0) / np.linalg.norm(expected, axis=0)).max())
-    near = np.isin(mesh.elements, mesh.boundary).any(axis=1)
-    inside = np.repeat(~np.isin(np.arange(mesh.n_nodes), mesh.elements[near]), mesh.dim)
     unbalanced = np.abs(K @ strains)
-    balanced = unbalanced[inside].max(initial=0.0) <= 1e-6 * unbalanced.max()
+    balanced = unbalanced[np.repeat(_far_inside(mesh), mesh.dim)].max(initial=0.0) <= 1e-6 * unbalanced.max()
     return _Patch(worst, bool(realised.lattice and balanced))
+
+
+def _far_inside(mesh: Mesh) -> Bools:
+    """The nodes whose elements have no node at the boundary, shape (n_nodes,)."""
+    outside, inside = np.zeros(mesh.n_nodes, dtype=bool), np.ones(mesh.n_nodes, dtype=bool)
+    outside[mesh.boundary] = True
+    inside[mesh.elements[outside[mesh.elements].any(axis=1)]] = False
+    return inside
 
 
 def follows_poisson(rule: str) -> bool:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
+from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.models.fem import fem_potential
 from truespring.models.laws import Constants
@@ -11,18 +12,22 @@ from truespring.problem import Problem
 #: Corners of a square (the first four) and of a cube, in the order of quadrilaterals and hexahedra.
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
-# Elements whose links differ by less than this share have one coupling: their own would differ by rounding.
-_ALIKE = 1e-13
-
 # Elements whose coupling is found at a time.
 _SLICE = 1024
 
 
-def link_vectors(mesh: Mesh) -> Floats:
-    """From the first to the second node of each link [m], shape (n_elements, links, dim)."""
+def link_vectors(mesh: Mesh, chosen: slice | Ints = slice(None)) -> Floats:
+    """From the first to the second node of each link of the elements chosen [m], shape (n, links, dim)."""
+    at = mesh.nodes[mesh.elements[chosen]]
     links = np.array(mesh.kind.links)
-    at = mesh.nodes[mesh.elements]
     return np.asarray(at[:, links[:, 1]] - at[:, links[:, 0]])
+
+
+def all_alike(mesh: Mesh, share: float) -> bool:
+    """Return whether the links of all elements are the same vectors, but for this share of the longest component."""
+    own = link_vectors(mesh, slice(1))
+    bound = share * np.abs(own).max()
+    return all(np.abs(link_vectors(mesh, part) - own).max() <= bound for part in slices(len(mesh.elements), own.nbytes))
 
 
 def link_coupling(problem: Problem) -> Floats:
@@ -36,7 +41,7 @@ def link_coupling(problem: Problem) -> Floats:
     biquadratic springs of Delingette (2008), on tetrahedra the links of Goulette and Chen (2015).
     """
     potential = fem_potential(problem, "saint-venant-kirchhoff")
-    alike = len(problem.materials) == 1 and _alike(problem.mesh)
+    alike = len(problem.materials) == 1 and problem.mesh.forms.single
     n_links = len(problem.mesh.kind.links)
     coupling = np.empty((1 if alike else len(problem.mesh.elements), n_links, n_links))
     for first in range(0, len(coupling), _SLICE):
@@ -44,20 +49,6 @@ def link_coupling(problem: Problem) -> Floats:
         constants = potential.constants.part(first, last)
         coupling[first:last] = _coupling(problem.mesh, *potential.quadrature(first, last), constants)
     return coupling
-
-
-def _alike(mesh: Mesh) -> bool:
-    """Whether the links of all elements are the same vectors."""
-    links = np.array(mesh.kind.links)
-
-    def vectors(first: int, last: int) -> Floats:
-        at = mesh.nodes[mesh.elements[first:last]]
-        return np.asarray(at[:, links[:, 1]] - at[:, links[:, 0]])
-
-    own = vectors(0, 1)
-    bound = _ALIKE * np.abs(own).max()
-    slices = range(0, len(mesh.elements), _SLICE)
-    return all(np.abs(vectors(first, first + _SLICE) - own).max() <= bound for first in slices)
 
 
 def _coupling(mesh: Mesh, gradients: Floats, volumes: Floats, constants: Constants) -> Floats:

@@ -3,24 +3,25 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, sparse
+from scipy import optimize
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
+from truespring.memory import remembered
 from truespring.mesh import Mesh
-from truespring.models.elasticity import affine_energies, hooke, lattice_classes, lattice_elasticity
-from truespring.models.fem import Fem, element_matrices
-from truespring.models.links import CORNERS, link_vectors
-from truespring.models.relaxation import relaxed
+from truespring.mesh.rows import distinct_rows
+from truespring.models.bending import bending_factors, cell_counts, fem_bending_factors
+from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
+from truespring.models.relaxation import relaxed_elasticity
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs
-from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.models.volume import VolumeTerm
-from truespring.problem import Fixed, Force, Problem
+from truespring.models.strain import voigt_pairs
+from truespring.problem import Problem
 
 #: Depths, in elements, at which the bending factor is shown.
 DEPTHS = (1, 2, 3, 4, 6, 8)
@@ -28,8 +29,8 @@ DEPTHS = (1, 2, 3, 4, 6, 8)
 # Sections of more elements than this have no bending factor of their own.
 _FINEST_SECTION = 150
 
-# Unbalanced forces below this share of E h^(d-1) are rounding: a uniform strain is an equilibrium.
-_BALANCED = 1e-8
+# Sums of stiffness below this share of the largest are rounding.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, repr=False)
@@ -204,7 +205,7 @@ def _directions(dim: int) -> Floats:
     return np.concatenate([signs / np.linalg.norm(signs, axis=1, keepdims=True), lattice])
 
 
-@lru_cache(maxsize=16)
+@remembered
 def moduli(problem: Problem, springs: Springs) -> Moduli:
     """Return what `springs` realise on the problem's mesh, were it all of the problem's own material.
 
@@ -224,34 +225,36 @@ def moduli(problem: Problem, springs: Springs) -> Moduli:
         elasticity = hooke(lame.lam, lame.mu, mesh.dim)
     else:
         shared = stiffness / _sharing(mesh) if springs.sharing == "single" else stiffness
-        elasticity = lattice_elasticity(alone, affine_energies(alone, shared), classes)
+        elasticity = lattice_elasticity(alone, shared, classes)
         elasticity[: mesh.dim, : mesh.dim] += springs.kappa(alone)[0]
     _require_resistance(elasticity)
+    counts = spring_counts(mesh, stiffness)
     whole, patch_score, stable = elasticity, 0.0, True
     if not springs.coupled:
-        whole, patch_score, stable = _relaxed(alone, springs, elasticity)
+        found, patch_score = relaxed_elasticity(alone, springs, shared, counts.n_negative > 0)
+        stable = patch_score == 0 or found is not None
+        whole = elasticity if found is None else found
         elasticity = whole if classes is None else elasticity
     _require_resistance(elasticity)
     young, poisson = section.apparent_moduli(material)
-    counts = _cells(mesh)
-    sizes = {n: (n,) * (mesh.dim - 1) for n in DEPTHS} if counts else {}
-    depth = counts[1] if counts and math.prod(counts[1:]) <= _FINEST_SECTION else None
-    if counts and depth:
-        sizes[depth] = counts[1:]
-    per_spring = _spring_sums(mesh, stiffness)
+    cells = cell_counts(mesh)
+    sizes = {n: (n,) * (mesh.dim - 1) for n in DEPTHS} if cells else {}
+    depth = cells[1] if cells and math.prod(cells[1:]) <= _FINEST_SECTION else None
+    if cells and depth:
+        sizes[depth] = cells[1:]
     return Moduli(
         elasticity=elasticity,
         young_wanted=young,
         poisson_wanted=poisson,
-        bending=_bending(alone, springs, sizes),
-        fem_bending=_fem_bending(alone, tuple(sizes.items())),
+        bending=bending_factors(alone, springs, sizes),
+        fem_bending=fem_bending_factors(alone, tuple(sizes.items())),
         depth=depth,
         lattice=classes is not None,
         body=whole,
         patch_score=patch_score,
-        n_springs=len(per_spring),
-        n_negative=int((per_spring < 0).sum()),
-        n_zero=int((per_spring == 0).sum()),
+        n_springs=counts.n_springs,
+        n_negative=counts.n_negative,
+        n_zero=counts.n_zero,
         stable=stable,
     )
 
@@ -266,154 +269,31 @@ def _sharing(mesh: Mesh) -> Floats:
     """How many elements share each link: of an unbounded regular mesh where that is known, else of this one."""
     if mesh.kind.sharing:
         return np.array(mesh.kind.sharing, dtype=float)
-    pairs = np.sort(mesh.elements[:, np.array(mesh.kind.links)], axis=2)
-    _, inverse, count = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(count[inverse.ravel()].reshape(pairs.shape[:2]), dtype=float)
+    found = distinct_rows([mesh.pair_keys(mesh.kind.links).ravel()])
+    return np.asarray(found.count[found.of].reshape(-1, len(mesh.elements)).T, dtype=float)
 
 
-def _spring_sums(mesh: Mesh, stiffness: Floats) -> Floats:
-    """The stiffness of each pair of nodes [N/m]; sums that are rounding are zero."""
-    pairs = np.sort(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
-    _, inverse = np.unique(pairs[:, 0] * mesh.n_nodes + pairs[:, 1], return_inverse=True)
-    sums = np.bincount(inverse.ravel(), stiffness.ravel())
-    return np.where(np.abs(sums) <= 1e-12 * np.abs(sums).max(), 0.0, sums)
+class SpringCounts(NamedTuple):
+    """The springs of a mesh, and those of negative and of no stiffness."""
+
+    n_springs: int
+    n_negative: int
+    n_zero: int
 
 
-def _relaxed(problem: Problem, springs: Springs, affine: Floats) -> tuple[Floats, float, bool]:
-    """The elasticity of the body, its boundary strained uniformly [Pa], the patch score, and whether it is stable."""
-    mesh = problem.mesh
-    material, section = require_body(problem)
-    outside = np.zeros(mesh.n_nodes, dtype=bool)
-    outside[mesh.boundary] = True
-    inner = np.flatnonzero(np.repeat(~outside, mesh.dim))
-    if not inner.size:
-        return affine, 0.0, True
-    K = replace(springs, allow_negative=True).potential(problem).hessian(mesh.nodes).tocsr()
-    strains = np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
-    force = K @ strains
-    size = (mesh.measures.sum() / len(mesh.elements)) ** ((mesh.dim - 1) / mesh.dim)
-    unbalanced = force[inner] / (material.young * section.thickness * size)
-    score = float(np.sqrt((unbalanced**2).mean(axis=0)).max() * np.sqrt(mesh.dim))
-    if score <= _BALANCED:
-        return affine, 0.0, True
-    relaxing = relaxed(sparse.csr_array(K[inner][:, inner]), -force[inner], mesh.dim)
-    if relaxing is None:
-        return affine, score, False
-    energy = strains.T @ force + force[inner].T @ relaxing
-    return np.asarray((energy + energy.T) / 2 / (section.thickness * mesh.measures.sum())), score, True
+def spring_counts(mesh: Mesh, stiffness: Floats) -> SpringCounts:
+    """Count springs, each the sum of what its elements give [N/m], shape (n_elements, links); rounding is zero."""
+    if stiffness.min() > 1e3 * _ROUNDING * stiffness.max():  # no thousand elements share a spring
+        return SpringCounts(_n_links(mesh), 0, 0)
+    found = distinct_rows([mesh.pair_keys(mesh.kind.links).ravel()])
+    sums = np.add.reduceat(stiffness.T.ravel()[found.order], found.starts)
+    rounding = _ROUNDING * np.abs(sums).max()
+    return SpringCounts(len(sums), int((sums < -rounding).sum()), int((np.abs(sums) <= rounding).sum()))
 
 
-# --- bending ----------------------------------------------------------------------------------------
-
-
-def _cells(mesh: Mesh) -> tuple[int, ...] | None:
-    """The numbers of cells along the axes where all elements are the same rectangle or brick along them."""
-    if mesh.element not in ("quadrilateral", "hexahedron"):
-        return None
-    across = link_vectors(mesh)
-    if np.abs(across - across[:1]).max() > 1e-6 * np.abs(across).max():
-        return None
-    at = mesh.nodes[mesh.elements[0]] - mesh.nodes[mesh.elements[0, 0]]
-    sides = at[-2 if mesh.dim == 3 else 2]
-    if (sides <= 0).any() or np.abs(at - CORNERS[: len(at), : mesh.dim] * sides).max() > 1e-6 * sides.max():
-        return None
-    counts = tuple(round(float(count)) for count in (mesh.upper - mesh.lower) / sides)
-    return counts if math.prod(counts) == len(mesh.elements) else None
-
-
-def _bending(
-    problem: Problem, springs: Springs | None, sizes: dict[int, tuple[int, ...]]
-) -> MappingProxyType[int, float]:
-    """Bending factors by depth, of sections of so many elements through depth (and width); of FEM without springs."""
-    if not sizes:
-        return MappingProxyType({})
-    one = _first_element(problem)
-    return MappingProxyType({depth: _bending_factor(one, springs, sizes[depth]) for depth in sorted(sizes)})
-
-
-@lru_cache(maxsize=8)
-def _fem_bending(problem: Problem, sizes: tuple[tuple[int, tuple[int, ...]], ...]) -> MappingProxyType[int, float]:
-    """The bending factors of the elements that are the default; the same for all springs on a body."""
-    return _bending(problem, None, dict(sizes))
-
-
-def _first_element(problem: Problem) -> Problem:
-    """The mesh's first element as a problem of its own, held and loaded in some way."""
-    mesh = problem.mesh
-    last = mesh.kind.n_nodes - 1
-    return replace(
-        problem,
-        mesh=Mesh(mesh.nodes[mesh.elements[0]], np.arange(last + 1)[None], mesh.element),
-        supports=[Fixed(on=range(last))],
-        loads=[Force(on=[last], total=[1.0] * mesh.dim)],
-    )
-
-
-def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int, ...]) -> float:
-    """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
-
-    A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
-    from column to column and makes the energy least; EI is twice that energy by length. For springs on
-    squares with summed sharing it is e0 (1 - 1/n^2) + 6 a / n^2, e0 = E_0 / E.
-    """
-    material, section = require_body(problem)
-    mesh = problem.mesh
-    dim, corners = mesh.dim, CORNERS[: mesh.kind.n_nodes, : mesh.dim]
-    sides = mesh.nodes[mesh.elements[0, -2 if dim == 3 else 2]] - mesh.nodes[mesh.elements[0, 0]]
-    grid = np.array([count + 1 for count in counts])
-    # Both ends of a cell along x are one place of the section.
-    section_corners, place = np.unique(corners[:, 1:], axis=0, return_inverse=True)
-    gather = np.kron(np.eye(len(section_corners))[place.ravel()], np.eye(dim))
-    n_free = dim * int(np.prod(grid))
-    stiffness, force, energy = np.zeros((n_free, n_free)), np.zeros(n_free), 0.0
-    single = springs is not None and springs.sharing == "single"
-    matrix = _element_matrix(problem, springs)
-    for cell in np.ndindex(*counts):
-        if single:
-            matrix = _element_matrix(problem, springs, _shares_of_links(problem, cell, counts))
-        numbers = np.ravel_multi_index(tuple((section_corners + np.array(cell)).T), tuple(grid))
-        dofs = (dim * numbers[:, None] + np.arange(dim)).ravel()
-        bent = np.zeros((len(corners), dim))
-        bent[:, 0] = -corners[:, 0] * sides[0] * (corners[:, 1] + cell[0] - counts[0] / 2) * sides[1]
-        bent[:, 1] = corners[:, 0] * sides[0] ** 2 / 2
-        stiffness[np.ix_(dofs, dofs)] += gather.T @ matrix @ gather
-        force[dofs] += gather.T @ matrix @ bent.ravel()
-        energy += float(bent.ravel() @ matrix @ bent.ravel())
-    energy -= float(force @ np.linalg.lstsq(stiffness, force, rcond=1e-10)[0])
-    young, _ = section.apparent_moduli(material)
-    width = section.thickness if dim == 2 else counts[1] * sides[2]
-    return float(energy / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
-
-
-def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:
-    """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
-    if springs is None:
-        return np.asarray(Fem("linear").potential(problem).element_hessians(problem.mesh.nodes)[0])
-    if springs.coupled:  # these are FEM
-        return np.asarray(element_matrices(problem)[0])
-    mesh = problem.mesh
-    links, across = np.array(mesh.kind.links), link_vectors(mesh)[0]
-    direction = across / np.linalg.norm(across, axis=1)[:, None]
-    stencils = np.zeros((len(links), mesh.kind.n_nodes, mesh.dim))
-    every = np.arange(len(links))
-    stencils[every, links[:, 0]], stencils[every, links[:, 1]] = -direction, direction
-    stiffness = springs.element_stiffness(problem)[0] * (1.0 if share is None else share)
-    matrix = np.einsum("l,lai,lbj->aibj", stiffness, stencils, stencils).reshape((mesh.kind.n_nodes * mesh.dim,) * 2)
-    if springs.volume:
-        matrix += VolumeTerm(problem, springs.kappa(problem)).stiffening(mesh.nodes)[0]
-    return np.asarray(matrix)
-
-
-def _shares_of_links(problem: Problem, cell: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
-    """The part of each link that belongs to a cell of a strip, where one spring stands for all that share it.
-
-    Two cells share what lies in the plane between them: always along x, inside the section across it.
-    """
-    dim = problem.mesh.dim
-    links = np.array(problem.mesh.kind.links)
-    ends = CORNERS[links][:, :, :dim]
-    within = ends[:, 0] == ends[:, 1]
-    places = ends[:, 0] + np.array([0, *cell])
-    inside = np.ones_like(within)
-    inside[:, 1:] = (places[:, 1:] > 0) & (places[:, 1:] < np.array(counts))
-    return np.asarray(0.5 ** (within & inside).sum(axis=1))
+@remembered
+def _n_links(mesh: Mesh) -> int:
+    """The number of pairs of nodes that links join."""
+    keys = mesh.pair_keys(mesh.kind.links).ravel()
+    keys.sort(kind="stable")
+    return 1 + int(np.count_nonzero(keys[1:] != keys[:-1]))

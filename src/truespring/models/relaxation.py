@@ -1,56 +1,116 @@
 """Linear equilibrium of springs near rest, for what is told of them before a solve."""
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import cg, splu
 
-from truespring.arrays import Floats, Ints
-from truespring.potential import rigid_body_modes
+from truespring.arrays import Bools, Floats
+from truespring.mesh import Mesh
+from truespring.models.links import link_vectors
+from truespring.models.rules import require_body
+from truespring.models.springs import Springs
+from truespring.models.strain import uniform_strain, voigt_pairs
+from truespring.potential import SparseMatrix, rigid_body_modes
+from truespring.problem import Problem
+from truespring.solvers.direct import SingularMatrixError
+from truespring.solvers.gradients import IndefiniteError
+from truespring.solvers.linear import choose
 
-FreeMatrix = sparse.csr_array[Any, tuple[int, int]]
+# Unbalanced forces below this share of E h^(d-1) are rounding: a uniform strain is an equilibrium.
+_BALANCED = 1e-8
 
-# Up to so many unknowns, in the plane and in space, a factorisation is quick.
-_DIRECT = {2: 300_000, 3: 20_000}
+# To this relative residual displacements are found; their energies are exact to its square.
+_ACCURACY = 1e-8
 
 
-def relaxed(matrix: FreeMatrix, right: Floats, dim: int) -> Floats | None:
-    """Solve matrix x = right, columns of shape (n, k); None where the matrix is not seen to be positive definite.
+def relaxed_elasticity(
+    problem: Problem, springs: Springs, stiffness: Floats, negative: bool
+) -> tuple[Floats | None, float]:
+    """Return the elasticity of a body whose boundary is strained uniformly [Pa], and its patch score (see `Moduli`).
 
-    By factorisation, whose pivots tell; of large bodies in space by conjugate gradients, which may not notice.
+    None where nothing relaxes, whose score is 0, or where the body is not stable. `stiffness` is the part of each
+    element in its springs [N/m], shape (n_elements, links), `negative` whether there are negative springs.
     """
-    if matrix.shape[0] > _DIRECT[dim]:
-        return _by_gradients(matrix, right)
+    mesh = problem.mesh
+    material, section = require_body(problem)
+    inner = np.ones(mesh.n_nodes, dtype=bool)
+    inner[mesh.boundary] = False
+    if not inner.any():
+        return None, 0.0
+    K = None
+    strains = np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
+    if mesh.forms.few and (springs.sharing == "summed" or mesh.kind.sharing):
+        force = _forces_by_form(mesh, stiffness)
+    else:
+        K = _at_rest(problem, springs)
+        force = K @ strains
+    size = (mesh.measures.sum() / len(mesh.elements)) ** ((mesh.dim - 1) / mesh.dim)
+    squares = (force.reshape(len(inner), -1)[inner] ** 2).reshape(-1, strains.shape[1]).sum(axis=0) / inner.sum()
+    score = float(np.sqrt(squares.max())) / (material.young * section.thickness * size)
+    if score <= _BALANCED:
+        return None, 0.0
+    K = _at_rest(problem, springs) if K is None else K
+    held = np.repeat(~inner[:, None], mesh.dim, axis=1)
+    definite = not negative and bool((springs.kappa(problem) > -1e-9 * material.young).all())
+    relaxing = relaxed(K, -(K @ strains), mesh.nodes, held, definite)
+    if relaxing is None:
+        return None, score
+    moved = strains + relaxing
+    energy = moved.T @ (K @ moved)  # the least there is: errors of the displacement count by their square
+    return np.asarray((energy + energy.T) / 2 / (section.thickness * mesh.measures.sum())), score
+
+
+def _at_rest(problem: Problem, springs: Springs) -> SparseMatrix:
+    """The stiffness of the body at rest [N/m]."""
+    return replace(springs, allow_negative=True).potential(problem).hessian(problem.mesh.nodes)
+
+
+def _forces_by_form(mesh: Mesh, stiffness: Floats) -> Floats:
+    """Nodal forces of springs under unit uniform strains [N/m], shape (n_nodes, dim * strains), right at inner nodes.
+
+    What a form's first element does holds for all of its elements. A volume term of one modulus, which these
+    meshes have, does nothing at inner nodes: the volume of a body does not depend on them.
+    """
+    forms, links = mesh.forms, np.array(mesh.kind.links)
+    across = link_vectors(mesh, forms.first)
+    pairs = voigt_pairs(mesh.dim)
+    strain = np.stack([across[:, :, i] * across[:, :, j] for i, j in pairs], axis=2)
+    tension = (stiffness[forms.first] / (across**2).sum(axis=2))[:, :, None] * strain
+    pull = across[:, :, :, None] * tension[:, :, None, :]
+    incidence = np.zeros((mesh.kind.n_nodes, len(links)))
+    every = np.arange(len(links))
+    incidence[links[:, 0], every], incidence[links[:, 1], every] = -1, 1
+    forces = np.einsum("al,flis->fais", incidence, pull).reshape(-1, mesh.dim * len(pairs))
+    places = forms.of[:, None] * mesh.kind.n_nodes + np.arange(mesh.kind.n_nodes)
+    ones = np.ones(mesh.elements.size)
+    at_nodes = sparse.coo_array((ones, (mesh.elements.ravel(), places.ravel())), shape=(mesh.n_nodes, len(forces)))
+    return np.asarray(at_nodes.tocsr() @ forces)
+
+
+def relaxed(matrix: SparseMatrix, right: Floats, nodes: Floats, held: Bools, definite: bool) -> Floats | None:
+    """Solve matrix x = right on the directions that are not held, columns of shape (n_dof, k); zero elsewhere.
+
+    None where the matrix is not seen to be positive definite; one that is known to be `definite` need not be looked
+    at. `nodes` [m] and `held` have shape (n_nodes, dim).
+    """
     try:
-        factors = splu(
-            sparse.csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
-    if (factors.perm_r != factors.perm_c).any() or (factors.U.diagonal() <= 0).any():
-        return None
-    return np.asarray(factors.solve(right))
-
-
-def _by_gradients(matrix: FreeMatrix, right: Floats) -> Floats | None:
-    diagonal = matrix.diagonal()
-    if (diagonal <= 0).any():
-        return None
-    found = np.zeros_like(right)
-    for column in range(right.shape[1]):
-        inverse = sparse.diags_array(1 / diagonal)
-        found[:, column], failed = cg(matrix, right[:, column], rtol=1e-9, maxiter=20_000, M=inverse)
-        if failed:
+        tangent = choose("auto", nodes, held).ready(matrix, nodes)
+        if not definite and tangent.negative_eigenvalues != 0:
             return None
-    return found
+        free = np.where(held.ravel(), 0.0, right.T).reshape(-1, *nodes.shape)
+        return np.stack([tangent.solve(column, _ACCURACY).ravel() for column in free], axis=1)
+    except (SingularMatrixError, IndefiniteError):
+        return None
 
 
-def pinned(nodes: Floats) -> Ints:
-    """Return dofs that hold a body against rigid motion and no more: without them no strain is hindered."""
-    _, order = linalg.qr(rigid_body_modes(nodes).T, mode="r", pivoting=True)
-    n_modes = np.linalg.matrix_rank(rigid_body_modes(nodes))
-    return np.sort(np.asarray(order[:n_modes], dtype=np.int64))
+def pinned(nodes: Floats) -> Bools:
+    """Return directions that hold a body against rigid motion and no more, shape (n_nodes, dim).
+
+    Without them no strain is hindered.
+    """
+    upper, order = linalg.qr(rigid_body_modes(nodes).T, mode="r", pivoting=True)
+    sizes = np.abs(np.diag(upper))
+    held = np.zeros(nodes.size, dtype=bool)
+    held[order[: int((sizes > 1e-9 * sizes[0]).sum())]] = True
+    return held.reshape(nodes.shape)

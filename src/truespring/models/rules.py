@@ -5,8 +5,10 @@ the order of `ElementKind.links`, and one line in RULES. What the springs realis
 the result (`moduli`), so that no rule needs to be believed.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -14,9 +16,11 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError
 from truespring.material import Material, Section
-from truespring.models.fem import element_matrices
+from truespring.memory import slices
+from truespring.mesh.rows import distinct_rows
+from truespring.models.fem import fem_potential
 from truespring.models.links import CORNERS, link_coupling, link_vectors
-from truespring.problem import Problem
+from truespring.problem import Problem, sample
 
 #: Share of E h that `isotropic` gives to each body diagonal of a cube unless told otherwise: the member
 #: of its family whose matrix is nearest to that of the hexahedron.
@@ -75,7 +79,15 @@ def require_body(problem: Problem) -> tuple[Material, Section]:
 def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
     """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links)."""
     check_rule(problem, rule, parameters)
-    return RULES[rule].stiffness(problem, **parameters)
+    recipe = partial(RULES[rule].stiffness, **parameters)
+    forms = problem.mesh.forms
+    if not forms.few:
+        return recipe(problem)
+    kinds = distinct_rows((forms.of, problem.material_numbers))
+    try:  # of elements that are alike one
+        return np.take(recipe(sample(problem, kinds.first)), kinds.of, axis=0)
+    except ModelError:
+        return recipe(problem)  # refuses it too, and counts and names the elements of the body
 
 
 def check_rule(problem: Problem, rule: str, parameters: dict[str, float]) -> None:
@@ -121,20 +133,23 @@ def _classes(problem: Problem, edge: float, diagonal: float = 0.0, body: float =
 def _bricks(problem: Problem, rule: str) -> Floats:
     """Side lengths of each rectangle or brick [m], shape (n_elements, dim); raise ModelError where one is none."""
     mesh = problem.mesh
-    at = mesh.nodes[mesh.elements]
-    sides = at[:, [1, 3, 4][: mesh.dim]] - at[:, :1]
-    lengths = np.linalg.norm(sides, axis=2)
-    directions = sides / lengths[:, :, None]
-    skew = np.abs(np.einsum("eai,ebi->eab", directions, directions) - np.eye(mesh.dim)).max(axis=(1, 2))
-    closed = at[:, :1] + np.einsum("ca,eai->eci", CORNERS[: mesh.kind.n_nodes, : mesh.dim], sides)
-    open_by = np.linalg.norm(at - closed, axis=2).max(axis=1) / lengths.max(axis=1)
-    wrong = np.flatnonzero(np.maximum(skew, open_by) > 1e-6)
+    lengths, off = np.empty((len(mesh.elements), mesh.dim)), np.empty(len(mesh.elements))
+    for part in slices(len(off), 32 * mesh.kind.n_nodes * mesh.dim):
+        at = mesh.nodes[mesh.elements[part]]
+        sides = at[:, [1, 3, 4][: mesh.dim]] - at[:, :1]
+        own = lengths[part] = np.linalg.norm(sides, axis=2)
+        directions = sides / own[:, :, None]
+        skew = np.abs(np.einsum("eai,ebi->eab", directions, directions) - np.eye(mesh.dim)).max(axis=(1, 2))
+        closed = at[:, :1] + np.einsum("ca,eai->eci", CORNERS[: mesh.kind.n_nodes, : mesh.dim], sides)
+        open_by = np.linalg.norm(at - closed, axis=2).max(axis=1) / own.max(axis=1)
+        off[part] = np.maximum(skew, open_by)
+    wrong = np.flatnonzero(off > 1e-6)
     if wrong.size:
         raise ModelError(
             f"rule = '{rule}' is made for {'rectangles' if mesh.dim == 2 else 'bricks'}, {wrong.size} elements are "
             f"none, the first is element {wrong[0]}; allowed here: projected, least-squares, biquadratic"
         )
-    return np.asarray(lengths)
+    return lengths
 
 
 def lloyd(problem: Problem) -> Floats:
@@ -201,10 +216,13 @@ def projected(problem: Problem) -> Floats:
     The least-squares fit of the off-diagonal blocks alone. On squares in plane stress at Poisson's
     ratio 1/3 it gives Lloyd's 5/16 and 7/16; on triangles at 1/3 Van Gelder's (1998) longer formula.
     """
-    links, direction = _link_directions(problem)
-    blocks = _blocks(problem)
-    off_diagonal = blocks[:, links[:, 0], :, links[:, 1], :].swapaxes(0, 1)
-    return np.asarray(-np.einsum("eli,elij,elj->el", direction, off_diagonal, direction))
+    links = np.array(problem.mesh.kind.links)
+
+    def fit(direction: Floats, blocks: Floats) -> Floats:
+        off_diagonal = blocks[:, links[:, 0], :, links[:, 1], :].swapaxes(0, 1)
+        return np.asarray(-np.einsum("eli,elij,elj->el", direction, off_diagonal, direction))
+
+    return _fitted(problem, fit)
 
 
 def least_squares(problem: Problem) -> Floats:
@@ -215,15 +233,17 @@ def least_squares(problem: Problem) -> Floats:
     (6 - nu) / (21 (1 - nu^2)) on edges, (15 + nu) / (42 (1 - nu^2)) on diagonals; cubes at 1/4, per E h:
     29/350, 188/1575 and 41/525.
     """
-    links, direction = _link_directions(problem)
-    blocks = _blocks(problem)
-    n_elements, n_nodes, dim = blocks.shape[:3]
-    stencil = np.zeros((n_elements, len(links), n_nodes, dim))
+    links = np.array(problem.mesh.kind.links)
     every = np.arange(len(links))
-    stencil[:, every, links[:, 0]], stencil[:, every, links[:, 1]] = -direction, direction
-    gram = np.einsum("esai,etai->est", stencil, stencil, optimize=True) ** 2
-    target = np.einsum("esai,eaibj,esbj->es", stencil, blocks, stencil, optimize=True)
-    return np.asarray(np.linalg.solve(gram, target[:, :, None])[:, :, 0])
+
+    def fit(direction: Floats, blocks: Floats) -> Floats:
+        stencil = np.zeros((len(direction), len(links), *blocks.shape[1:3]))
+        stencil[:, every, links[:, 0]], stencil[:, every, links[:, 1]] = -direction, direction
+        gram = np.einsum("esai,etai->est", stencil, stencil, optimize=True) ** 2
+        target = np.einsum("esai,eaibj,esbj->es", stencil, blocks, stencil, optimize=True)
+        return np.asarray(np.linalg.solve(gram, target[:, :, None])[:, :, 0])
+
+    return _fitted(problem, fit)
 
 
 def van_gelder(problem: Problem) -> Floats:
@@ -247,17 +267,20 @@ def biquadratic(problem: Problem) -> Floats:
     return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(problem)))
 
 
-def _link_directions(problem: Problem) -> tuple[Floats, Floats]:
-    """Local node pairs, shape (links, 2), and unit vectors, shape (n_elements, links, dim)."""
-    across = link_vectors(problem.mesh)
-    return np.array(problem.mesh.kind.links), across / np.linalg.norm(across, axis=2, keepdims=True)
+def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats:
+    """What `fit` makes of elements, slice by slice [N/m], shape (n_elements, links).
 
-
-def _blocks(problem: Problem) -> Floats:
-    """Linear FEM element matrices as blocks [N/m], shape (n_elements, nodes, dim, nodes, dim)."""
-    mesh = problem.mesh
-    n_nodes = mesh.elements.shape[1]
-    return element_matrices(problem).reshape(-1, n_nodes, mesh.dim, n_nodes, mesh.dim)
+    From the unit vectors of their links, shape (n, links, dim), and their linear FEM matrices as blocks [N/m],
+    shape (n, nodes, dim, nodes, dim).
+    """
+    mesh, potential = problem.mesh, fem_potential(problem, "linear")
+    shape = (mesh.kind.n_nodes, mesh.dim)
+    found = np.empty((len(mesh.elements), len(mesh.kind.links)))
+    for part in slices(len(found), 16 * math.prod(shape) ** 2):
+        across = link_vectors(mesh, part)
+        matrices = potential.element_hessians(mesh.nodes, None, part.start, part.stop)
+        found[part] = fit(across / np.linalg.norm(across, axis=2, keepdims=True), matrices.reshape(-1, *shape, *shape))
+    return found
 
 
 _ALL = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")

@@ -1,6 +1,6 @@
 """Springs: a body idealised as nodes joined by springs."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.elasticity import affine_energies, hooke, lattice_classes, lattice_elasticity
+from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
 from truespring.models.volume import VolumeSprings, VolumeTerm
@@ -113,9 +113,9 @@ class Springs:
                 f"volume = true: poisson = {material.poisson:g} is below 0; a volume term realises 0 to 0.5, "
                 "the rule biquadratic any"
             )
-        alone = replace(problem, material=material, regions=())
+        alone = dict(zip(problem.materials, problem.homogeneous, strict=True))[material]
         classes = lattice_classes(problem.mesh)
-        found = lattice_elasticity(alone, affine_energies(alone, self._given_stiffness(alone)), classes)
+        found = lattice_elasticity(alone, self._given_stiffness(alone), classes)
         mu = float(found[-1, -1])
         if classes is None or np.abs(found - hooke(mu, mu, problem.mesh.dim)).max() > _ISOTROPIC * abs(mu):
             this = "none" if classes is None else "anisotropic"

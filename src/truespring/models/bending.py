@@ -1,0 +1,123 @@
+"""Bending: the stiffness EI of strips of springs, and of finite elements, over that of their material."""
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.memory import remembered
+from truespring.mesh import Mesh
+from truespring.models.fem import Fem, element_matrices
+from truespring.models.links import CORNERS, all_alike, link_vectors
+from truespring.models.rules import require_body
+from truespring.models.springs import Springs
+from truespring.models.volume import VolumeTerm
+from truespring.problem import Problem, sample
+
+
+def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:
+    """Return the numbers of cells along the axes where all elements are the same rectangle or brick along them."""
+    if mesh.element not in ("quadrilateral", "hexahedron"):
+        return None
+    if not mesh.forms.single and not all_alike(mesh, 1e-6):
+        return None
+    at = mesh.nodes[mesh.elements[0]] - mesh.nodes[mesh.elements[0, 0]]
+    sides = at[-2 if mesh.dim == 3 else 2]
+    if (sides <= 0).any() or np.abs(at - CORNERS[: len(at), : mesh.dim] * sides).max() > 1e-6 * sides.max():
+        return None
+    counts = tuple(round(float(count)) for count in (mesh.upper - mesh.lower) / sides)
+    return counts if math.prod(counts) == len(mesh.elements) else None
+
+
+def bending_factors(
+    problem: Problem, springs: Springs | None, sizes: dict[int, tuple[int, ...]]
+) -> MappingProxyType[int, float]:
+    """Return bending factors by depth, of sections of so many elements through depth (and width).
+
+    Of finite elements where there are no springs.
+    """
+    if not sizes:
+        return MappingProxyType({})
+    one = sample(problem, np.zeros(1, dtype=np.int64))
+    return MappingProxyType({depth: _bending_factor(one, springs, sizes[depth]) for depth in sorted(sizes)})
+
+
+@remembered
+def fem_bending_factors(
+    problem: Problem, sizes: tuple[tuple[int, tuple[int, ...]], ...]
+) -> MappingProxyType[int, float]:
+    """Return the bending factors of the elements that are the default; the same for all springs on a body."""
+    return bending_factors(problem, None, dict(sizes))
+
+
+def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int, ...]) -> float:
+    """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
+
+    A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
+    from column to column and makes the energy least; EI is twice that energy by length. For springs on
+    squares with summed sharing it is e0 (1 - 1/n^2) + 6 a / n^2, e0 = E_0 / E.
+    """
+    material, section = require_body(problem)
+    mesh = problem.mesh
+    dim, corners = mesh.dim, CORNERS[: mesh.kind.n_nodes, : mesh.dim]
+    sides = mesh.nodes[mesh.elements[0, -2 if dim == 3 else 2]] - mesh.nodes[mesh.elements[0, 0]]
+    grid = np.array([count + 1 for count in counts])
+    # Both ends of a cell along x are one place of the section.
+    section_corners, place = np.unique(corners[:, 1:], axis=0, return_inverse=True)
+    gather = np.kron(np.eye(len(section_corners))[place.ravel()], np.eye(dim))
+    n_free = dim * int(np.prod(grid))
+    stiffness, force, energy = np.zeros((n_free, n_free)), np.zeros(n_free), 0.0
+    single = springs is not None and springs.sharing == "single"
+    matrix = _element_matrix(problem, springs)
+    for cell in np.ndindex(*counts):
+        if single:
+            matrix = _element_matrix(problem, springs, _shares_of_links(problem, cell, counts))
+        numbers = np.ravel_multi_index(tuple((section_corners + np.array(cell)).T), tuple(grid))
+        dofs = (dim * numbers[:, None] + np.arange(dim)).ravel()
+        bent = np.zeros((len(corners), dim))
+        bent[:, 0] = -corners[:, 0] * sides[0] * (corners[:, 1] + cell[0] - counts[0] / 2) * sides[1]
+        bent[:, 1] = corners[:, 0] * sides[0] ** 2 / 2
+        stiffness[np.ix_(dofs, dofs)] += gather.T @ matrix @ gather
+        force[dofs] += gather.T @ matrix @ bent.ravel()
+        energy += float(bent.ravel() @ matrix @ bent.ravel())
+    values, vectors = np.linalg.eigh(stiffness)
+    firm = np.abs(values) > 1e-10 * np.abs(values).max()
+    energy -= float(((force @ vectors[:, firm]) ** 2 / values[firm]).sum())
+    young, _ = section.apparent_moduli(material)
+    width = section.thickness if dim == 2 else counts[1] * sides[2]
+    return float(energy / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
+
+
+def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:
+    """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
+    if springs is None:
+        return np.asarray(Fem("linear").potential(problem).element_hessians(problem.mesh.nodes)[0])
+    if springs.coupled:  # these are FEM
+        return np.asarray(element_matrices(problem)[0])
+    mesh = problem.mesh
+    links, across = np.array(mesh.kind.links), link_vectors(mesh)[0]
+    direction = across / np.linalg.norm(across, axis=1)[:, None]
+    stencils = np.zeros((len(links), mesh.kind.n_nodes, mesh.dim))
+    every = np.arange(len(links))
+    stencils[every, links[:, 0]], stencils[every, links[:, 1]] = -direction, direction
+    stiffness = springs.element_stiffness(problem)[0] * (1.0 if share is None else share)
+    matrix = np.einsum("l,lai,lbj->aibj", stiffness, stencils, stencils).reshape((mesh.kind.n_nodes * mesh.dim,) * 2)
+    if springs.volume:
+        matrix += VolumeTerm(problem, springs.kappa(problem)).stiffening(mesh.nodes)[0]
+    return np.asarray(matrix)
+
+
+def _shares_of_links(problem: Problem, cell: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
+    """The part of each link that belongs to a cell of a strip, where one spring stands for all that share it.
+
+    Two cells share what lies in the plane between them: always along x, inside the section across it.
+    """
+    dim = problem.mesh.dim
+    links = np.array(problem.mesh.kind.links)
+    ends = CORNERS[links][:, :, :dim]
+    within = ends[:, 0] == ends[:, 1]
+    places = ends[:, 0] + np.array([0, *cell])
+    inside = np.ones_like(within)
+    inside[:, 1:] = (places[:, 1:] > 0) & (places[:, 1:] < np.array(counts))
+    return np.asarray(0.5 ** (within & inside).sum(axis=1))
