@@ -43,6 +43,7 @@ def test_verify_writes_every_file_of_the_contract(out: Path) -> None:
     for model in MODELS:
         expected |= {f"{model}.pvd", model, f"deformed_{model}.stl"}
     assert {path.name for path in (out / "study").iterdir()} == expected
+    assert (out / "report.html").read_bytes() == (out / "study" / "report.html").read_bytes()
     figures = {path.name for path in (out / "study" / "figures").iterdir()}
     for name in ("undeformed", "curves", "springs_over_linear"):
         assert {f"{name}.png", f"{name}.svg"} <= figures

@@ -286,8 +286,8 @@ def test_a_panel_for_each_model() -> None:
     with figure_style():
         for count in (1, 4):
             figure = young_figure([Known(f"springs {n}", realised, "b", "-") for n in range(count)], "material")
-            assert len(figure.axes) == count + 1
-            assert figure.get_figwidth() == pytest.approx(7.5 if count > 2 else 3.6)
+            assert len(figure.areas) == count
+            assert figure.width == pytest.approx(7.5 if count > 2 else 3.6)
 
 
 # --- the verbs ---------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -11,18 +12,20 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch, Rectangle
 
 import truespring as ts
 from truespring.mesh import Surface
+from truespring.report.bodies import undeformed_figure
 from truespring.report.figures import Drawing, draw_figures, over_name, save_figures
-from truespring.report.frame import blank_axes, round_numbers, written
+from truespring.report.frame import round_numbers, written
 from truespring.report.page import render_page, write_page
 from truespring.report.plots import _apart, _uncrossed
 from truespring.report.quantity import given, percent, quantity, round_factor, significant
 from truespring.report.result import Result
+from truespring.report.sheet import Area, Sheet
+from truespring.report.style import figure_style
 from truespring.report.summary import summary
 from truespring.report.verdict import (
     closest_sentence,
@@ -377,16 +380,22 @@ def solved() -> Result:
     return result(paths["springs"], {name: paths[name] for name in ("linear", "a/b")}, "Soft <10k & co>", "soft & wet")
 
 
-def segments(figure: Any, name: str) -> int:
+def called(figure: Sheet, name: str) -> list[Any]:
+    """The artists of a figure that an SVG calls by a name."""
+    return [artist for artist in figure.artists if artist.get_gid() == name]
+
+
+def segments(figure: Sheet, name: str) -> int:
     """The number of lines in the one path of a figure that is called `name`."""
-    (drawn,) = figure.findobj(lambda artist: artist.get_gid() == name)
+    (drawn,) = called(figure, name)
     return int((drawn.get_path().codes == 1).sum())
 
 
-def words(figure: Any) -> dict[str, Any]:
-    """What is written in a figure, and the outline that writes it."""
-    outlines = figure.findobj(lambda artist: isinstance(artist, PathPatch) and artist.get_label())
-    return {outline.get_label(): outline for outline in outlines}
+def words(figure: Sheet) -> dict[str, Any]:
+    """What is written in a figure, and where [points]."""
+    figure.pixels(72)
+    outlines = [artist for artist in figure.artists if isinstance(artist, PathPatch) and artist.get_label()]
+    return {str(outline.get_label()): outline.get_window_extent() for outline in outlines}
 
 
 def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
@@ -399,16 +408,15 @@ def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
     assert segments(over, "reference") == len(mesh.edges) == 13
     assert segments(figures["undeformed"], "springs") == n_springs
     for name, positions in (("undeformed", mesh.nodes), ("springs_over_linear", springs.states[-1].positions)):
-        (dot,) = figures[name].findobj(lambda artist: artist.get_gid() == "probe")
+        (dot,) = called(figures[name], "probe")
         assert np.ravel(dot.get_data()) == pytest.approx(1e3 * positions[solved.probe])
         assert dot.get_color() == "#d3222a"
-    assert figures["undeformed"].findobj(lambda artist: artist.get_gid() == "clamped")
+    assert called(figures["undeformed"], "clamped")
 
 
 def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Result) -> None:
     figure = draw_figures(solved)["curves"]
-    (axes,) = figure.axes
-    lines = {line.get_label(): line for line in axes.lines}
+    lines = {line.get_label(): line for line in figure.artists if isinstance(line, Line2D) and line.get_label()}
     assert set(lines) == {"springs (lloyd)", "linear FEM", "Hencky FEM, a/b"}
     said = words(figure)
     assert {"springs (lloyd)", "linear FEM", "Hencky FEM", "a/b"} <= said.keys()
@@ -419,9 +427,9 @@ def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Re
     assert lines["springs (lloyd)"].get_xdata() == pytest.approx([400 * state.load_factor for state in states])
     assert {"total force along x [mN]", "displacement along x [mm]"} <= said.keys()
     # Numbers stand below and beside what they tell.
-    right, up = (axes.transData.transform((float(number), float(number))) for number in ("400", "10"))
-    middles = [np.mean(said[number].get_window_extent().get_points(), axis=0) for number in ("400", "10")]
-    assert middles[0][0] == pytest.approx(right[0], abs=0.5) and middles[1][1] == pytest.approx(up[1], abs=0.5)
+    right, up = figure.areas[0].place(np.array([(400.0, 400.0), (10.0, 10.0)])) * 72
+    assert (said["400"].x0 + said["400"].x1) / 2 == pytest.approx(right[0], abs=0.5)
+    assert (said["10"].y0 + said["10"].y1) / 2 == pytest.approx(up[1], abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -440,20 +448,47 @@ def test_axes_carry_round_numbers(low: float, high: float, numbers: list[str]) -
 
 
 def test_words_stand_where_they_are_put() -> None:
-    figure = Figure(figsize=(4, 3), dpi=72)
-    axes = blank_axes(figure, 1, 1, 2, 1)
-    axes.set(xlim=(0, 10), ylim=(0, 10))
-    draw_words(figure, 1, 2, "HIH", 20)
-    draw_words(figure, 1, 2, "HHI", 20, align=1.0, shift=(0, -36))
-    draw_words(axes, 5, 5, "IHI", 20, align=0.5, upright=True)
-    draw_words(figure, 1, 2, " ")
-    left, right, up = (words(figure)[text].get_window_extent() for text in ("HIH", "HHI", "IHI"))
+    sheet = Sheet(4, 3, "")
+    draw_words(sheet, 1, 2, "HIH", 20)
+    draw_words(sheet, 1, 1.5, "HHI", 20, align=1.0)
+    draw_words(sheet, 2, 1.5, "IHI", 20, align=0.5, upright=True)
+    draw_words(sheet, 1, 2, " ")
+    left, right, up = (words(sheet)[text] for text in ("HIH", "HHI", "IHI"))
     assert left.y0 + left.y1 == pytest.approx(288, abs=0.02) and right.y0 + right.y1 == pytest.approx(216, abs=0.02)
     assert up.x0 + up.x1 == pytest.approx(288, abs=0.02) and up.y0 + up.y1 == pytest.approx(216, abs=3)
     assert left.x0 == pytest.approx(72, abs=3) and right.x1 == pytest.approx(72)
     assert left.height == pytest.approx(0.729 * 20, abs=0.01) and up.width == pytest.approx(left.height)
     assert left.width == pytest.approx(72 * text_width("HIH", 20), abs=5)
-    assert len(words(figure)) == 3
+    assert len(words(sheet)) == 3
+
+
+def test_a_sheet_draws_the_same_on_pixels_and_in_an_svg() -> None:
+    sheet = Sheet(2, 1, "")
+    area = Area(sheet, 0.5, 0.25, 1.0, 0.5, (0, 10), (-1, 1))
+    assert area.place(np.array([(0, -1), (10, 1)])).tolist() == [[0.5, 0.25], [1.5, 0.75]] and area.inch == 10
+    area.add(Rectangle((5, 0), 100, 100, color="red", lw=0, gid="clipped"))
+    sheet.add(Rectangle((0, 0), 0.1, 0.1, color="blue", lw=0, zorder=2))
+    sheet.add_image(np.full((3, 3, 3), [0, 255, 0], dtype=np.uint8), 0.0, 0.0, 0.2, 0.2, 1, "image")
+    drawn = sheet.pixels(100)
+    assert drawn.shape == (100, 200, 4)
+
+    def color(x: float, y: float) -> list[int]:
+        return drawn[round(100 * (1 - y)), round(100 * x)].tolist()  # type: ignore[no-any-return]
+
+    white, red, green, blue = [255] * 4, [255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]
+    assert [color(1.2, 0.6), color(1.7, 0.6), color(1.2, 0.4), color(0.7, 0.6)] == [red, white, white, white]
+    assert [color(0.05, 0.05), color(0.15, 0.15)] == [blue, green]
+    root = ElementTree.fromstring(sheet.svg())
+    assert (root.get("width"), root.get("height")) == ("144pt", "72pt")
+    (group,) = root.iterfind(".//*[@id='clipped']")
+    numbers = [float(one) for one in re.findall(r"[\d.]+", group[0].get("d") or "")]
+    assert numbers[:4] == [72, 36, 792, 36] and group[0].get("clip-path")  # downwards, in points
+    assert root.find(".//*[@id='image']") is not None
+
+
+def test_pictures_do_not_change_from_drawing_to_drawing(solved: Result) -> None:
+    with figure_style():
+        assert undeformed_figure(solved).svg() == undeformed_figure(solved).svg()
 
 
 def test_names_at_the_ends_of_curves_keep_their_distance() -> None:
@@ -479,13 +514,10 @@ def test_the_right_margin_holds_the_longest_name() -> None:
     long = path(problem, [0.7] * 5, label="springs (own stiffness, single) and then some more words")
     for found in (result(short, {"b": path(problem)}), result(short, {"b": path(problem), "c": long})):
         figure = draw_figures(found)["curves"]
-        renderer = FigureCanvasAgg(figure).get_renderer()
-        room = figure.bbox
-        names = words(figure).values()
-        boxes = [name.get_window_extent(renderer) for name in names]
+        boxes = words(figure).values()
         assert len(boxes) >= 2
-        assert all(room.x0 <= box.x0 and box.x1 <= room.x1 for box in boxes)
-        assert figure.axes[0].get_window_extent(renderer).width >= 3.1 * figure.dpi
+        assert all(box.x0 >= 0 and box.x1 <= 72 * figure.width for box in boxes)
+        assert figure.areas[0].width >= 3.1
 
 
 def moved_by(problem: ts.Problem, distance: float, **more: Any) -> ts.Path:
@@ -515,7 +547,7 @@ def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page
     found = result(tiny, {"linear": larger})
     figure = draw_figures(found)[over_name(found, "linear")]
     assert "displacements × 50" in words(figure)
-    (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
+    (dot,) = called(figure, "probe")
     assert np.ravel(dot.get_data()) == pytest.approx([80, 50 * 0.08])
     page = page_of(found)
     assert "displacements × 50" in page.said
@@ -538,7 +570,7 @@ def test_a_surface_is_magnified_only_where_its_displacement_is_known(page_of: Ca
     for read, factor in ((alone, 1), (known, 100)):
         found = result(tiny, {"ansys": read})
         figure = draw_figures(found)[over_name(found, "ansys")]
-        (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
+        (dot,) = called(figure, "probe")
         assert np.ravel(dot.get_data()) == pytest.approx([80, factor * 0.08])
         data = json.loads(page_of(found).scripts[0])
         assert (data["magnified"] == "") == (factor == 1)
@@ -556,10 +588,10 @@ def test_the_picture_follows_the_body_and_the_model_not_a_reference_that_goes_fa
     heights = {}
     for name, leaves in (("near", False), ("far", True)):
         figure = figures[over_name(found, name)]
-        low, high = figure.axes[0].get_ylim()
+        low, high = figure.areas[0].y
         heights[name] = high - low
         assert ("linear FEM that ran away leaves the picture" in words(figure)) == leaves
-        (drawn,) = figure.findobj(lambda artist: artist.get_gid() == "reference")
+        (drawn,) = called(figure, "reference")
         assert drawn.get_clip_path() is not None or drawn.get_clip_box() is not None
     assert heights["near"] > 120 and 60 < heights["far"] < 80  # mm
     data = json.loads(page_of(found).scripts[0])
@@ -573,7 +605,7 @@ def supports(problem: ts.Problem) -> dict[tuple[float, float], list[Any]]:
     """The marks of supports in the picture of what was asked, by their place in mm."""
     figure = draw_figures(result(path(problem), {"b": path(problem)}))["undeformed"]
     found: dict[tuple[float, float], list[Any]] = {}
-    for mark in figure.findobj(lambda artist: artist.get_gid() == "support" and hasattr(artist, "get_marker")):
+    for mark in [one for one in called(figure, "support") if isinstance(one, Line2D)]:
         x, y = np.ravel(mark.get_data())
         found.setdefault((round(float(x), 6), round(float(y), 6)), []).append(mark.get_marker().vertices)
     return found

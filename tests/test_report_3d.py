@@ -13,9 +13,10 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 import truespring as ts
-from tests.test_report import Page, words
+from tests.test_report import Page, called, words
 from truespring.mesh import Mesh
 from truespring.report import render as rendering
 from truespring.report.bodies import path_lines
@@ -338,16 +339,19 @@ def test_the_probe_the_arrow_and_the_scale_are_where_they_belong() -> None:
     picture = undeformed_picture(found)
     with figure_style():
         figure = figure_of(picture, draw(shot(picture)))
-    (dot,) = figure.findobj(lambda artist: artist.get_gid() == "probe")
+    (dot,) = called(figure, "probe")
     assert np.ravel(dot.get_data()) == pytest.approx(1e3 * seen(found.problem.mesh.nodes)[found.probe, :2])
-    (image,) = figure.findobj(lambda artist: artist.get_gid() == "image")
+    (image,) = called(figure, "image")
     wanted = shot(picture)
-    assert image.get_extent() == pytest.approx([1e3 * v for v in np.ravel(np.stack([wanted.lower, wanted.upper]).T)])
+    (area,) = figure.areas
+    assert [*area.x, *area.y] == pytest.approx([1e3 * v for v in np.ravel(np.stack([wanted.lower, wanted.upper]).T)])
+    corners = area.place(1e3 * np.stack([wanted.lower, wanted.upper]))
+    assert image.get_window_extent().get_points() == pytest.approx(corners)
     texts = words(figure)
     assert {"F = 50 mN", "x", "y", "z", "each 10 mm"} <= texts.keys()
-    assert figure.findobj(lambda artist: artist.get_gid() == "clamped")
+    assert called(figure, "clamped")
     # Loaded facets are tinted instead of dotted with nodes.
-    assert not figure.findobj(lambda artist: artist.get_gid() == "loaded")
+    assert not called(figure, "loaded")
     assert picture.layers[0].colors is not None
     right = np.isclose(found.problem.mesh.nodes[facets_of(found.problem.mesh), 0], SIZE[0]).all(axis=1)
     tints = picture.layers[0].colors.mean(axis=1)
@@ -360,12 +364,12 @@ def test_rollers_stand_on_the_sides_that_they_hold() -> None:
     picture = undeformed_picture(found)
     with figure_style():
         figure = figure_of(picture, draw(shot(picture)))
-    pins = figure.findobj(lambda artist: artist.get_gid() == "support" and hasattr(artist, "get_marker"))
+    pins = [one for one in called(figure, "support") if isinstance(one, Line2D)]
     places = {tuple(np.round(np.ravel(pin.get_data()), 6)) for pin in pins}
     nodes = found.problem.mesh.nodes
     on_sides = (np.isclose(nodes, 0)).any(axis=1)
     assert places <= {tuple(place) for place in np.round(1e3 * seen(nodes[on_sides])[:, :2], 6)}
-    assert len(pins) > 10 and not figure.findobj(lambda artist: artist.get_gid() == "clamped")
+    assert len(pins) > 10 and not called(figure, "clamped")
 
 
 def test_figures_of_a_study_in_3d(by_matplotlib: None, tmp_path: FilePath) -> None:
@@ -404,7 +408,7 @@ def test_a_network_in_space_has_no_surface_and_is_drawn_all_the_same(by_matplotl
     )
     figures = draw_figures(found)
     assert set(figures) == {"undeformed", "soft_over_stiff", "curves", "error"}
-    assert figures["undeformed"].findobj(lambda artist: artist.get_gid() == "loaded")
+    assert called(figures["undeformed"], "loaded")
     data = viewer(found, 10_000)
     assert data is not None and data["triangles"] == "" and numbers(data["paths"][0]["lines"]).size == 6
 

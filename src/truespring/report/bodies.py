@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,19 +10,16 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path
 from truespring.mesh import Mesh
-from truespring.report.frame import blank_axes, draw_frame
+from truespring.report.frame import draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import Scale, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
+from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
-from truespring.report.symbols import ROLLER, draw_arrow, draw_dot, draw_loaded, draw_pin, find_arrows
+from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_pin, find_arrows
 from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def spring_lines(path: Path) -> Ints | None:
@@ -71,10 +68,8 @@ _WIDEST = 3.0
 
 def _body_figure(
     title: str, lower: Floats, upper: Floats, legend: Sequence[Entry], remark: str = ""
-) -> "tuple[Figure, Axes, Scale]":
-    """A figure whose one pair of axes shows the box from `lower` to `upper` [m] at equal scales, words on top."""
-    from matplotlib.figure import Figure
-
+) -> tuple[Area, Scale]:
+    """A sheet whose one area shows the box from `lower` to `upper` [m] at equal scales, words on top."""
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
     columns, words = legend_columns(legend, 4.7)
@@ -87,27 +82,25 @@ def _body_figure(
     broad = max(width, 3.3, words + 0.05)
     margin = (broad / width - 1) / 2 * extent[0]
     told = f"{title}; {remark}" if remark else title
-    figure = Figure(figsize=(left + broad + right, bottom + height + top), label=told)
-    head = float(figure.get_figheight())
-    axes = blank_axes(figure, left, bottom, broad, height)
-    axes.set_xlim((lower[0] - margin) / scale.size, (upper[0] + margin) / scale.size)
-    axes.set_ylim(lower[1] / scale.size, upper[1] / scale.size)
-    draw_frame(figure, axes, f"x [{scale.unit}]", f"y [{scale.unit}]")
-    draw_words(figure, left, head - 0.17, title, 9, bold=True)
-    draw_words(figure, left, head - 0.37, remark, color=LOAD)
-    draw_legend(figure, columns, left, head - top + 0.14 + ROW * rows)
-    return figure, axes, scale
+    sheet = Sheet(left + broad + right, bottom + height + top, told)
+    x = ((lower[0] - margin) / scale.size, (upper[0] + margin) / scale.size)
+    area = Area(sheet, left, bottom, broad, height, x, (lower[1] / scale.size, upper[1] / scale.size))
+    draw_frame(area, f"x [{scale.unit}]", f"y [{scale.unit}]")
+    draw_words(sheet, left, sheet.height - 0.17, title, 9, bold=True)
+    draw_words(sheet, left, sheet.height - 0.37, remark, color=LOAD)
+    draw_legend(sheet, columns, left, sheet.height - top + 0.14 + ROW * rows)
+    return area, scale
 
 
 def _lines(
-    axes: "Axes", points: Floats, lines: Ints, color: str, width: float, zorder: float, name: str, **more: Any
+    area: Area, points: Floats, lines: Ints, color: str, width: float, zorder: float, name: str, **more: Any
 ) -> None:
     """Draw lines between points; fine meshes in fine lines."""
     width *= min(1.0, max(0.25, (500 / max(len(lines), 1)) ** 0.5))
-    draw_lines(axes, points[lines], color, width, zorder, name, **more)
+    draw_lines(area, points[lines], color, width, zorder, name, **more)
 
 
-def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | None":
+def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | None:
     """The model in blue over a reference in black, at the last load level that both have."""
     model, reference = comparison.model, comparison.reference
     rest = model.problem.mesh.nodes
@@ -140,15 +133,15 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> "Figure | 
         Entry("probe", RED, "o", ""),
     ]
     title = over_title(result, level, comparison)
-    figure, axes, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
+    area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
     outline = mesh.boundary if mesh.element != "line" else path_lines(model)
-    _lines(axes, rest / scale.size, outline, FAINT, 0.8, 1, "rest", linestyle=(0, (3, 2)))
+    _lines(area, rest / scale.size, outline, FAINT, 0.8, 1, "rest", linestyle=(0, (3, 2)))
     if inside is not None:
-        _lines(axes, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
-    _lines(axes, points / scale.size, lines, INK, 1.3, 3, "reference")
-    _lines(axes, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
-    draw_dot(axes, positions[comparison.probe] / scale.size)
-    return figure
+        _lines(area, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
+    _lines(area, points / scale.size, lines, INK, 1.3, 3, "reference")
+    _lines(area, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
+    draw_dot(area, positions[comparison.probe] / scale.size)
+    return area.sheet
 
 
 def over_title(result: Result, level: float, comparison: Comparison) -> str:
@@ -161,7 +154,7 @@ def over_title(result: Result, level: float, comparison: Comparison) -> str:
     return at
 
 
-def undeformed_figure(result: Result) -> "Figure":
+def undeformed_figure(result: Result) -> Sheet:
     """The body as it is asked for: mesh, springs, supports, loads and the probe."""
     mesh = result.problem.mesh
     model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
@@ -175,20 +168,20 @@ def undeformed_figure(result: Result) -> "Figure":
     legend += [Entry("probe", RED, "o", "")]
     title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
     title += f", {len(path_lines(model))} springs" if springs else ""
-    figure, axes, scale = _body_figure(title, lower, upper, legend)
+    area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":
-        _lines(axes, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
+        _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
     if springs:
-        _lines(axes, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, 3, "springs")
-    _supports(axes, result, scale, 0.028 * size)
+        _lines(area, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, 3, "springs")
+    _supports(area, result, scale, 0.028 * size)
     for arrow in arrows:
-        draw_loaded(axes, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
-        draw_arrow(axes, arrow, scale)
-    draw_dot(axes, mesh.nodes[result.probe] / scale.size)
-    return figure
+        draw_loaded(area, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
+        draw_drive(area, arrow, scale)
+    draw_dot(area, mesh.nodes[result.probe] / scale.size)
+    return area.sheet
 
 
-def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
+def _supports(area: Area, result: Result, scale: Scale, size: float) -> None:
     """Clamped edges hatched, edges held in one direction on rollers, single nodes on a pin or roller."""
     mesh, loading = result.problem.mesh, result.problem.loading
     still = loading.held & (loading.displacement == 0)
@@ -197,29 +190,21 @@ def _supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
     if mesh.boundary.shape[1] == 2:
         edges = mesh.boundary[clamped[mesh.boundary].all(axis=1)]
         hatched[edges] = True
-        _hatch(axes, mesh.nodes[edges] / scale.size, size / scale.size)
+        _hatch(area, mesh.nodes[edges] / scale.size, size / scale.size)
     single = still & ~hatched[:, None]
     for run in _rolling_runs(mesh, still):
         single[run.nodes, run.axis] = False
-        for node in run.thinned(mesh.nodes, 1.5 * ROLLER * _inch(axes) * scale.size):
+        for node in run.thinned(mesh.nodes, 1.5 * ROLLER * area.inch * scale.size):
             if not hatched[node]:
-                draw_pin(axes, mesh.nodes[node] / scale.size, run.away, run.beside)
+                draw_pin(area, mesh.nodes[node] / scale.size, run.away, run.beside)
     centre = (mesh.lower + mesh.upper) / 2
     for node in np.flatnonzero(single.any(axis=1)):
         at = mesh.nodes[node]
         if single[node].all():
-            draw_pin(axes, at / scale.size, np.array([0.0, -1.0]), roller=False)
+            draw_pin(area, at / scale.size, np.array([0.0, -1.0]), roller=False)
             continue
         for axis in np.flatnonzero(single[node]):
-            draw_pin(axes, at / scale.size, np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0))
-
-
-def _inch(axes: "Axes") -> float:
-    """The length of an inch on paper, in units of the axes."""
-    figure = axes.get_figure()
-    assert figure is not None
-    low, high = axes.get_xlim()
-    return (high - low) / float(axes.get_position().width * figure.get_figwidth())  # type: ignore[union-attr]
+            draw_pin(area, at / scale.size, np.eye(2)[axis] * (1.0 if at[axis] > centre[axis] else -1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,7 +249,7 @@ def _rolling_runs(mesh: Mesh, still: Bools) -> Iterator[_Run]:
                     yield _Run(nodes, axis, away, beside)
 
 
-def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
+def _hatch(area: Area, edges: Floats, size: float) -> None:
     """Short strokes outside clamped edges; edges of shape (n, 2, dim) run anticlockwise round the body."""
     if not len(edges):
         return
@@ -280,6 +265,6 @@ def _hatch(axes: "Axes", edges: Floats, size: float) -> None:
         ends.append(foot + size * (normal - 0.7 * direction))
     strokes = np.stack([np.concatenate(starts), np.concatenate(ends)], axis=1)
     pairs = np.arange(2 * len(strokes)).reshape(-1, 2)
-    _lines(axes, strokes.reshape(-1, 2), pairs, "#3d4248", 0.9, 1, "support", clip_on=False)
+    _lines(area, strokes.reshape(-1, 2), pairs, "#3d4248", 0.9, 1, "support", clip_on=False)
     sides = np.arange(2 * len(edges)).reshape(-1, 2)
-    _lines(axes, edges.reshape(-1, 2), sides, "#3d4248", 2.2, 5, "clamped")
+    _lines(area, edges.reshape(-1, 2), sides, "#3d4248", 2.2, 5, "clamped")

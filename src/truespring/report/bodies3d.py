@@ -5,7 +5,6 @@ What hides what is an image (render.py); words, marks, arrows and scales are dra
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,14 +17,12 @@ from truespring.report.lines import draw_lines
 from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, times
 from truespring.report.render import Layer, rgb
 from truespring.report.result import Result
+from truespring.report.sheet import Area
 from truespring.report.style import BLUE, FAINT, INK, RED, error_colors, full_name
 from truespring.report.supports3d import clamped_nodes, draw_supports
 from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
-from truespring.report.symbols import Arrow, draw_arrow, draw_dot, draw_loaded, find_arrows
+from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, find_arrows
 from truespring.report.verdict import display_name, level_name
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 # Surfaces: of the body as asked for, of a reference, where it is held; their light comes from above, left of the eye.
 _BODY, _REFERENCE, _HELD = "#f7f8f9", "#e6e9ec", "#bcc2c8"
@@ -52,13 +49,13 @@ def undeformed_picture(result: Result) -> Picture:
     legend += [Entry("springs", BLUE)] if springs is not None else []
     taken = np.concatenate([_spots(points, facets, mesh.edges), *(np.stack([*one.ends, one.room]) for one in arrows)])
 
-    def marks(axes: "Axes", scale: Scale) -> None:
-        draw_supports(axes, result, scale, 0.028 * size)
+    def marks(area: Area, scale: Scale) -> None:
+        draw_supports(area, result, scale, 0.028 * size)
         for arrow in arrows:
             if not _within(facets, arrow.nodes, mesh.n_nodes).any():
-                draw_loaded(axes, points[arrow.nodes, :2] / scale.size, arrow.color)
-            draw_arrow(axes, arrow, scale)
-        draw_dot(axes, points[result.probe, :2] / scale.size)
+                draw_loaded(area, points[arrow.nodes, :2] / scale.size, arrow.color)
+            draw_drive(area, arrow, scale)
+        draw_dot(area, points[result.probe, :2] / scale.size)
 
     lower, upper = taken.min(axis=0) - 0.03 * size, taken.max(axis=0) + 0.03 * size
     entries = (*legend, Entry("probe", RED, "o", ""))
@@ -172,11 +169,11 @@ def _pair_picture(
     remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
     at_rest = outline(pair.rest, facets, silhouette=True) if len(facets) else mesh.edges
 
-    def marks(axes: "Axes", scale: Scale) -> None:
+    def marks(area: Area, scale: Scale) -> None:
         draw_lines(
-            axes, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES, clip_on=False
+            area, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES, clip_on=False
         )
-        draw_dot(axes, pair.mine[comparison.probe, :2] / scale.size)
+        draw_dot(area, pair.mine[comparison.probe, :2] / scale.size)
 
     return Picture(
         title, " · ".join(remarks), legend, lower - margin, upper + margin, np.concatenate(spots), layers, marks, bar

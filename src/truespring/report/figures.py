@@ -3,12 +3,10 @@
 Matplotlib is imported where it is needed, and only through its objects: no window, no global state.
 """
 
-import io
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from truespring.report.bodies import over_figure, undeformed_figure
@@ -17,12 +15,8 @@ from truespring.report.frame3d import figure_of, shot
 from truespring.report.plots import curves_figure, error_figure, moduli_figure
 from truespring.report.render import render
 from truespring.report.result import Result
+from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_DPI = 130
 
 # A Result does not change, and its files and its pages show the same pictures: they are drawn once.
 _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()
@@ -42,17 +36,20 @@ class Drawing:
     note: str = ""
 
 
-def draw_figures(result: Result) -> "dict[str, Figure]":
+def draw_figures(result: Result) -> dict[str, Sheet]:
     """Return the figures of a study by the stem of their file names."""
     with figure_style():
-        return {name: figure for name, figure, _ in _draw(result)}
+        return {name: sheet for name, sheet, _ in _draw(result)}
 
 
 def render_figures(result: Result) -> dict[str, Drawing]:
     """Return the figures of a study as PNG and SVG, by the stem of their file names."""
     if result not in _DRAWN:
         with figure_style():
-            _DRAWN[result] = {name: _written(figure, note) for name, figure, note in _draw(result)}
+            _DRAWN[result] = {
+                name: Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width, note)
+                for name, sheet, note in _draw(result)
+            }
     return _DRAWN[result]
 
 
@@ -80,26 +77,8 @@ def _safe(name: str) -> str:
     return re.sub(r"[^\w.-]+", "-", name)
 
 
-def _written(figure: "Figure", note: str) -> Drawing:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    png, svg = io.BytesIO(), io.BytesIO()
-    figure.savefig(png, format="png", dpi=_DPI, pil_kwargs={"compress_level": 1})
-    figure.savefig(svg, format="svg", metadata={"Date": None})
-    width = float(figure.get_figwidth())
-    return Drawing(png.getvalue(), _shorter(svg.getvalue()), str(figure.get_label()), width, note)
-
-
-def _shorter(svg: bytes) -> bytes:
-    """The same picture in fewer bytes: coordinates to a hundredth of a point, no comments, no indents."""
-    text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg.decode(), flags=re.DOTALL)
-    text = re.sub(r"(?<=\.\d\d)\d+", "", text)
-    return re.sub(r"\s*\n\s*", "\n", text).encode()
-
-
 # A figure, the stem of the names of its files, and what a reader should know of how it was drawn.
-_Named = tuple[str, "Figure", str]
+_Named = tuple[str, Sheet, str]
 
 
 def _draw(result: Result) -> Iterator[_Named]:

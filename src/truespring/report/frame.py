@@ -1,18 +1,14 @@
 """The frame of a plot: grid, ticks, numbers and labels in few artists, many times faster than matplotlib's own."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.report.lines import draw_lines
+from truespring.report.sheet import Area, Sheet
 from truespring.report.style import POINT
 from truespring.report.words import draw_words, text_width
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: The colours of grids and of axes, and the size of their numbers [points].
 GRID, EDGE, SIZE = "#e3e6e9", "#5b6168", 8.5
@@ -21,49 +17,39 @@ GRID, EDGE, SIZE = "#e3e6e9", "#5b6168", 8.5
 _TICK, _ROW, _BAR = 3.5 * POINT, 14 * POINT, 0.09
 
 
-def blank_axes(figure: "Figure", left: float, bottom: float, width: float, height: float) -> "Axes":
-    """Add axes that show nothing of their own, at a place on the figure [inch]."""
-    total = figure.get_size_inches()
-    axes = figure.add_axes((left / total[0], bottom / total[1], width / total[0], height / total[1]))
-    axes.set_axis_off()
-    return axes
-
-
-def draw_frame(figure: "Figure", axes: "Axes", x_label: str, y_label: str) -> None:
-    """Draw grid, axes, ticks and numbers about what is between the limits of blank axes, and what the numbers mean."""
-    (left, bottom), (right, top) = axes.get_position().get_points() * figure.get_size_inches()
-    x, x_numbers = _places(axes.get_xlim(), left, right)
-    y, y_numbers = _places(axes.get_ylim(), bottom, top)
+def draw_frame(area: Area, x_label: str, y_label: str) -> None:
+    """Draw grid, axes, ticks and numbers about an area, and what the numbers stand for."""
+    sheet, left, bottom = area.sheet, area.left, area.bottom
+    right, top = left + area.width, bottom + area.height
+    x, x_numbers = _places(area.x, left, right)
+    y, y_numbers = _places(area.y, bottom, top)
     grid = [((at, bottom), (at, top)) for at in x] + [((left, at), (right, at)) for at in y]
     edges = [((left, bottom), (right, bottom)), ((left, bottom), (left, top))]
     edges += [((at, bottom), (at, bottom - _TICK)) for at in x] + [((left, at), (left - _TICK, at)) for at in y]
-    inches: dict[str, Any] = {"transform": figure.dpi_scale_trans}
-    draw_lines(axes, np.array(grid), GRID, 0.6, 0.5, "grid", clip_on=False, **inches)
-    draw_lines(axes, np.array(edges), EDGE, 0.7, 2.5, "axes", clip_on=False, **inches)
+    draw_lines(sheet, np.array(grid), GRID, 0.6, 0.5, "grid")
+    draw_lines(sheet, np.array(edges), EDGE, 0.7, 2.5, "axes")
     below, beside = bottom - _TICK - _ROW / 2, left - 2 * _TICK
     for at, number in zip(x, x_numbers, strict=True):
-        draw_words(figure, at, below, number, SIZE, align=0.5)
+        draw_words(sheet, at, below, number, SIZE, align=0.5)
     for at, number in zip(y, y_numbers, strict=True):
-        draw_words(figure, beside, at, number, SIZE, align=1.0)
-    draw_words(figure, (left + right) / 2, below - _ROW, x_label, SIZE, align=0.5)
+        draw_words(sheet, beside, at, number, SIZE, align=1.0)
+    draw_words(sheet, (left + right) / 2, below - _ROW, x_label, SIZE, align=0.5)
     widest = max(text_width(number, SIZE) for number in y_numbers)
-    draw_words(figure, beside - widest - _ROW / 2, (bottom + top) / 2, y_label, SIZE, align=0.5, upright=True)
+    draw_words(sheet, beside - widest - _ROW / 2, (bottom + top) / 2, y_label, SIZE, align=0.5, upright=True)
 
 
 def draw_bar(
-    figure: "Figure", left: float, top: float, width: float, colors: Floats, shares: Floats, numbers: Sequence[str]
+    sheet: Sheet, left: float, top: float, width: float, colors: Floats, shares: Floats, numbers: Sequence[str]
 ) -> None:
     """Draw a bar of colours, shape (n, 3), from its upper left corner on [inch], with numbers below at `shares`."""
     bottom = top - _BAR
-    axes = blank_axes(figure, left, bottom, width, _BAR)
-    axes.imshow(colors[None], extent=(0, 1, 0, 1), aspect="auto", gid="bar")
+    sheet.add_image(colors[None], left, bottom, width, _BAR, 3, "bar")
     corners = np.array([(left, bottom), (left + width, bottom), (left + width, top), (left, top)])
     edges = [*zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     edges += [((at, bottom), (at, bottom - 2.5 * POINT)) for at in left + width * shares]
-    inches: dict[str, Any] = {"transform": figure.dpi_scale_trans}
-    draw_lines(axes, np.array(edges), EDGE, 0.7, 2.5, "axes", clip_on=False, **inches)
+    draw_lines(sheet, np.array(edges), EDGE, 0.7, 4, "axes")
     for at, number in zip(left + width * shares, numbers, strict=True):
-        draw_words(figure, at, bottom - 8 * POINT, number, 7.5, align=0.5)
+        draw_words(sheet, at, bottom - 8 * POINT, number, 7.5, align=0.5)
 
 
 def _places(limits: tuple[float, float], start: float, end: float) -> tuple[Floats, list[str]]:

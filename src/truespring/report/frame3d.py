@@ -2,30 +2,27 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.report.frame import blank_axes, draw_bar, round_numbers, written
+from truespring.report.frame import draw_bar, round_numbers, written
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, natural_scale, quantity
 from truespring.report.render import Image, Layer, Shot
-from truespring.report.style import LOAD, error_colors
+from truespring.report.sheet import Area, Sheet
+from truespring.report.style import LOAD, POINT, error_colors
 from truespring.report.surfaces import VIEW
 from truespring.report.words import draw_words, text_width
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # Images are this fine [pixels an inch]: finer than the PNG that they become a part of.
 _DPI = 200
 
 _TRIAD = "#3d4248"
 
-#: Draws marks into axes in units of a scale.
-Marks = Callable[["Axes", Scale], None]
+#: Draws marks into an area in units of a scale.
+Marks = Callable[[Area, Scale], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,46 +127,42 @@ def shot(picture: Picture) -> Shot:
     return Shot(picture.layers, at.lower, at.upper, pixels, _DPI / 72)
 
 
-def figure_of(picture: Picture, image: Image) -> "Figure":
-    """Return a picture with its image as a figure."""
-    from matplotlib.figure import Figure
-
+def figure_of(picture: Picture, image: Image) -> Sheet:
+    """Return a picture with its image."""
     at = _layout(picture)
     scale = natural_scale(float(np.abs(picture.upper - picture.lower).max()), "m")
     told = f"{picture.title}; {picture.remark}" if picture.remark else picture.title
-    figure = Figure(figsize=(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top), label=told)
-    head = float(figure.get_figheight())
-    axes = blank_axes(figure, _SIDE, _BOTTOM, at.width, at.height)
+    sheet = Sheet(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top, told)
     (left, bottom), (right, top) = at.lower / scale.size, at.upper / scale.size
-    axes.imshow(image, extent=(left, right, bottom, top), zorder=3, gid="image", aspect="auto")
-    axes.set(xlim=(left, right), ylim=(bottom, top))
-    picture.marks(axes, scale)
-    _draw_triad(axes, at, scale)
-    draw_words(figure, _SIDE, head - 0.17, picture.title, 9, bold=True)
-    draw_words(figure, _SIDE, head - 0.37, picture.remark, color=LOAD)
-    below = 0.30 + ROW * bool(picture.remark)
-    draw_legend(figure, at.columns, _SIDE, head - below)
+    area = Area(sheet, _SIDE, _BOTTOM, at.width, at.height, (left, right), (bottom, top))
+    sheet.add_image(image, _SIDE, _BOTTOM, at.width, at.height, 3, "image")
+    picture.marks(area, scale)
+    _draw_triad(area, at, scale)
+    draw_words(sheet, _SIDE, sheet.height - 0.17, picture.title, 9, bold=True)
+    draw_words(sheet, _SIDE, sheet.height - 0.37, picture.remark, color=LOAD)
+    below = sheet.height - 0.30 - ROW * bool(picture.remark)
+    draw_legend(sheet, at.columns, _SIDE, below)
     if picture.bar:
-        _draw_bar(figure, picture.bar, head - below - ROW * len(at.columns[0]) - 0.08)
-    return figure
+        _draw_bar(sheet, picture.bar, below - ROW * len(at.columns[0]) - 0.08)
+    return sheet
 
 
-def _draw_triad(axes: "Axes", at: _Layout, scale: Scale) -> None:
+def _draw_triad(area: Area, at: _Layout, scale: Scale) -> None:
     """Draw arms along x, y and z, each as long as is written beside them."""
-    x, y = at.origin / scale.size
-    for axis, name in enumerate("xyz"):
-        right, up = at.arm * VIEW[:2, axis] / scale.size
-        style = {"arrowstyle": "-|>,head_width=0.14,head_length=0.28", "color": _TRIAD, "lw": 1.0}
-        axes.annotate("", (x + right, y + up), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
-        beyond = 6 / float(np.hypot(right, up))
-        draw_words(axes, x + right, y + up, name, align=0.5, shift=(beyond * right, beyond * up))
-    lowest = y + float((at.arm * VIEW[1]).min()) / scale.size
-    draw_words(axes, x, lowest, f"each {quantity(at.arm, 'm', 1)}", 7.5, _TRIAD, align=0.5, shift=(0, -11))
+    origin = area.place(at.origin / scale.size)
+    tips = area.place((at.origin + at.arm * VIEW[:2].T) / scale.size)
+    for tip, name in zip(tips, "xyz", strict=True):
+        draw_arrow(area.sheet, origin, tip, _TRIAD, 1.0, 2.5)
+        x, y = tip + 6 * POINT * (tip - origin) / np.linalg.norm(tip - origin)
+        draw_words(area.sheet, x, y, name, align=0.5)
+    lowest = float(min(origin[1], *tips[:, 1]))
+    told = f"each {quantity(at.arm, 'm', 1)}"
+    draw_words(area.sheet, origin[0], lowest - 11 * POINT, told, 7.5, _TRIAD, align=0.5)
 
 
-def _draw_bar(figure: "Figure", bar: Bar, top: float) -> None:
+def _draw_bar(sheet: Sheet, bar: Bar, top: float) -> None:
     """Draw a bar of colours with its label above, whose upper edge is at `top` [inch]."""
-    draw_words(figure, _SIDE, top - 0.07, bar.label)
+    draw_words(sheet, _SIDE, top - 0.07, bar.label)
     largest = bar.largest or 1.0
     values = round_numbers(0.0, largest, 5)
-    draw_bar(figure, _SIDE, top - 0.17, 2.6, error_colors(np.linspace(0, 1, 256)), values / largest, written(values))
+    draw_bar(sheet, _SIDE, top - 0.17, 2.6, error_colors(np.linspace(0, 1, 256)), values / largest, written(values))

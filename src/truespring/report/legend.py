@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from truespring.report.sheet import Sheet
 from truespring.report.words import draw_words, text_width
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 # Widths [inch]: the sample of a line, the gap to its text, the gap to the next column.
 _SAMPLE, _GAP, _COLUMNS_APART = 0.18, 0.06, 0.13
@@ -42,7 +40,7 @@ def _column_width(column: Sequence[Entry]) -> float:
     return _SAMPLE + _GAP + max(text_width(one.text, 8) for one in column) + _COLUMNS_APART
 
 
-def draw_legend(figure: "Figure", columns: Sequence[Sequence[Entry]], left: float, top: float) -> None:
+def draw_legend(sheet: Sheet, columns: Sequence[Sequence[Entry]], left: float, top: float) -> None:
     """Draw a legend whose upper left corner is at (left, top) [inch]."""
     from matplotlib.lines import Line2D
 
@@ -58,9 +56,8 @@ def draw_legend(figure: "Figure", columns: Sequence[Sequence[Entry]], left: floa
                 marker=one.marker,
                 ms=5,
                 markevery=[1],
-                transform=figure.dpi_scale_trans,
             )
-            figure.add_artist(sample)
+            sheet.add(sample)
             at = left + _SAMPLE + _GAP
-            draw_words(figure, at, y, one.text)
+            draw_words(sheet, at, y, one.text)
         left += _column_width(column)

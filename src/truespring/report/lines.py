@@ -1,24 +1,32 @@
-"""Many lines as one path: fast to draw, and one element of an SVG however many they are."""
+"""Lines on a sheet, many as one path: fast to draw, and one element of an SVG however many they are; and arrows."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.report.sheet import Area, Sheet
+from truespring.report.style import POINT
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
-
-def draw_lines(axes: "Axes", ends: Floats, color: str, width: float, zorder: float, name: str, **more: Any) -> None:
-    """Draw lines between `ends`, shape (n, 2, 2), in units of the axes unless `more` has a transform; width [points].
-
-    `name` is how the path is called in the SVG.
-    """
+def draw_lines(on: Sheet | Area, ends: Floats, color: str, width: float, zorder: float, name: str, **more: Any) -> None:
+    """Draw lines between `ends`, shape (n, 2, 2); `width` in points. `name` is how an SVG calls them."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
     codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(ends))
     path = Path(ends.reshape(-1, 2), codes)
-    # Not add_patch, which measures every line to find limits that are already set.
-    axes.add_artist(PathPatch(path, fill=False, edgecolor=color, lw=width, zorder=zorder, gid=name, **more))
+    on.add(PathPatch(path, fill=False, edgecolor=color, lw=width, zorder=zorder, gid=name, **more))
+
+
+def draw_arrow(sheet: Sheet, tail: Floats, tip: Floats, color: str, width: float, head: float) -> None:
+    """Draw an arrow between two places [inch] in a line of a width, with a head of a length [points]."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    along = (tip - tail) / np.linalg.norm(tip - tail) * head * POINT
+    across = 0.56 * np.array([-along[1], along[0]])
+    places = [tail, tip - along, tip, tip - along + across, tip - along - across, tip]
+    codes = [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    style: dict[str, Any] = {"joinstyle": "miter", "zorder": 9, "gid": "arrow"}
+    sheet.add(PathPatch(Path(np.array(places), codes), fc=color, ec=color, lw=width, **style))

@@ -3,22 +3,19 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.report.frame import EDGE, blank_axes, draw_frame
+from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
+from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, POINT, is_strong, label_and_name, path_styles
 from truespring.report.verdict import display_name, drive, material_name
 from truespring.report.words import draw_words, text_width
 from truespring.report.young import Known, young_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +29,7 @@ class _Curve:
     strong: bool
 
 
-def curves_figure(result: Result) -> "Figure":
+def curves_figure(result: Result) -> Sheet:
     """Displacement of the probe against the force, both along the direction that drives the body."""
     to = drive(result)
     styles = path_styles(result)
@@ -58,11 +55,13 @@ def curves_figure(result: Result) -> "Figure":
         f"total force along {to.name} [{x_scale.unit}]",
         f"displacement along {to.name} [{y_scale.unit}]",
         curves,
-    )
+    ).sheet
 
 
-def error_figure(result: Result) -> "Figure":
+def error_figure(result: Result) -> Sheet:
     """Rms error against every reference, level by level, beside the tolerance."""
+    from matplotlib.patches import Rectangle
+
     styles = path_styles(result)
     curves = [
         _Curve(
@@ -79,9 +78,9 @@ def error_figure(result: Result) -> "Figure":
     within = f"within {tolerance_percent(result.tolerance)}"
     curves.append(_Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    figure = _plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
-    figure.axes[0].axhspan(0, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5)
-    return figure
+    area = _plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
+    area.add(Rectangle((0, 0), 1.02, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
+    return area.sheet
 
 
 def _two_lines(result: Result, name: str) -> str:
@@ -92,32 +91,38 @@ def _two_lines(result: Result, name: str) -> str:
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
-def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_right: float | None = None) -> "Figure":
+def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_right: float | None = None) -> Area:
     """Curves with their names at their ends, moved apart where they would meet.
 
     The axes end at 0 or below and, with `to_right`, span 0 to that.
     """
-    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     names = [(curve.label.partition("\n"), curve.strong) for curve in curves]
     longest = max(max(text_width(one, 8, strong), text_width(two, 7)) for (one, _, two), strong in names)
     left, bottom, top = 0.62, 0.5, 0.38
     right = _LEADER + _SAMPLE + _GAP + longest + _FREE
     height = max(3.0, 0.34 * len(curves))
-    figure = Figure(figsize=(max(5.9, left + 3.2 + right), bottom + height + top), label=title)
-    total = figure.get_size_inches()
-    width = float(total[0]) - left - right
-    axes = blank_axes(figure, left, bottom, width, height)
-    draw_words(figure, left, float(total[1]) - 0.19, title, 9, bold=True)
+    sheet = Sheet(max(5.9, left + 3.2 + right), bottom + height + top, title)
+    low, high = _span([curve.y for curve in curves])
+    x = _span([curve.x for curve in curves]) if to_right is None else (0.0, to_right)
+    y = (min(low, 0.0) if to_right is None else 0.0, high)
+    area = Area(sheet, left, bottom, sheet.width - left - right, height, x, y)
+    draw_frame(area, x_label, y_label)
+    draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)
     for curve in curves:
-        axes.plot(curve.x, curve.y, label=curve.label.replace("\n", ", "), **_look(curve))
-    if to_right is not None:
-        axes.set_xlim(0, to_right)
-    low, high = axes.get_ylim()
-    axes.set_ylim(0.0 if to_right is not None else min(low, 0.0), high)
-    draw_frame(figure, axes, x_label, y_label)
-    _name_ends(figure, axes, curves)
-    return figure
+        area.add(Line2D(curve.x, curve.y, label=curve.label.replace("\n", ", "), **_look(curve)))
+    _name_ends(area, curves)
+    return area
+
+
+def _span(several: Sequence[Floats]) -> tuple[float, float]:
+    """From the smallest to the largest of all numbers, and a twentieth beyond them."""
+    values = np.concatenate(several)
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+    room = 0.05 * (high - low) or 0.05 * abs(high) or 0.05
+    return low - room, high + room
 
 
 def _look(curve: _Curve) -> dict[str, Any]:
@@ -133,35 +138,29 @@ def _look(curve: _Curve) -> dict[str, Any]:
     }
 
 
-def _name_ends(figure: "Figure", axes: "Axes", curves: Sequence[_Curve]) -> None:
-    """Write each curve's name right of the axes, by height of their ends, with a sample of its line.
+def _name_ends(area: Area, curves: Sequence[_Curve]) -> None:
+    """Write each curve's name right of the area, by height of their ends, with a sample of its line.
 
     A leader joins the two where the curve ends near the right edge.
     """
     from matplotlib.lines import Line2D
-    from matplotlib.transforms import Affine2D
 
-    corner, opposite = axes.get_position().get_points() * figure.get_size_inches()
-    size = opposite - corner
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    ends = np.array([((one.x[-1] - left) / (right - left), (one.y[-1] - bottom) / (top - bottom)) for one in curves])
-    ends = ends.clip(0, 1) * size
+    corner, size = np.array([area.left, area.bottom]), np.array([area.width, area.height])
+    ends = (area.place(np.array([(curve.x[-1], curve.y[-1]) for curve in curves])) - corner).clip(0, size)
     gap = (27 if any("\n" in curve.label for curve in curves) else 17) * POINT
     places = size[1] * _apart(ends[:, 1] / size[1], gap / size[1], ends[:, 0])
     led = np.flatnonzero(ends[:, 0] > 0.9 * size[0])
     places[led] = _uncrossed(ends[led], size[0] + _LEADER, places[led])
-    inches: dict[str, Any] = {"transform": Affine2D().translate(*corner) + figure.dpi_scale_trans, "clip_on": False}
-    for index, (curve, (x, y), place) in enumerate(zip(curves, ends, places, strict=True)):
-        first, _, second = curve.label.partition("\n")
-        at = size[0] + _LEADER
+    at = area.left + area.width + _LEADER
+    for index, (curve, (x, y), place) in enumerate(zip(curves, ends + corner, places + area.bottom, strict=True)):
         if index in led:
-            figure.add_artist(Line2D([x, at], [y, place], color=FAINT, lw=0.7, zorder=2, **inches))
+            area.sheet.add(Line2D([x, at], [y, place], color=FAINT, lw=0.7, zorder=2))
         sample = [at, at + _SAMPLE / 2, at + _SAMPLE]
-        figure.add_artist(Line2D(sample, [place] * 3, markevery=[1], **_look(curve), **inches))
-        x, y = corner[0] + at + _SAMPLE + _GAP, corner[1] + place
-        up = 5 if second else 0
-        draw_words(figure, x, y, first, color=curve.color, bold=curve.strong, shift=(0, up))
-        draw_words(figure, x, y, second, 7, EDGE, shift=(0, -up))
+        area.sheet.add(Line2D(sample, [place] * 3, markevery=[1], **_look(curve)))
+        first, _, second = curve.label.partition("\n")
+        beside, up = sample[-1] + _GAP, 5 * POINT if second else 0.0
+        draw_words(area.sheet, beside, place + up, first, color=curve.color, bold=curve.strong)
+        draw_words(area.sheet, beside, place - up, second, 7, EDGE)
 
 
 def _uncrossed(ends: Floats, to_right: float, places: Floats) -> Floats:
@@ -208,7 +207,7 @@ def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
     return moved
 
 
-def moduli_figure(result: Result) -> "Figure":
+def moduli_figure(result: Result) -> Sheet:
     """Young's modulus in a test along every direction: what the springs of a study realise beside the material's."""
     styles = path_styles(result)
     several = [

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truespring.arrays import Floats, Ints
+from truespring.report.sheet import polygons
 
 #: An image: red, green, blue and opacity in 0 ... 255, shape (height, width, 4), the upper row first.
 Image = NDArray[np.uint8]
@@ -199,10 +200,6 @@ def draw(shot: Shot) -> Image:
 
 
 def _draw_layer(layer: Layer, shot: Shot) -> Image:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import PolyCollection
-    from matplotlib.figure import Figure
-
     filled = layer.colors is not None
     n_faces, k = layer.faces.shape[:2]
     depth = layer.faces[:, :, 2].mean(axis=1)
@@ -215,25 +212,11 @@ def _draw_layer(layer: Layer, shot: Shot) -> Image:
         fill, line = layer.colors.mean(axis=1), rgb(layer.ink)
     else:
         fill, line = np.zeros((n_faces, 3)), np.ones(3)
-    edge = np.concatenate([fill, np.broadcast_to(line, (len(strokes), 3))])
-    inside = np.concatenate([np.column_stack([fill, np.ones(n_faces)]), np.zeros((len(strokes), 4))])
+    fills = np.concatenate([np.column_stack([fill, np.ones(n_faces)]), np.zeros((len(strokes), 4))])
+    edges = np.concatenate([fill, np.broadcast_to(line, (len(strokes), 3))])
+    edges = np.column_stack([edges, np.ones(len(edges))])
     widths = np.concatenate([np.full(n_faces, 0.4), np.full(len(strokes), layer.width)])
-    dpi = 72 * shot.points
-    figure = Figure(figsize=(shot.size[0] / dpi, shot.size[1] / dpi), dpi=dpi)
-    figure.patch.set(facecolor="black", alpha=0.0 if filled else 1.0)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set_axis_off()
-    axes.set(xlim=(shot.lower[0], shot.upper[0]), ylim=(shot.lower[1], shot.upper[1]))
-    polygons = PolyCollection(
-        corners[order],  # type: ignore[arg-type]
-        facecolors=inside[order],
-        edgecolors=edge[order],
-        linewidths=widths[order],
-        joinstyle="round",
-        capstyle="round",
-    )
-    axes.add_collection(polygons, autolim=False)
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    image = np.array(canvas.buffer_rgba())
+    corners = (corners - shot.lower) / (shot.upper - shot.lower) * shot.size
+    drawn = (corners[order], fills[order], edges[order], widths[order])
+    image = polygons(shot.size, 72 * shot.points, None if filled else "black", *drawn)
     return image if filled else inked(image[..., 0], layer.ink)

@@ -1,18 +1,14 @@
 """Supports of a body in 3D: clamped faces hatched at their rim, other nodes on pins and rollers."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import Scale
 from truespring.report.result import Result
+from truespring.report.sheet import Area
 from truespring.report.surfaces import VIEW, facets_of, normals, seen
 from truespring.report.symbols import draw_pin
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _SUPPORT = "#3d4248"
 
@@ -23,14 +19,14 @@ def clamped_nodes(result: Result) -> Bools:
     return np.asarray((loading.held & (loading.displacement == 0)).all(axis=1))
 
 
-def draw_supports(axes: "Axes", result: Result, scale: Scale, size: float) -> None:
+def draw_supports(area: Area, result: Result, scale: Scale, size: float) -> None:
     """Hatch the rim of clamped faces; nodes that are held besides stand on pins or rollers. `size` of a stroke [m]."""
     mesh, loading = result.problem.mesh, result.problem.loading
     points, facets = seen(mesh.nodes), facets_of(mesh)
     facing = normals(points, facets)
     clamped = clamped_nodes(result)
     patch = np.flatnonzero(clamped[facets].all(axis=1))
-    _hatch(axes, points, facets[patch], facing[patch], scale, size)
+    _hatch(area, points, facets[patch], facing[patch], scale, size)
     hatched = np.zeros(mesh.n_nodes, dtype=bool)
     hatched[facets[patch]] = True
     visible = np.zeros(mesh.n_nodes, dtype=bool)
@@ -39,13 +35,13 @@ def draw_supports(axes: "Axes", result: Result, scale: Scale, size: float) -> No
     pinned = still.all(axis=1)
     for node in _thinned(mesh.nodes, np.flatnonzero(pinned), 3.2 * size):
         at = points[node, :2] / scale.size
-        draw_pin(axes, at, np.array([0.0, -1.0]), roller=False, zorder=6 if visible[node] else 1.5)
+        draw_pin(area, at, np.array([0.0, -1.0]), roller=False, zorder=6 if visible[node] else 1.5)
     centre = (mesh.lower + mesh.upper) / 2
     for axis in range(3):
         for node in _thinned(mesh.nodes, np.flatnonzero(still[:, axis] & ~pinned), 3.2 * size):
             away = VIEW[:2, axis] * (1.0 if mesh.nodes[node, axis] > centre[axis] else -1.0)
             away = away / np.linalg.norm(away)
-            draw_pin(axes, points[node, :2] / scale.size, away, zorder=6 if visible[node] else 1.5)
+            draw_pin(area, points[node, :2] / scale.size, away, zorder=6 if visible[node] else 1.5)
 
 
 def _thinned(places: Floats, nodes: Ints, spacing: float) -> Ints:
@@ -54,7 +50,7 @@ def _thinned(places: Floats, nodes: Ints, spacing: float) -> Ints:
     return np.asarray(nodes[np.unique(cubes, axis=0, return_index=True)[1]])
 
 
-def _hatch(axes: "Axes", points: Floats, facets: Ints, facing: Floats, scale: Scale, size: float) -> None:
+def _hatch(area: Area, points: Floats, facets: Ints, facing: Floats, scale: Scale, size: float) -> None:
     """Short strokes out of the rim of a patch of facets, those that face away behind the body."""
     if not len(facets):
         return
@@ -74,6 +70,6 @@ def _hatch(axes: "Axes", points: Floats, facets: Ints, facing: Floats, scale: Sc
             strokes.append(np.stack([foot, foot + slant], axis=1))
         if strokes:
             strokes_on_paper = np.concatenate(strokes)[:, :, :2] / scale.size
-            draw_lines(axes, strokes_on_paper, _SUPPORT, 0.9, zorder, "support", clip_on=False)
+            draw_lines(area, strokes_on_paper, _SUPPORT, 0.9, zorder, "support", clip_on=False)
             sides = points[edges[rim[(facing[owner, 2] > 0) == front]]][:, :, :2]
-            draw_lines(axes, sides / scale.size, _SUPPORT, 2.2, zorder, "clamped", clip_on=False)
+            draw_lines(area, sides / scale.size, _SUPPORT, 2.2, zorder, "clamped", clip_on=False)

@@ -2,19 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.mesh import select
+from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, given
 from truespring.report.result import Result
+from truespring.report.sheet import Area
 from truespring.report.style import LOAD, MOTION, POINT, RED
 from truespring.report.words import draw_words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: From places of a body [m], shape (n, dim), to places on paper [m], shape (n, 2).
 View = Callable[[Floats], Floats]
@@ -25,9 +24,15 @@ def as_it_is(points: Floats) -> Floats:
     return points
 
 
-def draw_dot(axes: "Axes", point: Floats) -> None:
+def draw_dot(area: Area, point: Floats) -> None:
     """Draw the red dot of the probe."""
-    axes.plot(*point, "o", color=RED, ms=5.5, mec="white", mew=0.6, zorder=10, gid="probe", clip_on=False)
+    _draw_marks(area, point, "probe", marker="o", color=RED, ms=5.5, mec="white", mew=0.6, zorder=10, clip_on=False)
+
+
+def _draw_marks(area: Area, points: Floats, name: str, **style: Any) -> None:
+    from matplotlib.lines import Line2D
+
+    area.add(Line2D(*np.atleast_2d(points).T, ls="", gid=name, **style))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,20 +85,20 @@ def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arro
     return found
 
 
-def draw_arrow(axes: "Axes", arrow: Arrow, scale: Scale) -> None:
+def draw_drive(area: Area, arrow: Arrow, scale: Scale) -> None:
     """Draw an arrow with its text."""
-    (x, y), (to_x, to_y) = (end / scale.size for end in arrow.ends)
-    style = {"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": arrow.color, "lw": 1.8}
-    axes.annotate("", (to_x, to_y), (x, y), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=9)
+    tail, tip = area.place(np.stack(arrow.ends) / scale.size)
+    (x, y), (to_x, to_y) = tail, tip
+    draw_arrow(area.sheet, tail, tip, arrow.color, 1.8, 4.2)
     upright = abs(to_y - y) > abs(to_x - x)
-    end, align = (min(x, to_x), 0.0) if arrow.side > 0 else (max(x, to_x), 1.0)
-    shift = (7 * arrow.side, 0 if upright else 11)
-    draw_words(axes, end, (y + to_y) / 2, arrow.text, 8.5, arrow.color, align=align, shift=shift, halo=True)
+    beside, align = (min(x, to_x), 0.0) if arrow.side > 0 else (max(x, to_x), 1.0)
+    beside, above = beside + 7 * POINT * arrow.side, (y + to_y) / 2 + (0 if upright else 11 * POINT)
+    draw_words(area.sheet, beside, above, arrow.text, 8.5, arrow.color, align=align, halo=True)
 
 
-def draw_loaded(axes: "Axes", points: Floats, color: str) -> None:
-    """Draw dots where a load or a motion acts, in units of the axes."""
-    axes.plot(*points.T, "o", color=color, ms=3, zorder=8, ls="", gid="loaded")
+def draw_loaded(area: Area, points: Floats, color: str) -> None:
+    """Draw dots where a load or a motion acts, in units of the area."""
+    _draw_marks(area, points, "loaded", marker="o", color=color, ms=3, zorder=8)
 
 
 # A unit of a pin is half of 11 points; the line under a roller is its widest part.
@@ -103,7 +108,7 @@ ROLLER = 1.4 * _SYMBOL / 2 * POINT
 
 
 def draw_pin(
-    axes: "Axes",
+    area: Area,
     point: Floats,
     away: Floats,
     beside: Floats | None = None,
@@ -127,6 +132,4 @@ def draw_pin(
         codes = [Outline.MOVETO, Outline.LINETO, *codes[1:]]
     symbol = Outline(np.array(corners), codes)
     size = _SYMBOL * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
-    axes.plot(
-        *point, marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=zorder, ls="", gid="support"
-    )
+    _draw_marks(area, point, "support", marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=zorder)

@@ -1,15 +1,14 @@
 """Words in figures as outlines, laid out once for all figures and files; matplotlib's own take most of the time."""
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truespring.report.sheet import Sheet
 from truespring.report.style import INK, POINT
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
 
@@ -18,7 +17,7 @@ _CAPITAL = 0.729
 
 
 def draw_words(
-    on: "Figure | Axes",
+    sheet: Sheet,
     x: float,
     y: float,
     text: str,
@@ -27,30 +26,27 @@ def draw_words(
     *,
     bold: bool = False,
     align: float = 0.0,
-    shift: tuple[float, float] = (0.0, 0.0),
     upright: bool = False,
     halo: bool = False,
 ) -> None:
     """Draw words whose capital letters have their middle at height y, and the share `align` of their width left of x.
 
-    A figure takes x and y in inches, axes in their own units; `size` and a `shift` from there are in points.
-    `upright` words run upwards; a `halo` keeps them legible on lines. The artist's label is the text.
+    Places are in inches, the `size` in points. `upright` words run upwards; a `halo` keeps them legible on
+    lines. The artist's label is the text.
     """
-    from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
-    from matplotlib.transforms import Affine2D, ScaledTranslation
+    from matplotlib.transforms import Affine2D
 
     if not text.strip():
         return
-    units: Any = on.dpi_scale_trans if isinstance(on, Figure) else on.transData
     outline = _outline(text, bold)
-    shape = Affine2D().translate(-align * np.max(outline.vertices, axis=0)[0], -_CAPITAL / 2).scale(size)
+    shape = Affine2D().translate(-align * np.max(outline.vertices, axis=0)[0], -_CAPITAL / 2).scale(size * POINT)
     turned = shape.rotate_deg(90) if upright else shape
-    whole = turned.translate(*shift).scale(POINT) + on.figure.dpi_scale_trans + ScaledTranslation(x, y, units)
-    style: dict[str, Any] = {"zorder": 11, "clip_on": False, "transform": whole}
+    place = turned.translate(x, y)
     if halo:
-        on.add_artist(PathPatch(outline, fc="white", ec="white", lw=3, joinstyle="round", alpha=0.8, **style))
-    on.add_artist(PathPatch(outline, fc=color, lw=0, label=text, **style))
+        under = PathPatch(outline, fc="white", ec="white", lw=3, joinstyle="round", alpha=0.8, zorder=11)
+        sheet.add(under, place)
+    sheet.add(PathPatch(outline, fc=color, lw=0, label=text, zorder=11), place)
 
 
 @cache

@@ -11,23 +11,21 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats
 from truespring.models import Moduli
-from truespring.report.frame import GRID, SIZE, blank_axes, draw_bar, round_numbers, written
+from truespring.report.frame import GRID, SIZE, draw_bar, round_numbers, written
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import natural_scale, quantity
-from truespring.report.style import BLUE, INK, LOAD, SPRING_STYLES, figure_style
+from truespring.report.sheet import DPI, Area, Sheet, polygons
+from truespring.report.style import BLUE, INK, LOAD, POINT, SPRING_STYLES, figure_style
 from truespring.report.surfaces import VIEW, seen
 from truespring.report.words import draw_words
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.colors import Colormap, Normalize
-    from matplotlib.figure import Figure
 
 _TITLE = "Young's modulus by direction"
 _DASHES = (0, (5, 2))
 _MOST_COLUMNS = 3
-_DPI = 130
 
 # A panel of the figure in space, what stands above and below all of them [inch].
 _PANEL, _CAPTION, _TOP, _FOOT = 2.5, 0.42, 0.36, 0.62
@@ -48,27 +46,24 @@ class Known:
 
 def save_young(several: Mapping[str, Moduli], material: str, folder: FilePath) -> FilePath:
     """Write the figure of springs by their labels as moduli.png and moduli.svg into `folder`; return the first."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     looks = itertools.cycle(SPRING_STYLES)
     known = [Known(label, moduli, *look[:2]) for (label, moduli), look in zip(several.items(), looks, strict=False)]
     folder.mkdir(parents=True, exist_ok=True)
     with figure_style():
-        figure = young_figure(known, material)
-        FigureCanvasAgg(figure)
-        figure.savefig(folder / "moduli.png", dpi=_DPI)
-        figure.savefig(folder / "moduli.svg", metadata={"Date": None})
+        sheet = young_figure(known, material)
+        (folder / "moduli.png").write_bytes(sheet.png())
+        (folder / "moduli.svg").write_bytes(sheet.svg())
     return folder / "moduli.png"
 
 
-def young_figure(several: Sequence[Known], material: str) -> "Figure":
+def young_figure(several: Sequence[Known], material: str) -> Sheet:
     """Young's modulus in a test along every direction, of springs beside the `material`, as its moduli are called."""
     return (_surfaces if several[0].moduli.dim == 3 else _polar)(several, material)
 
 
-def _polar(several: Sequence[Known], material: str) -> "Figure":
+def _polar(several: Sequence[Known], material: str) -> Sheet:
     """The springs' curves against the material's circle."""
-    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     wanted = several[0].moduli.young_wanted
     angles = np.radians(np.arange(0.0, 361.0))
@@ -81,48 +76,48 @@ def _polar(several: Sequence[Known], material: str) -> "Figure":
         legend.append(Entry(f"{known.label}: {' to '.join(extremes)}", known.color, linestyle=known.dashes))
     columns, words = legend_columns(legend, 0.0)
     width, height = 3.9, 4.25 + ROW * len(several)
-    figure = Figure(figsize=(width, height), label=_TITLE)
-    axes = blank_axes(figure, 0.12 * width, 0.65 + ROW * len(several), 0.76 * width, 0.76 * width)
-    _draw_compass(axes, largest / scale.size)
-    axes.plot(*(wanted / scale.size * directions.T), color=INK, lw=1.3, ls=_DASHES)
+    sheet = Sheet(width, height, _TITLE)
+    end = 1.12 * largest / scale.size
+    place = (0.12 * width, 0.65 + ROW * len(several), 0.76 * width, 0.76 * width)
+    area = Area(sheet, *place, (-end, end), (-end, end))
+    _draw_compass(area)
+    area.add(Line2D(*(wanted / scale.size * directions.T), color=INK, lw=1.3, ls=_DASHES))
     for known in several:
         values = known.moduli.young_along(directions)[:, None] / scale.size
-        axes.plot(*(values * directions).T, color=known.color, lw=2, ls=known.dashes)
-    draw_words(figure, width / 2, height - 0.19, f"{_TITLE} [{scale.unit}]", 9, bold=True, align=0.5)
-    draw_legend(figure, columns, (width - words) / 2, 0.1 + ROW * len(legend))
-    return figure
+        area.add(Line2D(*(values * directions).T, color=known.color, lw=2, ls=known.dashes))
+    draw_words(sheet, width / 2, height - 0.19, f"{_TITLE} [{scale.unit}]", 9, bold=True, align=0.5)
+    draw_legend(sheet, columns, (width - words) / 2, 0.1 + ROW * len(legend))
+    return sheet
 
 
-def _draw_compass(axes: "Axes", largest: float) -> None:
-    """Draw rings at round numbers up to about `largest`, and rays at every 45 degrees."""
+def _draw_compass(area: Area) -> None:
+    """Draw rings about the middle of an area, at round numbers, and rays at every 45 degrees."""
     from matplotlib.patches import Circle
 
-    end = 1.12 * largest
-    axes.set(xlim=(-end, end), ylim=(-end, end))
-    numbers = round_numbers(0.0, 1.1 * largest, 5)[1:]
+    end = area.x[1]
+    numbers = round_numbers(0.0, end, 5)[1:]
     for number, told in zip(numbers, written(numbers), strict=True):
-        axes.add_artist(Circle((0, 0), number, fill=False, ec=GRID, lw=0.6, zorder=0.5))
-        draw_words(axes, number * np.cos(np.pi / 8), number * np.sin(np.pi / 8), told, SIZE, shift=(0, 3))
+        area.add(Circle((0, 0), number, fill=False, ec=GRID, lw=0.6, zorder=0.5))
+        x, y = area.place(number * np.array([np.cos(np.pi / 8), np.sin(np.pi / 8)]))
+        draw_words(area.sheet, x, y + 3 * POINT, told, SIZE)
     angles = np.arange(0, 360, 45)
     rays = end * np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
-    draw_lines(axes, np.stack([0 * rays, rays], axis=1), GRID, 0.6, 0.5, "rays")
-    for angle, (x, y) in zip(angles, 1.12 * rays, strict=True):
-        draw_words(axes, x, y, f"{angle}°", SIZE, align=0.5)
+    draw_lines(area, np.stack([0 * rays, rays], axis=1), GRID, 0.6, 0.5, "rays")
+    for angle, (x, y) in zip(angles, area.place(1.12 * rays), strict=True):
+        draw_words(area.sheet, x, y, f"{angle}°", SIZE, align=0.5)
 
 
 # --- in space ---------------------------------------------------------------------------------------
 
 
-def _surfaces(several: Sequence[Known], material: str) -> "Figure":
+def _surfaces(several: Sequence[Known], material: str) -> Sheet:
     """A surface for each springs model, its radius and colour E over the material's, which is the sphere of wires."""
-    from matplotlib.figure import Figure
-
     columns = min(len(several), _MOST_COLUMNS)
     rows = math.ceil(len(several) / columns)
     width = max(columns * _PANEL, 3.6)
     height = _TOP + rows * (_PANEL + _CAPTION) + _FOOT
-    figure = Figure(figsize=(width, height), label=_TITLE, dpi=200)
-    draw_words(figure, width / 2, height - 0.19, _TITLE, 9, bold=True, align=0.5)
+    sheet = Sheet(width, height, _TITLE)
+    draw_words(sheet, width / 2, height - 0.19, _TITLE, 9, bold=True, align=0.5)
     shares = np.array([known.moduli.young_range for known in several]) / several[0].moduli.young_wanted
     facets = [_facets(known.moduli) for known in several]
     extent = max(1.0, *(float(np.abs(corners[..., :2]).max()) for corners, _ in facets))
@@ -132,23 +127,22 @@ def _surfaces(several: Sequence[Known], material: str) -> "Figure":
     for place, known in enumerate(several):
         row, column = divmod(place, columns)
         bottom = height - _TOP - (row + 1) * (_PANEL + _CAPTION)
-        corner = (left + column * _PANEL, bottom + _CAPTION)
-        axes = blank_axes(figure, *corner, _PANEL, _PANEL)
-        axes.set(xlim=(-1.3 * extent, 1.3 * extent), ylim=(-1.3 * extent, 1.3 * extent))
-        _draw_surface(axes, *facets[place], lambda share: colors(norm(share)))
-        _draw_sphere(axes, known.moduli)
-        _draw_axes(axes, known.moduli, extent)
-        middle = corner[0] + _PANEL / 2
+        limits = (-1.3 * extent, 1.3 * extent)
+        area = Area(sheet, left + column * _PANEL, bottom + _CAPTION, _PANEL, _PANEL, limits, limits)
+        _draw_surface(area, *facets[place], lambda share: colors(norm(share)))
+        _draw_sphere(area, known.moduli)
+        _draw_axes(area, known.moduli, extent)
+        middle = area.left + _PANEL / 2
         extremes = " to ".join(dict.fromkeys(f"{value:.2f}" for value in shares[place]))
-        draw_words(figure, middle, bottom + 0.3, known.label, bold=True, align=0.5)
-        draw_words(figure, middle, bottom + 0.13, extremes, align=0.5)
+        draw_words(sheet, middle, bottom + 0.3, known.label, bold=True, align=0.5)
+        draw_words(sheet, middle, bottom + 0.13, extremes, align=0.5)
     marks = np.array(_marks(farthest))
     shown = colors(np.linspace(0, 1, 256))[:, :3]
-    draw_bar(figure, width / 2 - 1.2, 0.49, 2.4, shown, np.asarray(norm(marks)), [f"{mark:g}" for mark in marks])
+    draw_bar(sheet, width / 2 - 1.2, 0.49, 2.4, shown, np.asarray(norm(marks)), [f"{mark:g}" for mark in marks])
     wanted = quantity(several[0].moduli.young_wanted, "Pa")
     under = f"times that of the {material}, {wanted} (the sphere)"
-    draw_words(figure, width / 2, 0.11, under, 7.5, align=0.5)
-    return figure
+    draw_words(sheet, width / 2, 0.11, under, 7.5, align=0.5)
+    return sheet
 
 
 def _colors(farthest: float) -> "tuple[Colormap, Normalize]":
@@ -166,35 +160,32 @@ def _marks(farthest: float) -> list[float]:
     return [*below[-2:][::-1], 1.0, *above[-2:]]
 
 
-def _draw_surface(axes: "Axes", corners: Floats, share: Floats, color: Callable[[Floats], Any]) -> None:
-    """Facets that face the eye, the ones behind first."""
-    from matplotlib.collections import PolyCollection
-
+def _draw_surface(area: Area, corners: Floats, share: Floats, color: Callable[[Floats], Any]) -> None:
+    """Facets that face the eye, the ones behind first, as an image: in an SVG they would be thousands of elements."""
     across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     towards = np.flatnonzero(across[:, 2] > 0)
     order = towards[np.argsort(corners[towards, :, 2].mean(axis=1))]
     light = across[order] @ (_LIGHT / np.linalg.norm(_LIGHT)) / np.linalg.norm(across[order], axis=1)
     shade = _DIMMEST + (1 - _DIMMEST) * np.clip(light, 0, 1)
     shown = np.asarray(color(share[order]))[:, :3] * shade[:, None]
-    surface = PolyCollection(
-        corners[order, :, :2],  # type: ignore[arg-type]
-        facecolors=shown,
-        edgecolors=shown,
-        lw=0.4,
-    )
-    surface.set_rasterized(True)
-    axes.add_collection(surface)
+    shown = np.column_stack([shown, np.ones(len(shown))])
+    places = (area.place(corners[order, :, :2]) - (area.left, area.bottom)) * 2 * DPI
+    size = round(area.width * 2 * DPI), round(area.height * 2 * DPI)
+    image = polygons(size, 2 * DPI, None, places, shown, shown, np.full(len(shown), 0.4))
+    area.sheet.add_image(image, area.left, area.bottom, area.width, area.height, 1, "surface")
 
 
-def _draw_axes(axes: "Axes", moduli: Moduli, extent: float) -> None:
+def _draw_axes(area: Area, moduli: Moduli, extent: float) -> None:
+    from matplotlib.lines import Line2D
+
     for axis, name in zip(np.eye(3), "xyz", strict=True):
         start = max(1.0, float(_share(moduli, axis[None])[0]))
         end = max(1.06 * start, 1.12 * extent)
         line = np.linspace(start, end, 40)[:, None] * axis
         for piece in _visible_pieces(line, moduli):
-            axes.plot(piece[:, 0], piece[:, 1], color=INK, lw=0.9)
-        right, up, _ = seen((end + 0.1 * extent) * axis)
-        draw_words(axes, right, up, name, align=0.5)
+            area.add(Line2D(*piece.T, color=INK, lw=0.9))
+        x, y = area.place(seen((end + 0.1 * extent) * axis)[:2])
+        draw_words(area.sheet, x, y, name, align=0.5)
 
 
 def _share(moduli: Moduli, directions: Floats) -> Floats:
@@ -218,16 +209,17 @@ def _on_sphere(polar: Floats, around: Floats) -> Floats:
     return np.stack([np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=-1)
 
 
-def _draw_sphere(axes: "Axes", moduli: Moduli) -> None:
+def _draw_sphere(area: Area, moduli: Moduli) -> None:
     """Outline, meridians and parallels of the material's sphere, where neither it nor the surface hides them."""
-    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
 
     turn, every = np.linspace(0, 2 * np.pi, 241), np.radians(np.arange(0, 180, 30))
     lines = [np.cos(turn)[:, None] * VIEW[0] + np.sin(turn)[:, None] * VIEW[1]]
     lines += [_on_sphere(turn, angle) for angle in every]
     lines += [_on_sphere(angle, turn) for angle in every[1:]]
-    pieces = [piece for line in lines for piece in _visible_pieces(line, moduli)]
-    axes.add_collection(LineCollection(pieces, colors=INK, lw=0.5, alpha=0.55))
+    pieces = Path.make_compound_path(*(Path(piece) for line in lines for piece in _visible_pieces(line, moduli)))
+    area.add(PathPatch(pieces, fill=False, ec=INK, lw=0.5, alpha=0.55, zorder=2))
 
 
 def _visible_pieces(line: Floats, moduli: Moduli) -> list[Floats]:

@@ -14,7 +14,7 @@ from truespring.solvers.direct import FACTORISERS, Direct, direct_bytes, present
 from truespring.solvers.iterative import Multigrid
 
 # Up to so many free directions, in the plane and in space, a factorisation is as quick as multigrid, and exact.
-_DIRECT = MappingProxyType({2: 30_000, 3: 6_000})
+_DIRECT = MappingProxyType({2: 8_000, 3: 3_000})
 
 
 class Tangent(Protocol):
