@@ -9,7 +9,7 @@ from benchmarks.runs import PROGRAMS, Measured
 # Springs in the colours of truespring, finite elements of its own in greys, peers in others; the dash tells the law.
 _STYLES = {
     "lloyd": ("#1f5fa8", "-"),
-    "isotropic": ("#1f5fa8", "-"),
+    "isotropic": ("#0b3c75", "-"),
     "biquadratic": ("#6ba3dc", "-"),
     "fem-svk": ("#444444", "-"),
     "fem-nh": ("#999999", "-"),
@@ -27,21 +27,21 @@ def draw(runs: Iterable[Measured], file: Path) -> None:
     from matplotlib.figure import Figure
 
     bent = [run for run in runs if run.load == "bending" and run.seconds and run.depth in SIZES[run.dim]]
-    figure = Figure(figsize=(10.5, 4.8), layout="constrained")
+    figure = Figure(figsize=(12, 4.8), layout="constrained")
+    labelled = {}
     for ax, dim in zip(figure.subplots(1, 2, sharey=True), (2, 3), strict=True):
         for name, program in PROGRAMS.items():
-            points = [(run.n_nodes, run.median) for run in bent if (run.program, run.dim) == (name, dim)]
-            if points:
+            points = sorted((run.n_nodes, run.median) for run in bent if (run.program, run.dim) == (name, dim))
+            if points and dim in program.dims:
                 color, dash = _STYLES[name]
                 width = 2.4 if name == SPRINGS[dim] else 1.4
-                ax.loglog(
-                    *zip(*points, strict=True), dash, marker="o", ms=4, color=color, lw=width, label=program.label
-                )
+                (line,) = ax.loglog(*zip(*points, strict=True), dash, marker="o", ms=4, color=color, lw=width)
+                labelled[program.label] = line
         ax.set(xlabel="nodes", title=f"{dim}D")
         ax.grid(which="major", color="#e5e5e5", lw=0.8)
         ax.set_axisbelow(True)
         ax.spines[["top", "right"]].set_visible(False)
-        ax.legend(frameon=False, fontsize=8, loc="upper left")
+    figure.legend(labelled.values(), labelled.keys(), loc="outside right center", frameon=False, fontsize=9)
     figure.axes[0].set_ylabel("seconds from the mesh to equilibrium")
     figure.suptitle("Bent by a force that moves the end of the springs by half the length", fontsize=11)
     with matplotlib.rc_context({"svg.hashsalt": "performance", "svg.fonttype": "path"}):

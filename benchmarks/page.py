@@ -1,6 +1,7 @@
 """The page docs/performance.md from results.json: python -m benchmarks.page rebuilds it without measuring."""
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -55,11 +56,11 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
     yield from _recorded(recorded)
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
-    """Yield the lines of a table, its first column to the left."""
+def table(head: Iterable[str], rows: Iterable[Iterable[str]], words: tuple[int, ...] = (0,)) -> Iterator[str]:
+    """Yield the lines of a table; the columns `words` stand to the left, numbers to the right."""
     head = list(head)
     yield f"| {' | '.join(head)} |"
-    yield f"|---|{'---:|' * (len(head) - 1)}"
+    yield f"|{'|'.join('---' if column in words else '---:' for column in range(len(head)))}|"
     for row in rows:
         yield f"| {' | '.join(row)} |"
     yield ""
@@ -101,11 +102,13 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
     for name, program in PROGRAMS.items():
         version = next((run.version for run in runs if run.program == name and run.version), "not run")
         rows.append((program.label, version, program.law, _SOLVERS[program.module]))
-    yield from table(("program", "version", "what matter is", "how it is solved"), rows)
+    yield from table(("program", "version", "what matter is", "how it is solved"), rows, words=(0, 1, 2, 3))
 
 
 def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterator[str]:
     depths = _sizes(runs, dim, load)
+    if not depths:
+        return
     at = {(run.program, run.depth): run for run in runs if (run.dim, run.load) == (dim, load)}
     nodes = [n_nodes(dim, depth) for depth in depths]
     yield f"### {dim}D, {load}: seconds\n"
@@ -174,7 +177,9 @@ def _at_reference(runs: list[Measured], program: str, dim: int, load: str) -> Me
 def _details(runs: list[Measured]) -> Iterator[str]:
     yield "## Springs by size\n"
     for dim, load in LOADS:
-        springs = [run for run in aims.of_springs(runs, dim, load) if run.depth in _sizes(runs, dim, load)]
+        springs = [run for run in aims.of_springs(runs, dim, load) if run.depth in SIZES[dim]]
+        if not springs:
+            continue
         power = aims.growth(springs)
         grown = f": time ~ n^{power:.2f} from {aims.LARGE:,} nodes on" if power is not None else ""
         yield f"{dim}D, {load}{grown}\n"
@@ -192,6 +197,7 @@ def _details(runs: list[Measured]) -> Iterator[str]:
                 )
                 for run in springs
             ),
+            words=(0, 6),
         )
 
 
@@ -248,13 +254,15 @@ def _accuracy(runs: list[Measured]) -> Iterator[str]:
     )
     for dim in (2, 3):
         truth = errors.limit(errors.solved(runs, errors.TRUTH, dim))
+        if math.isnan(truth):
+            continue
         rows = []
         for name, program in PROGRAMS.items():
             solved = errors.solved(runs, name, dim)
             if not solved or dim not in program.ladder:
                 continue
             found = errors.accuracy(solved, truth)
-            rows.append((program.label, f"{found.floor:+.2%}", *_reached(found)))
+            rows.append((program.label, f"{round(found.floor, 4) + 0.0:+.2%}", *_reached(found)))
         yield from table((f"{dim}D", "floor", *(f"to {target:.0%}" for target in errors.TARGETS)), rows)
     yield (
         "Seconds, and about how many nodes that takes; `<=` where the coarsest mesh is good enough. Bodies as plain as "
@@ -277,7 +285,7 @@ def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
     for aim in aims.aims(results, runs):
         measured = "" if aim.measured is None else f"{aim.measured:.3g}"
         rows.append((aim.what, f"{'at least' if aim.at_least else 'at most'} {aim.wanted:g}", measured, aim.verdict))
-    yield from table(("50 % bending, springs", "wanted", "measured", ""), rows)
+    yield from table(("springs, bent by half the length", "wanted", "measured", ""), rows, words=(0, 3))
 
 
 def _recorded(recorded: dict) -> Iterator[str]:
@@ -290,7 +298,7 @@ def _recorded(recorded: dict) -> Iterator[str]:
         (run["program"], run["version"], f"{run['dim']}D, {run['n_nodes']:,}", _seconds(run["seconds"]), run["notes"])
         for run in recorded["runs"]
     )
-    yield from table(("program", "version", "nodes", "seconds", "notes"), rows)
+    yield from table(("program", "version", "nodes", "seconds", "notes"), rows, words=(0, 1, 4))
 
 
 if __name__ == "__main__":

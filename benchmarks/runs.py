@@ -15,7 +15,7 @@ from pathlib import Path
 from subprocess import PIPE
 from typing import Any
 
-from benchmarks.cases import LOADS, SIZES, SPRINGS, STRETCHED, bar, n_nodes
+from benchmarks.cases import LOADS, REFERENCE, SIZES, SPRINGS, STRETCHED, bar, n_nodes
 from benchmarks.machine import hardware
 
 HERE = Path(__file__).parent
@@ -116,11 +116,13 @@ class Measured:
 
 def jobs(sizes: dict[int, tuple[int, ...]], ladder: dict[int, tuple[int, ...]]) -> Iterator[Job]:
     """Yield all jobs; those of one program and load from small to large."""
-    for dim, load in LOADS:
+    for dim, load in sorted(LOADS, key=lambda one: one[1]):  # what is bent first
         largest = STRETCHED[dim] if load == "stretching" else max(sizes[dim])
         for name, program in PROGRAMS.items():
             rungs = ladder[dim] if load == "bending" and dim in program.ladder else ()
-            wanted = [depth for depth in sizes[dim] if depth <= largest] if dim in program.dims else []
+            elements = name.startswith("fem") or (dim == 3 and name == "biquadratic")
+            most = min(largest, REFERENCE[dim]) if elements else largest
+            wanted = [depth for depth in sizes[dim] if depth <= most] if dim in program.dims else []
             yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *wanted}))
 
 
@@ -188,15 +190,15 @@ def fingerprint(name: str) -> str:
 def execute(job: Job) -> dict[str, Any]:
     """Run a job in a process of its own; return what it printed, or {"failure": why}."""
     program = PROGRAMS[job.program]
-    return in_process(f"programs.{program.module}", job, program.arguments, program.peer)
+    return in_process(f"programs.{program.module}", job, program.arguments, python(program.peer))
 
 
-def in_process(module: str, job: Job, arguments: tuple[str, ...], peer: bool = False) -> Any:
+def in_process(module: str, job: Job, arguments: tuple[str, ...], interpreter: str = sys.executable) -> Any:
     """Give the case of a job to a module of benchmarks; return what it prints, or {"failure": why}."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.npz"
         bar(job.dim, job.load, job.depth).write(file)
-        command = [python(peer), "-m", f"benchmarks.{module}", str(file), *arguments]
+        command = [interpreter, "-m", f"benchmarks.{module}", str(file), *arguments]
         with subprocess.Popen(
             command, cwd=ROOT, env=environment(), stdout=PIPE, stderr=PIPE, text=True, start_new_session=True
         ) as process:

@@ -83,28 +83,34 @@ class VolumeTerm:
 
     def add_hessian(self, positions: Floats, pressure: Floats, values: Floats) -> None:
         """Add the tangent stiffness [N/m], the curvature of the volumes weighted by `pressure` [Pa], to a matrix."""
-        self.pattern.add(partial(self._matrices, positions, self.kappa, pressure), values)
+        from truespring.kernels.threads import writable
+
+        self.pattern.add(partial(self._matrices, writable(positions), self.kappa, writable(pressure)), values)
 
     def add_projected_hessian(self, positions: Floats, values: Floats) -> None:
         """Add what of it is positive semidefinite everywhere: the stiffness against a change of volume [N/m]."""
+        from truespring.kernels.threads import writable
+
         stiff = np.maximum(self.kappa, 0.0)
-        self.pattern.add(partial(self._matrices, positions, stiff, np.zeros_like(stiff)), values)
+        self.pattern.add(partial(self._matrices, writable(positions), stiff, np.zeros_like(stiff)), values)
 
     def stiffening(self, positions: Floats, first: int = 0, last: int | None = None) -> Floats:
         """Stiffness of elements against a change of their volume [N/m], shape (n, n_dof, n_dof)."""
+        from truespring.kernels.threads import writable
+
         end = len(self.kappa) if last is None else last
-        return self._matrices(positions, self.kappa, np.zeros(len(self.kappa)), first, end)
+        return self._matrices(writable(positions), self.kappa, np.zeros(len(self.kappa)), first, end)
 
     def _matrices(self, positions: Floats, kappa: Floats, pressure: Floats, first: int, last: int) -> Floats:
         """Element matrices of a slice [N/m], shape (last - first, n_dof, n_dof)."""
         from truespring.kernels import volumes
-        from truespring.kernels.threads import run, writable
+        from truespring.kernels.threads import run
 
         here = slice(first, last)
         elements, stiffness = self.pattern.elements[here], kappa[here] / self._at_rest[here]
         n_dof = elements.shape[1] * self.pattern.dim
         blocks = np.empty((last - first, n_dof, n_dof))
-        known = (writable(positions), elements, *self._form, stiffness, writable(pressure)[here])
+        known = (positions, elements, *self._form, stiffness, pressure[here])
         run(volumes.stiffnesses, last - first, *known, blocks, self.pattern.zero, smallest=_SMALLEST_PIECE)
         return blocks
 

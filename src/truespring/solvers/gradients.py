@@ -50,8 +50,8 @@ def conjugate_gradients(
     """Solve A x = right until the residual is `accuracy` of `right` in size, shapes (n, k).
 
     `product(x, result)` writes A x and returns x . A x; `precondition(r)` returns an approximate solution.
-    Raises IndefiniteError where either is not positive along a direction that was met, SlowError where the
-    iterations do not suffice.
+    Raises IndefiniteError where the matrix is not positive along a direction that was met, SlowError where the
+    iterations do not suffice or the preconditioner is not positive.
     """
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
@@ -65,7 +65,7 @@ def conjugate_gradients(
         z = precondition(r)
         slope = float(sum(run(blocks.scalar_product, n, r, z)))
         if not slope > 0:
-            raise IndefiniteError("the preconditioner is not positive")
+            raise SlowError(x)  # the preconditioner is that of another state, which was not positive
         run(blocks.turn_towards, n, z, slope / previous, p)
         curvature = product(p, q)
         if not curvature > 0:

@@ -1,0 +1,36 @@
+"""Record the programs that are too slow to be measured each time: python -m benchmarks.record PYTHON.
+
+PYTHON is an interpreter with torch-fem, pypardiso and JAX. Writes recorded.json, which the page shows.
+"""
+
+import json
+import sys
+
+from benchmarks import machine
+from benchmarks.runs import HERE, Job, in_process
+
+# Module, label, what matter is, dimension, elements over the height.
+_WANTED = (
+    ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 2, 12),
+    ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 3, 6),
+    ("jax_springs", "JAX with SciPy's L-BFGS", "the springs of Lloyd's rule", 2, 12),
+    ("jax_springs", "JAX with SciPy's L-BFGS", "the springs of Lloyd's rule", 2, 25),
+)
+
+
+def main() -> None:
+    """Run them once each."""
+    runs = []
+    for module, label, matter, dim, depth in _WANTED:
+        job = Job(label, dim, "bending", depth)
+        found = in_process(f"programs.{module}", job, (), sys.argv[1])
+        if "failure" in found:
+            raise SystemExit(f"{label}: {found['failure']}")
+        notes = ", ".join(part for part in (matter, found.pop("notes")) if part)
+        runs.append({"program": label, "dim": dim, "n_nodes": job.n_nodes, "notes": notes, **found})
+    recorded = {"date": machine.today(), **machine.hardware(), "runs": runs}
+    (HERE / "recorded.json").write_text(json.dumps(recorded, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""Newton's method with mixed integration points: the same answers as line search, in few iterations, or a way back."""
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from tests.test_examples import EXAMPLES
+from truespring.study import read_study
+
+WAYS = [("mixed", "multigrid"), ("line-search", "scipy"), ("line-search", "multigrid")]
+SOFT, THIN = ts.Material(young=1e4, poisson=0.3), ts.PlaneStress(thickness=0.01)
+MODELS = {
+    "springs": ts.Springs(rule="isotropic"),
+    "volume": ts.Springs(rule="isotropic", volume=True),
+    "biquadratic": ts.Springs(rule="biquadratic"),
+    **{law: ts.Fem(law=law) for law in ts.LAWS},
+}
+
+
+@pytest.mark.parametrize("name", ["bending", "stretching", "soft_block", "tissue"])
+def test_every_way_leads_to_the_same_tip_of_a_shipped_study(name: str) -> None:
+    study = read_study(EXAMPLES / f"{name}.toml")
+    model = study.entries[study.model]
+    assert isinstance(model, ts.Springs)
+
+    probe = study.probe if study.probe is not None else int(study.problem.loading.external_force.any(axis=1).argmax())
+
+    def tip(method: str, linear: str) -> np.ndarray:
+        path = ts.solve(study.problem, model, ts.Newton(load_steps=2, method=method, linear=linear))
+        assert path.status is ts.Status.CONVERGED
+        return path.states[-1].displacement[probe]
+
+    wanted = tip("mixed", "scipy")
+    for way in WAYS:
+        assert np.linalg.norm(tip(*way) - wanted) <= 1e-8 * np.linalg.norm(wanted), way
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_one_step_to_half_the_length_takes_few_iterations(model: str) -> None:
+    """As the line search finds it, which takes more of them; the linear law needs one."""
+    mesh = ts.rectangle((8, 1), (64, 8))
+    problem = ts.Problem(mesh, SOFT, THIN, [ts.Fixed("left")], [ts.Force("right", (0, -0.24))])
+    path = ts.solve(problem, MODELS[model], ts.Newton(load_steps=1, tolerance=1e-8))
+    searched = ts.solve(problem, MODELS[model], ts.Newton(load_steps=1, tolerance=1e-8, method="line-search"))
+    assert path.status is ts.Status.CONVERGED
+    assert path.cost is not None and path.cost.newton == "mixed integration points" and not path.cost.notes
+    tip = path.states[-1].displacement
+    assert model == "linear" or 0.4 * 8 < np.abs(tip[:, 1]).max() < 0.6 * 8
+    assert np.abs(tip - searched.states[-1].displacement).max() <= 1e-7 * np.abs(tip).max()
+    assert path.newton_iterations <= 8
+    assert path.newton_iterations < searched.newton_iterations or model == "linear"
+
+
+def test_a_load_too_large_for_it_is_searched_and_said() -> None:
+    """A short bar under alpha = P L^2 / EI of 10: mixed integration points run away, line search arrives."""
+    mesh = ts.rectangle((5, 1), (20, 4))
+    inertia = 0.01 / 12
+    problem = ts.Problem(mesh, SOFT, THIN, [ts.Fixed("left")], [ts.Force("right", (0, -10 * 1e4 * inertia / 25))])
+    alone = ts.solve(problem, MODELS["springs"], ts.Newton(load_steps=1, max_cutbacks=0, method="mixed"))
+    path = ts.solve(problem, MODELS["springs"], ts.Newton(load_steps=1))
+    assert path.cost is not None
+    assert alone.status is ts.Status.NOT_CONVERGED
+    assert any("line search at load factor 1" in note for note in path.cost.notes)
+    searched = ts.solve(problem, MODELS["springs"], ts.Newton(load_steps=1, method="line-search"))
+    assert path.status is searched.status
+    tip = searched.states[-1].displacement
+    assert np.abs(path.states[-1].displacement - tip).max() <= 1e-8 * np.abs(tip).max()
