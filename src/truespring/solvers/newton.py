@@ -80,7 +80,8 @@ class Newton:
         step, spent = 1.0 / self.load_steps, 0
         smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
-            reached = self._find(balance, self._next_level(last.state.load_factor, step), last, previous)
+            level = self._next_level(last.state.load_factor, step)
+            reached = self._find(balance, level, last, previous, admissible)
             spent += reached.state.iterations
             refused = reached.state.converged and strict and not admissible(reached.state.positions)
             ever_refused = ever_refused or refused
@@ -119,14 +120,22 @@ class Newton:
         """Whether line search is the first choice."""
         return self.method == "line-search" or not isinstance(balance.potential, Stressed)
 
-    def _find(self, balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
+    def _find(
+        self,
+        balance: Balance,
+        level: float,
+        last: Found,
+        previous: Equilibrium | None,
+        admissible: Callable[[Floats], bool],
+    ) -> Found:
         """Return the equilibrium at `level`: by mixed integration points, else by line search."""
         found = None
         if not self._searches(balance):
             found = self._find_mixed(balance, level, last.state, previous)
-            if self.method == "mixed" or _trusted(found.state, last.state, previous):
+            doubt = _doubt(found.state, last.state, previous, admissible)
+            if self.method == "mixed" or not doubt:
                 return found
-            balance.note(f"line search at load factor {level:.6g}: {_doubt(found.state)}")
+            balance.note(f"line search at load factor {level:.6g}: mixed integration points {doubt}")
         searched = _find_by_search(balance, level, last, previous)
         spent = searched.state.iterations + (found.state.iterations if found else 0)
         return searched._replace(state=replace(searched.state, iterations=spent))
@@ -142,16 +151,17 @@ class Newton:
         return float(requested if load_factor + step > requested - 1e-9 else load_factor + step)
 
 
-def _trusted(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None) -> bool:
-    """Whether a state may be taken without line search: one that is not on the path may be anywhere."""
-    return state.converged and not state.negative_eigenvalues and not _snapped(state, last, previous)
-
-
-def _doubt(state: Equilibrium) -> str:
-    """Why a state was not taken."""
+def _doubt(
+    state: Equilibrium, last: Equilibrium, previous: Equilibrium | None, admissible: Callable[[Floats], bool]
+) -> str:
+    """Why a state is not taken without line search, empty where it is: one that is not on the path may be anywhere."""
     if not state.converged:
-        return "mixed integration points did not converge"
-    return "they led to an unstable state" if state.negative_eigenvalues else "they led far away"
+        return "did not converge"
+    if state.negative_eigenvalues:
+        return "led to an unstable state"
+    if not admissible(state.positions):
+        return "turned an element inside out"
+    return "led far away" if _snapped(state, last, previous) else ""
 
 
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
