@@ -67,9 +67,11 @@ def aims(results: dict, runs: list[Measured]) -> Iterator[Aim]:
             yield Aim(f"{dim}D, {size} nodes: times faster than {name}, hoped for", best, measured, at_least=True)
     for dim, upper, memory in ((2, "one million", 2.5), (3, "300,000", 10.0)):
         springs = of_springs(runs, dim)
-        yield Aim(f"{dim}D: p of time ~ n^p from 30,000 to {upper} nodes", 1.1, growth(springs))
-        largest = [run.peak_bytes / run.n_nodes / 1024 for run in springs if run.depth == SIZES[dim][-1]]
-        yield Aim(f"{dim}D, largest size: memory over an empty process, KiB a node", memory, max(largest, default=None))
+        largest = springs[-1] if springs and springs[-1].depth == SIZES[dim][-1] else None
+        power = growth(springs) if largest else None
+        yield Aim(f"{dim}D: p of time ~ n^p from 30,000 to {upper} nodes", 1.1, power)
+        taken = largest.peak_bytes / largest.n_nodes / 1024 if largest else None
+        yield Aim(f"{dim}D, largest size: memory over an empty process, KiB a node", memory, taken)
         newton = max((run.iterations for run in springs), default=None)
         yield Aim(f"{dim}D: Newton iterations, most of all sizes", 8, newton)
         per_newton = [run.linear_iterations / run.iterations for run in springs if run.linear_iterations]
