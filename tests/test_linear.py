@@ -1,7 +1,9 @@
 """Linear solvers: multigrid against factorisations, what they tell of stability, and what they fall back on."""
 
+import time
 from collections.abc import Callable
 
+import numba
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
@@ -160,6 +162,28 @@ def test_what_runs_again_is_the_same_to_the_last_bit() -> None:
         ts.solve(strip(40), ts.Springs(rule="isotropic"), ts.Newton(load_steps=1, linear="multigrid")) for _ in range(2)
     )
     assert np.array_equal(one.states[-1].positions, two.states[-1].positions)
+
+
+def test_compiling_is_told_while_it_goes_on_and_counted_once() -> None:
+    """What a solve takes is told without it: it must be known before the block ends."""
+
+    def inner(x: float) -> float:
+        return x + 1.0
+
+    compiled_inner = numba.njit(inner)
+
+    def outer(x: float) -> float:
+        return compiled_inner(x) * 2.0
+
+    compiled_outer = numba.njit(outer)
+    with threads.compiling() as compiled:
+        assert compiled() == 0
+        started = time.perf_counter()
+        assert compiled_outer(1.0) == 4.0
+        assert 0 < compiled() <= time.perf_counter() - started
+        before = compiled()
+        compiled_outer(2.0)
+        assert compiled() == before
 
 
 def test_pieces_cover_the_range_once() -> None:

@@ -1,6 +1,7 @@
 """Running kernels on several threads, and what compiling them costs."""
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -66,13 +67,26 @@ def _pool(count: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(count, thread_name_prefix="truespring")
 
 
+class _Stopwatch(event.Listener):
+    """Adds up the time of events; one within another counts once."""
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._started = 0.0, 0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        if not self._depth:
+            self._started = time.perf_counter()
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.perf_counter() - self._started
+
+
 @contextmanager
 def compiling() -> Iterator[Callable[[], float]]:
     """Yield a function that tells the seconds spent on compiling kernels so far within the block."""
-    spent = [0.0]
-
-    def add(duration: float) -> None:
-        spent[0] += duration
-
-    with event.install_timer("numba:compile", add):
-        yield lambda: spent[0]
+    watch = _Stopwatch()
+    with event.install_listener("numba:compile", watch):
+        yield lambda: watch.seconds
