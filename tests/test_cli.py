@@ -272,3 +272,10 @@ def test_the_command_is_installed_and_answers() -> None:
     )
     for verb in ("verify", "solve", "moduli", "rules", "check", "schema"):
         assert verb in shown.stdout
+
+
+def test_the_garbage_collector_works_on_and_passes_over_what_was_imported() -> None:
+    asked = "import gc; from truespring.cli import main; main(['schema']); print(gc.isenabled(), gc.get_freeze_count())"
+    shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
+    enabled, frozen = shown.split()[-2:]
+    assert enabled == "True" and int(frozen) > 10_000

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
 
 import truespring as ts
@@ -454,3 +456,84 @@ def test_irregular_springs_fail_the_patch_test_that_coupled_ones_pass(mesh: ts.M
         assert patch_error(mesh, ts.Springs(rule, allow_negative=True), poisson) > 1e-3
     for exact in (ts.Springs("biquadratic"), ts.Fem("linear")):
         assert patch_error(mesh, exact, poisson) < 1e-6
+
+
+# --- large bodies ---------------------------------------------------------------------------------
+
+REGULAR = {
+    "squares": ts.rectangle((4.0, 3.0), (4, 3)),
+    "rectangles": ts.rectangle((4.0, 3.0), (8, 5)),
+    "triangles": ts.rectangle((4.0, 3.0), (4, 3), "triangle", "alternating"),
+    "cubes": ts.box((3.0, 3.0, 3.0), (3, 3, 3)),
+    "tetrahedra": ts.box((3.0, 3.0, 3.0), (3, 3, 3), "tetrahedron"),
+    "body-centred": ts.box((4.0, 4.0, 4.0), (4, 4, 4), "bcc-tetrahedron"),
+}
+
+
+ALIKE = [
+    (name, rule, sharing)
+    for name, mesh in REGULAR.items()
+    for rule, entry in ts.RULES.items()
+    for sharing in ("summed", "single")
+    if mesh.element in entry.elements and not (entry.coupled and sharing == "single")
+    if (name, rule) != ("rectangles", "lloyd")
+]
+
+
+@pytest.mark.parametrize(("name", "rule", "sharing"), ALIKE)
+def test_one_element_stands_for_those_that_are_alike(
+    name: str, rule: str, sharing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is told from one element of each form is what is told from all of them."""
+    mesh, springs = REGULAR[name], ts.Springs(rule, sharing=sharing, allow_negative=True)
+    material, section = ts.Material(2.0, 0.3), ts.PlaneStrain(0.5) if mesh.dim == 2 else None
+    supports, load = ts.Fixed("left"), ts.Force("right", (1.0,) * mesh.dim)
+    stiff = ts.Region(range(2), ts.Material(5.0, 0.1))
+
+    def told() -> tuple[Floats, ts.Moduli]:
+        problem = ts.Problem(mesh, material, section, supports, load, stiff)
+        return springs.element_stiffness(problem), ts.moduli(problem.homogeneous[0], springs)
+
+    assert mesh.forms.few
+    stiffness, few = told()
+    monkeypatch.setattr(type(mesh.forms), "few", False)
+    every_stiffness, every = told()
+    assert stiffness == pytest.approx(every_stiffness, rel=1e-12)
+    assert few.elasticity == pytest.approx(every.elasticity, rel=1e-11, abs=1e-12)
+    assert few.body == pytest.approx(every.body, rel=1e-11, abs=1e-12)
+    assert few.patch_score == pytest.approx(every.patch_score, rel=1e-10, abs=0)
+    assert (few.n_springs, few.n_negative, few.n_zero) == (every.n_springs, every.n_negative, every.n_zero)
+
+
+def test_counts_of_springs_are_those_of_the_network() -> None:
+    """`isotropic` gives the longer edges of rectangles nothing at an aspect of sqrt(3), and less beyond."""
+    found = []
+    for mesh in (ts.rectangle((4.0, 3.0), (4, 3)), ts.box((2.0, 2.0, 3.0), (2, 2, 3))):
+        for side in (1.0, 3**0.5, 2.5):
+            flat = ts.Mesh(mesh.nodes * np.array([side, 1.0, 1.0])[: mesh.dim], mesh.elements, mesh.element)
+            problem, springs = held(flat, 0.25), ts.Springs("isotropic", allow_negative=True)
+            told, network = ts.moduli(problem, springs), springs.potential(problem)
+            assert isinstance(network, ts.SpringNetwork)
+            counts = len(network.springs), (network.stiffness < 0).sum(), (network.stiffness == 0).sum()
+            assert (told.n_springs, told.n_negative, told.n_zero) == counts
+            found.append((told.n_negative, told.n_zero))
+    assert found[:3] == [(0, 0), (0, 16), (16, 0)]  # of 4 by 3 rectangles 16 edges run along
+
+
+def test_a_large_irregular_body_relaxes_as_by_a_factorisation() -> None:
+    """So many inner nodes are found by multigrid; the elasticity is that of the exact displacements."""
+    mesh = shaken(ts.box((14.0,) * 3, (14,) * 3))
+    problem, springs = held(mesh, 0.25), ts.Springs("least-squares", allow_negative=True)
+    told = ts.moduli(problem, springs)
+    assert not told.lattice and told.stable
+    K = sparse.csr_array(springs.potential(problem).hessian(mesh.nodes))
+    inner = np.ones(mesh.n_nodes, dtype=bool)
+    inner[mesh.boundary] = False
+    free = np.repeat(inner, 3)
+    assert free.sum() == 3 * 13**3
+    strain = np.array([[0.0, 0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 1.0]])  # zz and xy together
+    moved = (mesh.nodes @ strain).ravel()
+    moved[free] += spsolve(sparse.csc_array(K[free][:, free]), -(K @ moved)[free])
+    expected = moved @ (K @ moved) / 14**3
+    chosen = np.array([0, 0, 1, 0, 0, 1])
+    assert chosen @ told.elasticity @ chosen == pytest.approx(expected, rel=1e-10)

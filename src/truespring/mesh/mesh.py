@@ -243,12 +243,10 @@ class Mesh:
     @cached_property
     def parts(self) -> Ints:
         """The connected part of the mesh that each node belongs to, numbered from 0, shape (n_nodes,)."""
-        # A graph of nodes and elements: each element is joined to its nodes.
-        n_elements, k = self.elements.shape
-        starts = np.concatenate([np.zeros(self.n_nodes, dtype=np.int32), np.arange(0, self.elements.size + 1, k)])
-        joined = np.ones(self.elements.size, dtype=bool), self.elements.ravel().astype(np.int32), starts
-        graph = sparse.csr_array(joined, shape=(self.n_nodes + n_elements,) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1][: self.n_nodes], dtype=np.int64)
+        corners = self.elements.astype(np.int32)
+        ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
+        graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def _frozen(array: Floats) -> Floats:

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
@@ -171,17 +170,18 @@ def _extremes(value: Callable[[Floats], Floats], dim: int) -> tuple[float, float
     directions = _directions(dim)
     found = value(directions)
 
-    def refined(sign: float) -> float:
-        def at(vector: Floats) -> float:
-            return float(sign * value((vector / np.linalg.norm(vector))[None])[0])
+    around = np.stack(np.meshgrid(*[(-1.0, 0.0, 1.0)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
 
-        starts = directions[np.argsort(sign * found)[:40:10]]
-        close = 1e-12 * float(np.abs(found).max())
-        ends = [
-            float(optimize.minimize(at, start, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": close}).fun)
-            for start in starts
-        ]
-        return sign * min(float((sign * found).min()), *ends)
+    def refined(sign: float) -> float:
+        best = directions[np.argsort(sign * found)[:40:10]]
+        step = 0.1  # wider than directions are apart
+        while step > 1e-8:  # there a value is flat: it is found to rounding
+            near = best[:, None] + step * around
+            near /= np.linalg.norm(near, axis=2, keepdims=True)
+            values = sign * value(near.reshape(-1, dim)).reshape(near.shape[:2])
+            best = near[np.arange(len(best)), values.argmin(axis=1)]
+            step *= 0.6
+        return sign * min(float((sign * found).min()), float(values.min()))
 
     return refined(1.0), refined(-1.0)
 

@@ -135,7 +135,7 @@ Probe = Annotated[
 class Table(BaseModel):
     """A table of a study file: frozen, and without keys that it does not know."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, protected_namespaces=())
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, protected_namespaces=())
 
 
 _Count = Annotated[int, Field(ge=1, le=10**9)]
