@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import dot, minus, plus, put, row, times
+from truespring.kernels.small import dot, minus, plus, put, row, times, unsigned
 from truespring.kernels.threads import kernel
 
 
@@ -93,7 +93,7 @@ def product(
         here = row(x, i, zero)
         s = times(rest, i, here, zero)
         for p in range(starts[i], starts[i + 1]):
-            s = plus(s, times(off, p, minus(row(x, columns[p], zero), here), zero))
+            s = plus(s, times(off, p, minus(row(x, columns[unsigned(p)], zero), here), zero))
         put(result, i, s)
         total += dot(here, s)
     return total
@@ -109,38 +109,8 @@ def rounding(first: int, last: int, starts: Any, columns: Any, data: Any, size: 
                 s = 0.0
                 for p in range(starts[i], starts[i + 1]):
                     for e in range(data.shape[1]):
-                        s += abs(data[p, c, e]) * size[columns[p], e]
+                        s += abs(data[p, c, e]) * size[columns[unsigned(p)], e]
                 total += s * s
-    return total
-
-
-@kernel
-def advance(first: int, last: int, length: float, p: Any, q: Any, x: Any, r: Any) -> float:
-    """Step x along p and r against q; the sum of r . r."""
-    total = 0.0
-    for i in range(first, last):
-        for c in range(x.shape[1]):
-            x[i, c] += length * p[i, c]
-            r[i, c] -= length * q[i, c]
-            total += r[i, c] * r[i, c]
-    return total
-
-
-@kernel
-def turn_towards(first: int, last: int, z: Any, share: float, p: Any) -> None:
-    """p = z + share p."""
-    for i in range(first, last):
-        for c in range(p.shape[1]):
-            p[i, c] = z[i, c] + share * p[i, c]
-
-
-@kernel
-def scalar_product(first: int, last: int, a: Any, b: Any) -> float:
-    """The sum of a . b in double precision."""
-    total = 0.0
-    for i in range(first, last):
-        for c in range(a.shape[1]):
-            total += a[i, c] * b[i, c]
     return total
 
 
@@ -165,7 +135,7 @@ def sweep_forward(
     for i in range(first, last):
         s = row(r, i, zero)
         for p in range(starts[i], diagonal[i]):
-            j = columns[p]
+            j = columns[unsigned(p)]
             if j >= first:
                 s = minus(s, times(off, p, row(z, j, zero), zero))
         s = times(inverse, i, s, zero)
@@ -180,11 +150,11 @@ def left_over(
     for i in range(first, last):
         s = zero
         for p in range(starts[i], diagonal[i]):
-            if columns[p] >= first:
+            if columns[unsigned(p)] >= first:
                 break
-            s = minus(s, times(off, p, row(z, columns[p], zero), zero))
+            s = minus(s, times(off, p, row(z, columns[unsigned(p)], zero), zero))
         for p in range(diagonal[i] + 1, starts[i + 1]):
-            s = minus(s, times(off, p, row(z, columns[p], zero), zero))
+            s = minus(s, times(off, p, row(z, columns[unsigned(p)], zero), zero))
         put(left, i, s)
 
 
@@ -207,11 +177,11 @@ def sweep_backward(
         s = row(r, i, zero)
         # Backwards through memory all the way: so it is fetched ahead.
         for p in range(starts[i + 1] - 1, diagonal[i], -1):
-            j = columns[p]
+            j = columns[unsigned(p)]
             if j < last:
                 s = minus(s, times(off, p, row(z, j, zero), zero))
             else:
                 s = minus(s, times(off, p, row(old, j, zero), zero))
         for p in range(diagonal[i] - 1, starts[i] - 1, -1):
-            s = minus(s, times(off, p, row(old, columns[p], zero), zero))
+            s = minus(s, times(off, p, row(old, columns[unsigned(p)], zero), zero))
         put(z, i, times(inverse, i, s, zero))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import add_line, line, plus, put, row, times, times_transposed
+from truespring.kernels.small import add_line, line, plus, put, row, times, times_transposed, unsigned
 from truespring.kernels.threads import kernel
 
 
@@ -328,7 +328,7 @@ def restrict(
     for c in range(first, last):
         s = zero
         for p in range(r_starts[c], r_starts[c + 1]):
-            s = plus(s, times(r_data, p, row(fine, r_node[p], none), zero))
+            s = plus(s, times(r_data, p, row(fine, r_node[unsigned(p)], none), zero))
         put(coarse, c, s)
 
 
@@ -340,7 +340,7 @@ def prolong(
     for i in range(first, last):
         s = row(fine, i, none)
         for p in range(p_starts[i], p_starts[i + 1]):
-            s = plus(s, times(p_data, p, row(coarse, p_columns[p], zero), none))
+            s = plus(s, times(p_data, p, row(coarse, p_columns[unsigned(p)], zero), none))
         put(fine, i, s)
 
 

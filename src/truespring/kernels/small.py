@@ -5,7 +5,11 @@ such as (0.0, 0.0) and compiled once for each kind. The loops of numba over shor
 through memory instead, and an index that is not a constant would be looked up.
 """
 
+import numpy as np
 from numba.extending import overload
+
+#: An index that could be negative is looked at before it is used: that is half the time of a short loop.
+unsigned = np.uint64
 
 
 def row(x, i, zero):
@@ -15,9 +19,16 @@ def row(x, i, zero):
 @overload(row)
 def _row(x, i, zero):
     return {
-        2: lambda x, i, zero: (x[i, 0], x[i, 1]),
-        3: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2]),
-        6: lambda x, i, zero: (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4], x[i, 5]),
+        2: lambda x, i, zero: (x[unsigned(i), 0], x[unsigned(i), 1]),
+        3: lambda x, i, zero: (x[unsigned(i), 0], x[unsigned(i), 1], x[unsigned(i), 2]),
+        6: lambda x, i, zero: (
+            x[unsigned(i), 0],
+            x[unsigned(i), 1],
+            x[unsigned(i), 2],
+            x[unsigned(i), 3],
+            x[unsigned(i), 4],
+            x[unsigned(i), 5],
+        ),
     }[len(zero)]
 
 
@@ -67,11 +78,25 @@ def along(blocks, p, i, v):
 @overload(along)
 def _along(blocks, p, i, v):
     return {
-        2: lambda blocks, p, i, v: blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1],
-        3: lambda blocks, p, i, v: blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1] + blocks[p, i, 2] * v[2],
+        2: lambda blocks, p, i, v: (
+            blocks[unsigned(p), unsigned(i), 0] * v[0] + blocks[unsigned(p), unsigned(i), 1] * v[1]
+        ),
+        3: lambda blocks, p, i, v: (
+            blocks[unsigned(p), unsigned(i), 0] * v[0]
+            + blocks[unsigned(p), unsigned(i), 1] * v[1]
+            + blocks[unsigned(p), unsigned(i), 2] * v[2]
+        ),
         6: lambda blocks, p, i, v: (
-            (blocks[p, i, 0] * v[0] + blocks[p, i, 1] * v[1] + blocks[p, i, 2] * v[2])
-            + (blocks[p, i, 3] * v[3] + blocks[p, i, 4] * v[4] + blocks[p, i, 5] * v[5])
+            (
+                blocks[unsigned(p), unsigned(i), 0] * v[0]
+                + blocks[unsigned(p), unsigned(i), 1] * v[1]
+                + blocks[unsigned(p), unsigned(i), 2] * v[2]
+            )
+            + (
+                blocks[unsigned(p), unsigned(i), 3] * v[3]
+                + blocks[unsigned(p), unsigned(i), 4] * v[4]
+                + blocks[unsigned(p), unsigned(i), 5] * v[5]
+            )
         ),
     }[len(v)]
 
@@ -83,11 +108,25 @@ def across(blocks, p, j, v):
 @overload(across)
 def _across(blocks, p, j, v):
     return {
-        2: lambda blocks, p, j, v: blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1],
-        3: lambda blocks, p, j, v: blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1] + blocks[p, 2, j] * v[2],
+        2: lambda blocks, p, j, v: (
+            blocks[unsigned(p), 0, unsigned(j)] * v[0] + blocks[unsigned(p), 1, unsigned(j)] * v[1]
+        ),
+        3: lambda blocks, p, j, v: (
+            blocks[unsigned(p), 0, unsigned(j)] * v[0]
+            + blocks[unsigned(p), 1, unsigned(j)] * v[1]
+            + blocks[unsigned(p), 2, unsigned(j)] * v[2]
+        ),
         6: lambda blocks, p, j, v: (
-            (blocks[p, 0, j] * v[0] + blocks[p, 1, j] * v[1] + blocks[p, 2, j] * v[2])
-            + (blocks[p, 3, j] * v[3] + blocks[p, 4, j] * v[4] + blocks[p, 5, j] * v[5])
+            (
+                blocks[unsigned(p), 0, unsigned(j)] * v[0]
+                + blocks[unsigned(p), 1, unsigned(j)] * v[1]
+                + blocks[unsigned(p), 2, unsigned(j)] * v[2]
+            )
+            + (
+                blocks[unsigned(p), 3, unsigned(j)] * v[3]
+                + blocks[unsigned(p), 4, unsigned(j)] * v[4]
+                + blocks[unsigned(p), 5, unsigned(j)] * v[5]
+            )
         ),
     }[len(v)]
 
@@ -139,13 +178,20 @@ def put(x, i, v):
 @overload(put)
 def _put(x, i, v):
     def two(x, i, v):
-        x[i, 0], x[i, 1] = v[0], v[1]
+        x[unsigned(i), 0], x[unsigned(i), 1] = v[0], v[1]
 
     def three(x, i, v):
-        x[i, 0], x[i, 1], x[i, 2] = v[0], v[1], v[2]
+        x[unsigned(i), 0], x[unsigned(i), 1], x[unsigned(i), 2] = v[0], v[1], v[2]
 
     def six(x, i, v):
-        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4], x[i, 5] = v[0], v[1], v[2], v[3], v[4], v[5]
+        (
+            x[unsigned(i), 0],
+            x[unsigned(i), 1],
+            x[unsigned(i), 2],
+            x[unsigned(i), 3],
+            x[unsigned(i), 4],
+            x[unsigned(i), 5],
+        ) = v[0], v[1], v[2], v[3], v[4], v[5]
 
     return {2: two, 3: three, 6: six}[len(v)]
 
@@ -170,15 +216,19 @@ def line(blocks, p, i, zero):
 @overload(line)
 def _line(blocks, p, i, zero):
     return {
-        2: lambda blocks, p, i, zero: (blocks[p, i, 0], blocks[p, i, 1]),
-        3: lambda blocks, p, i, zero: (blocks[p, i, 0], blocks[p, i, 1], blocks[p, i, 2]),
+        2: lambda blocks, p, i, zero: (blocks[unsigned(p), unsigned(i), 0], blocks[unsigned(p), unsigned(i), 1]),
+        3: lambda blocks, p, i, zero: (
+            blocks[unsigned(p), unsigned(i), 0],
+            blocks[unsigned(p), unsigned(i), 1],
+            blocks[unsigned(p), unsigned(i), 2],
+        ),
         6: lambda blocks, p, i, zero: (
-            blocks[p, i, 0],
-            blocks[p, i, 1],
-            blocks[p, i, 2],
-            blocks[p, i, 3],
-            blocks[p, i, 4],
-            blocks[p, i, 5],
+            blocks[unsigned(p), unsigned(i), 0],
+            blocks[unsigned(p), unsigned(i), 1],
+            blocks[unsigned(p), unsigned(i), 2],
+            blocks[unsigned(p), unsigned(i), 3],
+            blocks[unsigned(p), unsigned(i), 4],
+            blocks[unsigned(p), unsigned(i), 5],
         ),
     }[len(zero)]
 
@@ -190,21 +240,21 @@ def add_line(blocks, p, i, a, v):
 @overload(add_line)
 def _add_line(blocks, p, i, a, v):
     def two(blocks, p, i, a, v):
-        blocks[p, i, 0] += a * v[0]
-        blocks[p, i, 1] += a * v[1]
+        blocks[unsigned(p), unsigned(i), 0] += a * v[0]
+        blocks[unsigned(p), unsigned(i), 1] += a * v[1]
 
     def three(blocks, p, i, a, v):
-        blocks[p, i, 0] += a * v[0]
-        blocks[p, i, 1] += a * v[1]
-        blocks[p, i, 2] += a * v[2]
+        blocks[unsigned(p), unsigned(i), 0] += a * v[0]
+        blocks[unsigned(p), unsigned(i), 1] += a * v[1]
+        blocks[unsigned(p), unsigned(i), 2] += a * v[2]
 
     def six(blocks, p, i, a, v):
-        blocks[p, i, 0] += a * v[0]
-        blocks[p, i, 1] += a * v[1]
-        blocks[p, i, 2] += a * v[2]
-        blocks[p, i, 3] += a * v[3]
-        blocks[p, i, 4] += a * v[4]
-        blocks[p, i, 5] += a * v[5]
+        blocks[unsigned(p), unsigned(i), 0] += a * v[0]
+        blocks[unsigned(p), unsigned(i), 1] += a * v[1]
+        blocks[unsigned(p), unsigned(i), 2] += a * v[2]
+        blocks[unsigned(p), unsigned(i), 3] += a * v[3]
+        blocks[unsigned(p), unsigned(i), 4] += a * v[4]
+        blocks[unsigned(p), unsigned(i), 5] += a * v[5]
 
     return {2: two, 3: three, 6: six}[len(v)]
 
@@ -241,20 +291,20 @@ def take_symmetric(blocks, p, m, zero):
 @overload(take_symmetric)
 def _take_symmetric(blocks, p, m, zero):
     def two(blocks, p, m, zero):
-        blocks[p, 0, 0] -= m[0]
-        blocks[p, 0, 1] -= m[1]
-        blocks[p, 1, 0] -= m[1]
-        blocks[p, 1, 1] -= m[2]
+        blocks[unsigned(p), 0, 0] -= m[0]
+        blocks[unsigned(p), 0, 1] -= m[1]
+        blocks[unsigned(p), 1, 0] -= m[1]
+        blocks[unsigned(p), 1, 1] -= m[2]
 
     def three(blocks, p, m, zero):
-        blocks[p, 0, 0] -= m[0]
-        blocks[p, 0, 1] -= m[1]
-        blocks[p, 0, 2] -= m[2]
-        blocks[p, 1, 0] -= m[1]
-        blocks[p, 1, 1] -= m[3]
-        blocks[p, 1, 2] -= m[4]
-        blocks[p, 2, 0] -= m[2]
-        blocks[p, 2, 1] -= m[4]
-        blocks[p, 2, 2] -= m[5]
+        blocks[unsigned(p), 0, 0] -= m[0]
+        blocks[unsigned(p), 0, 1] -= m[1]
+        blocks[unsigned(p), 0, 2] -= m[2]
+        blocks[unsigned(p), 1, 0] -= m[1]
+        blocks[unsigned(p), 1, 1] -= m[3]
+        blocks[unsigned(p), 1, 2] -= m[4]
+        blocks[unsigned(p), 2, 0] -= m[2]
+        blocks[unsigned(p), 2, 1] -= m[4]
+        blocks[unsigned(p), 2, 2] -= m[5]
 
     return {2: two, 3: three}[len(zero)]

@@ -4,14 +4,27 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import along_and_across, dot, minus, nothing, plus, put, row, scaled, take_symmetric
+from truespring.kernels.small import (
+    along_and_across,
+    dot,
+    minus,
+    nothing,
+    plus,
+    put,
+    row,
+    scaled,
+    take_symmetric,
+    unsigned,
+)
 from truespring.kernels.threads import kernel
+
+ONE = unsigned(1)
 
 
 @kernel
 def lengths(first: int, last: int, x: Any, springs: Any, length: Any, zero: Any) -> None:
     """The length of each spring."""
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         length[s] = np.sqrt(dot(d, d))
 
@@ -20,7 +33,7 @@ def lengths(first: int, last: int, x: Any, springs: Any, length: Any, zero: Any)
 def energy(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, zero: Any) -> float:
     """The sum of 1/2 k (l - L)^2."""
     total = 0.0
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         total += 0.5 * stiffness[s] * (np.sqrt(dot(d, d)) - rest[s]) ** 2
     return total
@@ -29,7 +42,7 @@ def energy(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: An
 @kernel
 def tensions(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, tension: Any, zero: Any) -> None:
     """k (l - L)."""
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         tension[s] = stiffness[s] * (np.sqrt(dot(d, d)) - rest[s])
 
@@ -39,7 +52,7 @@ def extrapolated(
     first: int, last: int, x: Any, step: Any, springs: Any, stiffness: Any, rest: Any, tension: Any, zero: Any
 ) -> None:
     """k (l - L + n . change of d along the step): the tension carried on linearly."""
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         a, b = springs[s, 0], springs[s, 1]
         d = minus(row(x, b, zero), row(x, a, zero))
         change = minus(row(step, b, zero), row(step, a, zero))
@@ -51,7 +64,7 @@ def extrapolated(
 @kernel
 def pulls(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, pull: Any, zero: Any) -> None:
     """Tension over length."""
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         length = np.sqrt(dot(d, d))
         pull[s] = stiffness[s] * (length - rest[s]) / length if length > 0 else 0.0
@@ -65,8 +78,10 @@ def internal_forces(
     for i in range(first, last):
         here, force = row(x, i, zero), zero
         for q in range(at_starts[i], at_starts[i + 1]):
-            s = at[q] // 2
-            force = plus(force, scaled(pull[s], minus(here, row(x, springs[s, 1 - at[q] % 2], zero))))
+            end = unsigned(at[unsigned(q)])
+            s = end >> ONE
+            other = springs[s, ONE - (end & ONE)]
+            force = plus(force, scaled(pull[s], minus(here, row(x, other, zero))))
         put(forces, i, force)
 
 
@@ -75,7 +90,7 @@ def stiffen(
     first: int, last: int, x: Any, springs: Any, stiffness: Any, tension: Any, lengthwise: Any, sideways: Any, zero: Any
 ) -> None:
     """The numbers u, v of each spring's Hessian block u d d^T + v I; a collapsed spring has none."""
-    for s in range(first, last):
+    for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         squared = dot(d, d)
         if squared > 0:
@@ -108,9 +123,10 @@ def hessian(
             data[p] = 0.0
         here, whole, own = row(x, i, zero), nothing(zero), starts[i]
         for q in range(at_starts[i], at_starts[i + 1]):
-            s, a = at[q] // 2, at[q] % 2
-            block = along_and_across(lengthwise[s], sideways[s], minus(row(x, springs[s, 1 - a], zero), here))
-            take_symmetric(data, slots[s, a, 1 - a], block, zero)
+            end = unsigned(at[unsigned(q)])
+            s, a = end >> ONE, end & ONE
+            block = along_and_across(lengthwise[s], sideways[s], minus(row(x, springs[s, ONE - a], zero), here))
+            take_symmetric(data, slots[s, a, ONE - a], block, zero)
             whole = minus(whole, block)
             own = slots[s, a, a]
         take_symmetric(data, own, whole, zero)

@@ -1,11 +1,11 @@
 """Running kernels on several threads, and what compiling them costs."""
 
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import partial
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -18,6 +18,11 @@ FASTMATH = {"contract", "nsz", "arcp"}
 
 #: How every kernel is compiled: serially, released from the interpreter's lock, kept on disk.
 kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(nogil=True, cache=True, fastmath=FASTMATH)
+
+#: How loops over plain vectors are compiled: sums in the order of the machine's vector registers.
+vector_kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
+    nogil=True, cache=True, fastmath=FASTMATH | {"reassoc"}
+)
 
 # Pieces smaller than so many rows, springs or elements are not worth the hand-over to another thread.
 _SMALLEST_PIECE = 4000
@@ -50,10 +55,20 @@ def pieces(n: int, smallest: int = _SMALLEST_PIECE) -> list[tuple[int, int]]:
 def run(function: Callable[..., Any], n: int, *arguments: Any, smallest: int = _SMALLEST_PIECE) -> list[Any]:
     """Call function(first, last, *arguments) on all pieces of 0..n and return what each returned, in order."""
     (first, *others) = pieces(n, smallest)
-    if not others:
-        return [function(*first, *arguments)]
-    started = [_pool(len(others)).submit(function, *piece, *arguments) for piece in others]
-    return [function(*first, *arguments), *(one.result() for one in started)]
+    if not others or not _in_use.acquire(blocking=False):  # whoever comes second does without other threads
+        return [function(*piece, *arguments) for piece in (first, *others)]
+    try:
+        workers = _workers(len(others))
+        for worker, piece in zip(workers, others, strict=True):
+            worker.start(function, *piece, *arguments)
+        try:
+            found = [function(*first, *arguments)]
+        finally:
+            for worker in workers:
+                worker.wait()
+        return found + [worker.result() for worker in workers]
+    finally:
+        _in_use.release()
 
 
 def writable(array: Array) -> Array:
@@ -62,9 +77,58 @@ def writable(array: Array) -> Array:
     return writable
 
 
-@lru_cache(maxsize=1)
-def _pool(count: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(count, thread_name_prefix="truespring")
+class _Worker:
+    """A thread that waits for calls: two locks hand them over in a third of the time that an executor takes."""
+
+    def __init__(self) -> None:
+        self._called, self._returned = threading.Lock(), threading.Lock()
+        self._called.acquire()
+        self._returned.acquire()
+        threading.Thread(target=self._work, name="truespring", daemon=True).start()
+
+    def start(self, function: Callable[..., Any], *arguments: Any) -> None:
+        self._call = partial(function, *arguments)
+        self._called.release()
+
+    def wait(self) -> None:
+        self._returned.acquire()
+
+    def result(self) -> Any:
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+    def _work(self) -> None:
+        while True:
+            self._called.acquire()
+            self._result, self._error = None, None
+            try:
+                self._result = self._call()
+            except BaseException as error:  # raised again where it is waited for
+                self._error = error
+            del self._call  # and with it the arrays
+            self._returned.release()
+
+
+_in_use = threading.Lock()
+_waiting: list[_Worker] = []
+
+
+def _workers(count: int) -> list[_Worker]:
+    while len(_waiting) < count:
+        _waiting.append(_Worker())
+    return _waiting[:count]
+
+
+def _forget() -> None:
+    """A process that was forked has none of the threads."""
+    global _in_use
+    _in_use = threading.Lock()
+    _waiting.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)
 
 
 class _Stopwatch(event.Listener):

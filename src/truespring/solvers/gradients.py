@@ -38,10 +38,29 @@ class Solved(NamedTuple):
 
 def norm(x: Floats) -> float:
     """Return the Euclidean norm of an array of shape (n, k)."""
-    from truespring.kernels import blocks
+    return float(np.sqrt(_scalar_product(x, x)))
+
+
+def _scalar_product(a: Floats, b: Floats) -> float:
+    from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
-    return float(np.sqrt(sum(run(blocks.scalar_product, len(x), x, x))))
+    return float(sum(run(vectors.scalar_product, a.size, a.ravel(), b.ravel(), smallest=vectors.SMALLEST)))
+
+
+def _turn_towards(z: Floats, share: float, p: Floats) -> None:
+    from truespring.kernels import vectors
+    from truespring.kernels.threads import run
+
+    run(vectors.turn_towards, p.size, z.ravel(), share, p.ravel(), smallest=vectors.SMALLEST)
+
+
+def _advance(length: float, p: Floats, q: Floats, x: Floats, r: Floats) -> float:
+    from truespring.kernels import vectors
+    from truespring.kernels.threads import run
+
+    flat = (p.ravel(), q.ravel(), x.ravel(), r.ravel())
+    return float(np.sqrt(sum(run(vectors.advance, x.size, length, *flat, smallest=vectors.SMALLEST))))
 
 
 def conjugate_gradients(
@@ -53,24 +72,20 @@ def conjugate_gradients(
     Raises IndefiniteError where the matrix is not positive along a direction that was met, SlowError where the
     iterations do not suffice or the preconditioner is not positive.
     """
-    from truespring.kernels import blocks
-    from truespring.kernels.threads import run
-
-    n = len(right)
     x, r = np.zeros(right.shape), right.copy()
     wanted = accuracy * norm(right)
     p, q = np.zeros(right.shape), np.empty(right.shape)
     previous = np.inf
     for iteration in range(1, max_iterations + 1):
         z = precondition(r)
-        slope = float(sum(run(blocks.scalar_product, n, r, z)))
+        slope = _scalar_product(r, z)
         if not slope > 0:
             raise SlowError(x)  # the preconditioner is that of another state, which was not positive
-        run(blocks.turn_towards, n, z, slope / previous, p)
+        _turn_towards(z, slope / previous, p)
         curvature = product(p, q)
         if not curvature > 0:
             raise IndefiniteError("the matrix is not positive")
-        size = float(np.sqrt(sum(run(blocks.advance, n, slope / curvature, p, q, x, r))))
+        size = _advance(slope / curvature, p, q, x, r)
         if size <= wanted:
             return Solved(x, iteration)
         previous = slope
@@ -90,10 +105,6 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     The recurrence is that of conjugate gradients, whose coefficients are the tridiagonal matrix (Golub and
     Van Loan, 10.3 and 11.5); where a direction of negative curvature is met, that is the answer.
     """
-    from truespring.kernels import blocks
-    from truespring.kernels.threads import run
-
-    n = len(start)
     r, x = start.copy(), np.zeros(start.shape)
     p, q = np.zeros(start.shape), np.empty(start.shape)
     previous, length = np.inf, 1.0
@@ -101,7 +112,7 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     beside: list[float] = []
     for iteration in range(1, _MOST + 1):
         z = precondition(r)
-        slope = float(sum(run(blocks.scalar_product, n, r, z)))
+        slope = _scalar_product(r, z)
         if not slope > 0:
             return Lowest(None, iteration)
         share = slope / previous
@@ -110,12 +121,12 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
             values, vectors = eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]))
             if iteration > _FEWEST and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
                 return Lowest(float(values[0]), iteration)
-        run(blocks.turn_towards, n, z, share, p)
+        _turn_towards(z, share, p)
         curvature = product(p, q)
         if not curvature > 0:
             return Lowest(curvature / slope, iteration)
         diagonal.append(curvature / slope + (share / length if beside else 0.0))
         length = slope / curvature
-        run(blocks.advance, n, length, p, q, x, r)
+        _advance(length, p, q, x, r)
         previous = slope
     return Lowest(None, _MOST)
