@@ -43,13 +43,13 @@ def kernels(potential: ts.SpringNetwork, positions: np.ndarray, ready: Precondit
 
 def _once(level: Level) -> int:
     """The bytes of a matrix as it is read once for a product."""
-    return level.columns.nbytes + level.off.nbytes + level.rest.nbytes
+    return level.columns.nbytes + level.lower.nbytes + level.rest.nbytes
 
 
 def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
-    """What a V-cycle reads: each matrix twice (down by halves, up as a whole), each transfer once each way."""
+    """What a V-cycle reads: each matrix twice, once down and once up, each transfer once each way."""
     levels = [finest, *coarse.levels]
-    matrices = sum(2 * (level.columns.nbytes + level.off.nbytes + level.inverse.nbytes) for level in levels)
+    matrices = sum(2 * (level.columns.nbytes + level.lower.nbytes + level.inverse.nbytes) for level in levels)
     return matrices + sum(transfer.n_bytes for transfer in coarse.transfers) + coarse.inverse.nbytes
 
 
@@ -65,7 +65,7 @@ def measured(case: Case, rule: str) -> list[Moved]:
     found = [measure(kernel) for kernel in kernels(path.potential, positions, ready)]
     assembly, product, cycle = (one.bytes_moved for one in found)
     step = product + cycle + _VECTORS * positions.nbytes
-    whole = path.newton_iterations * assembly + path.cost.cg_iterations * step
+    whole = path.newton_iterations * assembly + (path.cost.cg_iterations + path.cost.lanczos_iterations) * step
     return [*found, Moved("whole solve", path.seconds, whole)]
 
 

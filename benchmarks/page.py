@@ -184,20 +184,30 @@ def _details(runs: list[Measured]) -> Iterator[str]:
         grown = f": time ~ n^{power:.2f} from {aims.LARGE:,} nodes on" if power is not None else ""
         yield f"{dim}D, {load}{grown}\n"
         yield from table(
-            ("nodes", "seconds", "Newton", "conjugate gradients", "KiB a node", "end moves, of the length", "how"),
+            (
+                "nodes",
+                "seconds",
+                "Newton",
+                "conjugate gradients",
+                "Lanczos",
+                "KiB a node",
+                "end moves, of the length",
+                "how",
+            ),
             (
                 (
                     f"{run.n_nodes:,}",
                     _seconds(run.median),
                     f"{run.iterations}",
                     f"{run.linear_iterations or '-'}",
+                    f"{run.lanczos_iterations or '-'}",
                     f"{run.peak_bytes / run.n_nodes / 1024:.3g}",
                     f"{run.tip / LENGTH:.4f}",
                     run.notes,
                 )
                 for run in springs
             ),
-            words=(0, 6),
+            words=(0, 7),
         )
 
 

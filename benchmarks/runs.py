@@ -23,7 +23,7 @@ ROOT = HERE.parent
 CACHE = HERE / ".cache"
 
 #: What a solve may take [s]; larger meshes of that load are then not given to the program.
-LIMIT = 60.0
+LIMIT = 120.0
 
 # Failing attempts, warming up and reading come on top of what is timed.
 _PROCESS_LIMIT = 3 * LIMIT
@@ -103,6 +103,7 @@ class Measured:
     tip: float = float("nan")
     iterations: int = 0
     linear_iterations: int | None = None
+    lanczos_iterations: int | None = None
     peak_bytes: int = 0
     version: str = ""
     notes: str = ""

@@ -733,12 +733,12 @@ def test_page_tells_verdict_law_advice_and_how_to_run_it_again(solved: Result) -
 
 def test_page_and_summary_tell_how_a_path_was_solved_and_what_it_took(page_of: Callable[[Result], "Page"]) -> None:
     problem = stretched()
-    cost = Cost("line search", "multigrid", 21, 120, 3, 10**6, 2, ("mixed integration points were given up",))
+    cost = Cost("line search", "multigrid", 21, 120, 17, 3, 10**6, 2, ("mixed integration points were given up",))
     springs = path(problem, kind="springs", label="springs (lloyd)", cost=cost)
-    once = replace(cost, newton_iterations=1, cg_iterations=0, notes=())
+    once = replace(cost, newton_iterations=1, cg_iterations=0, lanczos_iterations=0, notes=())
     found = result(springs, {"linear": path(problem, cost=once), "read": path(problem, label="read")})
     told = "".join(page_of(found).said)
-    assert "line search, multigrid, 21 Newton iterations, 120 CG iterations; mixed integration points were" in told
+    assert "line search, multigrid, 21 Newton iterations, 120 CG iterations, 17 of Lanczos for stability; mixed" in told
     assert "linear FEM: line search, multigrid, 1 Newton iteration\n" in told and "read: " not in told
     models = summary(found)["models"]
     assert models["springs"]["solver"]["memory"] == 10**6 and models["linear"]["solver"]["newton"] == "line search"

@@ -31,6 +31,7 @@ class Run:
         iterations: of Newton, or of what the program does instead.
         peak_bytes: the largest resident memory of the process.
         linear_iterations: of conjugate gradients, over all Newton iterations; None for a direct solver.
+        lanczos_iterations: beside these, of what tells of stability.
         notes: what else should be known.
     """
 
@@ -40,6 +41,7 @@ class Run:
     iterations: int
     peak_bytes: int
     linear_iterations: int | None = None
+    lanczos_iterations: int | None = None
     notes: str = ""
 
 

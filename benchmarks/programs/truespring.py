@@ -27,7 +27,7 @@ def solve(case: Case, model: str) -> Run:
     path = ts.solve(problem_of(case), chosen, ts.Newton(load_steps=1, tolerance=TOLERANCE))
     if path.status is not ts.Status.CONVERGED:
         raise SystemExit(f"{path.status}: {path.status.advice}")
-    cost = getattr(path, "cost", None)
+    cost = path.cost
     notes = [cost.newton, cost.linear, *cost.notes] if cost else []
     return Run(
         version=version("truespring"),
@@ -35,7 +35,8 @@ def solve(case: Case, model: str) -> Run:
         tip=case.tip(path.states[-1].displacement),
         iterations=path.newton_iterations,
         peak_bytes=peak_bytes(),
-        linear_iterations=getattr(cost, "cg_iterations", 0) or None,
+        linear_iterations=(cost.cg_iterations or None) if cost else None,
+        lanczos_iterations=(cost.lanczos_iterations or None) if cost else None,
         notes=", ".join(notes),
     )
 

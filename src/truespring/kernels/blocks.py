@@ -1,26 +1,39 @@
 """Loops over the rows of a symmetric matrix of node blocks, in the form in which it is iterated with.
 
-The blocks beside the diagonal are in single precision; that of the diagonal is kept as `rest`, the sum
-of a row's blocks, in double: A x at node i is rest_i x_i + sum A_ij (x_j - x_i). A body moved as a whole
-has exactly the forces that it should, however many nodes it has; rounding a spring's block is a spring
-a little different.
+Only blocks left of the diagonal are kept, in single precision: each serves its own row, and transposed that
+of its column, while it is at hand. The diagonal is kept as `rest`, the sum of a row's blocks, in double: A x at
+node i is rest_i x_i + sum A_ij (x_j - x_i). A body moved as a whole has exactly the forces that it should,
+however many nodes it has; rounding a spring's block is a spring a little different.
+
+Rows are cut into one piece a thread. A block whose row and column are in different pieces is crossing: the
+loops over pieces pass it over where two threads could write to one row, and those over `bounds`, where pieces
+begin and the last one ends, see to it.
 """
 
 from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import dot, minus, plus, put, row, times, unsigned
+from truespring.kernels.small import minus, plus, put, row, times, times_transposed, unsigned
 from truespring.kernels.threads import kernel
 
 
 @kernel
-def find_diagonal(first: int, last: int, starts: Any, columns: Any, diagonal: Any) -> None:
-    """The place of the diagonal block of each row."""
+def count_lower(first: int, last: int, starts: Any, columns: Any, counts: Any) -> None:
+    """Count the blocks left of the diagonal of each row, whose columns ascend; -1 where there is no diagonal one."""
     for i in range(first, last):
-        for p in range(starts[i], starts[i + 1]):
-            if columns[p] == i:
-                diagonal[i] = p
+        p = starts[i]
+        while p < starts[i + 1] and columns[p] < i:
+            p += 1
+        counts[i] = p - starts[i] if p < starts[i + 1] and columns[p] == i else -1
+
+
+@kernel
+def take_lower(first: int, last: int, starts: Any, columns: Any, lower_starts: Any, lower_columns: Any) -> None:
+    """Write the columns of those blocks."""
+    for i in range(first, last):
+        for q in range(lower_starts[i], lower_starts[i + 1]):
+            lower_columns[q] = columns[starts[i] + q - lower_starts[i]]
 
 
 @kernel
@@ -29,40 +42,42 @@ def condense(
     last: int,
     starts: Any,
     columns: Any,
-    diagonal: Any,
     data: Any,
     held: Any,
     scale: float,
-    off: Any,
+    lower_starts: Any,
+    lower: Any,
     rest: Any,
     inverse: Any,
+    zero: Any,
 ) -> int:
     """Bring rows to that form, times `scale`, held directions replaced by ones on the diagonal.
 
     Returns how many diagonal blocks are not positive definite.
     """
-    size = data.shape[1]
-    work = np.empty((size, 2 * size))
+    size = len(zero)  # known when compiled
+    work, total = np.empty((size, 2 * size)), np.empty((size, size))
     bad = 0
     for i in range(first, last):
-        own = diagonal[i]
+        shift = lower_starts[i] - starts[i]
+        own = lower_starts[i + 1] - shift
         for c in range(size):
             for e in range(size):
                 value = scale * data[own, c, e]
                 if held[i, c] or held[i, e]:
                     value = 1.0 if c == e else 0.0
-                rest[i, c, e] = value
+                total[c, e] = value
                 work[c, e] = value
                 work[c, size + e] = 1.0 if c == e else 0.0
-                off[own, c, e] = 0.0
         for p in range(starts[i], starts[i + 1]):
             if p != own:
                 j = columns[p]
                 for c in range(size):
                     for e in range(size):
-                        value = 0.0 if held[i, c] or held[j, e] else scale * data[p, c, e]
-                        off[p, c, e] = value
-                        rest[i, c, e] += value  # not as rounded: the sum of a row stays what it is
+                        value = 0.0 if held[i, c] or held[unsigned(j), e] else scale * data[unsigned(p), c, e]
+                        total[c, e] += value  # not as rounded: the sum of a row stays what it is
+                        if p < own:
+                            lower[unsigned(p + shift), c, e] = value
         for c in range(size):  # Gauss and Jordan; the pivots of a positive block are positive
             pivot = work[c, c]
             if not pivot > 0.0:
@@ -80,27 +95,40 @@ def condense(
         for c in range(size):
             for e in range(size):
                 inverse[i, c, e] = work[c, size + e]
+                rest[i, c, e] = total[c, e]
     return bad
 
 
 @kernel
-def product(
-    first: int, last: int, starts: Any, columns: Any, off: Any, rest: Any, x: Any, result: Any, zero: Any
-) -> float:
-    """A x, and the sum x . A x over the rows."""
-    total = 0.0
+def product(first: int, last: int, starts: Any, columns: Any, lower: Any, rest: Any, x: Any, y: Any, zero: Any) -> None:
+    """y = A x, but for what crossing blocks give to the rows of other pieces."""
     for i in range(first, last):
         here = row(x, i, zero)
         s = times(rest, i, here, zero)
         for p in range(starts[i], starts[i + 1]):
-            s = plus(s, times(off, p, minus(row(x, columns[unsigned(p)], zero), here), zero))
-        put(result, i, s)
-        total += dot(here, s)
-    return total
+            j = columns[unsigned(p)]
+            d = minus(row(x, j, zero), here)
+            s = plus(s, times(lower, p, d, zero))
+            if j >= first:
+                put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
+        put(y, i, s)
 
 
 @kernel
-def rounding(first: int, last: int, starts: Any, columns: Any, data: Any, size: Any, held: Any) -> float:
+def product_across(bounds: Any, starts: Any, columns: Any, lower: Any, x: Any, y: Any, zero: Any) -> None:
+    """Add that."""
+    for piece in range(1, len(bounds) - 1):
+        for i in range(bounds[piece], bounds[piece + 1]):
+            for p in range(starts[i], starts[i + 1]):
+                j = columns[unsigned(p)]
+                if j >= bounds[piece]:
+                    break
+                d = minus(row(x, j, zero), row(x, i, zero))
+                put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
+
+
+@kernel
+def rounding(first: int, last: int, starts: Any, columns: Any, data: Any, size: Any, held: Any, zero: Any) -> float:
     """The sum of the squares of |A| |x| over the free directions."""
     total = 0.0
     for i in range(first, last):
@@ -129,59 +157,61 @@ def dense(first: int, last: int, matrix: Any, x: Any, result: Any) -> None:
 
 @kernel
 def sweep_forward(
-    first: int, last: int, starts: Any, columns: Any, diagonal: Any, off: Any, inverse: Any, r: Any, z: Any, zero: Any
-) -> None:
-    """z = (D + L)^-1 r."""
-    for i in range(first, last):
-        s = row(r, i, zero)
-        for p in range(starts[i], diagonal[i]):
-            j = columns[unsigned(p)]
-            if j >= first:
-                s = minus(s, times(off, p, row(z, j, zero), zero))
-        s = times(inverse, i, s, zero)
-        put(z, i, s)
-
-
-@kernel
-def left_over(
-    first: int, last: int, starts: Any, columns: Any, diagonal: Any, off: Any, z: Any, left: Any, zero: Any
-) -> None:
-    """The residual that a forward sweep from zero leaves: only blocks that it did not use make it."""
-    for i in range(first, last):
-        s = zero
-        for p in range(starts[i], diagonal[i]):
-            if columns[unsigned(p)] >= first:
-                break
-            s = minus(s, times(off, p, row(z, columns[unsigned(p)], zero), zero))
-        for p in range(diagonal[i] + 1, starts[i + 1]):
-            s = minus(s, times(off, p, row(z, columns[unsigned(p)], zero), zero))
-        put(left, i, s)
-
-
-@kernel
-def sweep_backward(
     first: int,
     last: int,
     starts: Any,
     columns: Any,
-    diagonal: Any,
-    off: Any,
+    lower: Any,
     inverse: Any,
     r: Any,
-    old: Any,
     z: Any,
+    left: Any,
     zero: Any,
 ) -> None:
-    """z + (D + U)^-1 (r - A z), `old` being z before the sweep."""
+    """z = (D + L)^-1 r, and the residual that this leaves, but for crossing blocks."""
+    for i in range(first, last):
+        s = row(r, i, zero)
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[unsigned(p)]
+            if j >= first:
+                s = minus(s, times(lower, p, row(z, j, zero), zero))
+        s = times(inverse, i, s, zero)
+        put(z, i, s)
+        put(left, i, zero)
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[unsigned(p)]
+            if j >= first:
+                put(left, j, minus(row(left, j, zero), times_transposed(lower, p, s, zero)))
+
+
+@kernel
+def sweep_backward(
+    first: int, last: int, starts: Any, columns: Any, lower: Any, inverse: Any, r: Any, z: Any, zero: Any
+) -> None:
+    """z becomes z + (D + U)^-1 (r - A z), crossing blocks having been seen to in r; r is used up."""
     for i in range(last - 1, first - 1, -1):
         s = row(r, i, zero)
         # Backwards through memory all the way: so it is fetched ahead.
-        for p in range(starts[i + 1] - 1, diagonal[i], -1):
+        for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
             j = columns[unsigned(p)]
-            if j < last:
-                s = minus(s, times(off, p, row(z, j, zero), zero))
-            else:
-                s = minus(s, times(off, p, row(old, j, zero), zero))
-        for p in range(diagonal[i] - 1, starts[i] - 1, -1):
-            s = minus(s, times(off, p, row(old, columns[unsigned(p)], zero), zero))
-        put(z, i, times(inverse, i, s, zero))
+            if j >= first:
+                s = minus(s, times(lower, p, row(z, j, zero), zero))
+        s = times(inverse, i, s, zero)
+        put(z, i, s)
+        for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
+            j = columns[unsigned(p)]
+            if j >= first:
+                put(r, j, minus(row(r, j, zero), times_transposed(lower, p, s, zero)))
+
+
+@kernel
+def subtract_across(bounds: Any, starts: Any, columns: Any, lower: Any, z: Any, r: Any, zero: Any) -> None:
+    """Subtract from r what the crossing blocks make of z."""
+    for piece in range(1, len(bounds) - 1):
+        for i in range(bounds[piece], bounds[piece + 1]):
+            for p in range(starts[i], starts[i + 1]):
+                j = columns[unsigned(p)]
+                if j >= bounds[piece]:
+                    break
+                put(r, i, minus(row(r, i, zero), times(lower, p, row(z, j, zero), zero)))
+                put(r, j, minus(row(r, j, zero), times_transposed(lower, p, row(z, i, zero), zero)))

@@ -8,36 +8,40 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import add_line, line, plus, put, row, times, times_transposed, unsigned
+from truespring.kernels.small import add_line, line, minus, plus, put, row, times, times_transposed, unsigned
 from truespring.kernels.threads import kernel
 
 
 @kernel
-def diagonal_sizes(first: int, last: int, starts: Any, off: Any, rest: Any, sizes: Any) -> None:
-    """The sum of the squares of each block on the diagonal."""
-    size = rest.shape[1]
-    for i in range(first, last):
-        total = 0.0
-        for c in range(size):
-            for e in range(size):
-                value = rest[i, c, e]
-                for p in range(starts[i], starts[i + 1]):
-                    value -= off[p, c, e]
-                total += value * value
-        sizes[i] = total
+def _size(data: Any, p: int, i: int, j: int, held: Any) -> float:
+    """The sum of the squares of a block's entries between directions that are free."""
+    total = 0.0
+    for c in range(data.shape[1]):
+        for e in range(data.shape[1]):
+            if not (held[i, c] or held[j, e]):
+                total += data[p, c, e] ** 2
+    return total
 
 
 @kernel
-def strong(first: int, last: int, starts: Any, columns: Any, off: Any, sizes: Any, share: float, keep: Any) -> None:
-    """Mark blocks beside the diagonal of at least `share` of the geometric mean of the diagonal ones' size."""
-    size = off.shape[1]
+def diagonal_sizes(first: int, last: int, starts: Any, columns: Any, data: Any, held: Any, sizes: Any) -> None:
+    """The size of each block on the diagonal, that of a held direction being one of no strength."""
     for i in range(first, last):
         for p in range(starts[i], starts[i + 1]):
-            block = 0.0
-            for c in range(size):
-                for e in range(size):
-                    block += off[p, c, e] ** 2
-            keep[p] = block * block >= share**4 * sizes[i] * sizes[columns[p]] and block > 0.0
+            if columns[p] == i:
+                sizes[i] = _size(data, p, i, i, held)
+
+
+@kernel
+def strong(
+    first: int, last: int, starts: Any, columns: Any, data: Any, held: Any, sizes: Any, share: float, keep: Any
+) -> None:
+    """Mark blocks beside the diagonal of at least `share` of the geometric mean of the diagonal ones' size."""
+    for i in range(first, last):
+        for p in range(starts[i], starts[i + 1]):
+            j = columns[p]
+            block = _size(data, p, i, j, held) if j != i else 0.0
+            keep[p] = block * block >= share**4 * sizes[i] * sizes[j] and block > 0.0
 
 
 @kernel
@@ -99,8 +103,8 @@ def smooth(
     last: int,
     starts: Any,
     columns: Any,
-    off: Any,
-    rest: Any,
+    data: Any,
+    held: Any,
     inverse: Any,
     aggregate: Any,
     basis: Any,
@@ -111,10 +115,14 @@ def smooth(
     p_data: Any,
     zero: Any,
 ) -> None:
-    """Write the rows of P = (I - omega D^-1 A) T, T the basis."""
+    """Write the rows of P = (I - omega D^-1 A) T, T the basis; those of held directions are zero."""
     size, n_modes = basis.shape[1], basis.shape[2]
     where = np.full(n_aggregates, -1, np.int32)
-    image = np.empty((size, n_modes))
+    total = np.empty((1, n_modes))
+    widest = 0
+    for i in range(first, last):
+        widest = max(widest, p_starts[i + 1] - p_starts[i])
+    image = np.empty((widest, size, n_modes))
     for i in range(first, last):
         begin = p_starts[i]
         end = begin
@@ -129,40 +137,28 @@ def smooth(
                 p_columns[place] = c
                 where[c] = place
                 end += 1
-        for q in range(begin, end):
-            for r in range(size):
-                for k in range(n_modes):
-                    p_data[q, r, k] = 0.0
-        # A T of the row: rest and the sum of the other blocks make the diagonal one.
+        image[: end - begin] = 0.0
         for p in range(starts[i], starts[i + 1]):
             j = columns[p]
-            here = aggregate[i]
-            there = aggregate[j]
-            for r in range(size):
+            if aggregate[j] >= 0:
+                q = where[aggregate[j]] - begin
                 for s in range(size):
-                    a = np.float64(off[p, r, s])
-                    if there >= 0:
-                        add_line(p_data, where[there], r, a, line(basis, j, s, zero))
-                    if here >= 0:
-                        add_line(p_data, where[here], r, -a, line(basis, i, s, zero))
-        if aggregate[i] >= 0:
-            q = where[aggregate[i]]
-            for r in range(size):
-                for s in range(size):
-                    for k in range(n_modes):
-                        p_data[q, r, k] += rest[i, r, s] * basis[i, s, k]
+                    modes = line(basis, j, s, zero)
+                    for r in range(size):
+                        if not held[i, r]:
+                            add_line(image, q, r, data[p, r, s], modes)
         for q in range(begin, end):
             for r in range(size):
-                for k in range(n_modes):
-                    value = 0.0
+                total[:] = 0.0
+                if not held[i, r]:
                     for s in range(size):
-                        value += inverse[i, r, s] * p_data[q, s, k]
-                    image[r, k] = -omega * value
+                        for k in range(n_modes):
+                            total[0, k] -= omega * inverse[i, r, s] * image[q - begin, s, k]
                     if p_columns[q] == aggregate[i]:
-                        image[r, k] += basis[i, r, k]
-            for r in range(size):
+                        for k in range(n_modes):
+                            total[0, k] += basis[i, r, k]
                 for k in range(n_modes):
-                    p_data[q, r, k] = image[r, k]
+                    p_data[q, r, k] = total[0, k]
 
 
 @kernel
@@ -243,8 +239,7 @@ def multiply(
     begin: int,
     starts: Any,
     columns: Any,
-    off: Any,
-    rest: Any,
+    data: Any,
     p_starts: Any,
     p_columns: Any,
     p_data: Any,
@@ -254,36 +249,21 @@ def multiply(
     ap_data: Any,
     zero: Any,
 ) -> None:
-    """Rows begin + first to begin + last of A P, stored from row `begin` on.
-
-    The diagonal block of A is rest less the row's other blocks.
-    """
+    """Rows begin + first to begin + last of A P, stored from row `begin` on."""
     size = p_data.shape[1]
     where = np.empty(n, np.int32)
-    own = np.empty((size, size))
     for i in range(begin + first, begin + last):
         for q in range(ap_starts[i] - ap_starts[begin], ap_starts[i + 1] - ap_starts[begin]):
             where[ap_columns[q + ap_starts[begin]]] = q
             ap_data[q] = 0.0
-        own[:] = rest[i]
         for p in range(starts[i], starts[i + 1]):
             j = columns[p]
-            for r in range(size):
+            for t in range(p_starts[j], p_starts[j + 1]):
+                q = where[p_columns[t]]
                 for s in range(size):
-                    own[r, s] -= off[p, r, s]
-            if j != i:
-                for t in range(p_starts[j], p_starts[j + 1]):
-                    q = where[p_columns[t]]
-                    for s in range(size):
-                        modes = line(p_data, t, s, zero)
-                        for r in range(size):
-                            add_line(ap_data, q, r, np.float64(off[p, r, s]), modes)
-        for t in range(p_starts[i], p_starts[i + 1]):
-            q = where[p_columns[t]]
-            for s in range(size):
-                modes = line(p_data, t, s, zero)
-                for r in range(size):
-                    add_line(ap_data, q, r, own[r, s], modes)
+                    modes = line(p_data, t, s, zero)
+                    for r in range(size):
+                        add_line(ap_data, q, r, data[p, r, s], modes)
 
 
 @kernel
@@ -345,6 +325,27 @@ def prolong(
 
 
 @kernel
+def prolong_turned(
+    first: int,
+    last: int,
+    p_starts: Any,
+    p_columns: Any,
+    p_data: Any,
+    turns: Any,
+    coarse: Any,
+    fine: Any,
+    zero: Any,
+    none: Any,
+) -> None:
+    """Add Q P coarse."""
+    for i in range(first, last):
+        s = none
+        for p in range(p_starts[i], p_starts[i + 1]):
+            s = plus(s, times(p_data, p, row(coarse, p_columns[unsigned(p)], zero), none))
+        put(fine, i, plus(row(fine, i, none), times(turns, i, s, none)))
+
+
+@kernel
 def turn_back(first: int, last: int, turns: Any, x: Any, zero: Any) -> None:
     """x = Q^T x at each node."""
     for i in range(first, last):
@@ -352,29 +353,32 @@ def turn_back(first: int, last: int, turns: Any, x: Any, zero: Any) -> None:
 
 
 @kernel
-def add_turned(first: int, last: int, turns: Any, x: Any, result: Any, zero: Any) -> None:
-    """Add Q x."""
+def smoothed(first: int, last: int, inverse: Any, x: Any, result: Any, zero: Any) -> None:
+    """D^-1 x."""
     for i in range(first, last):
-        put(result, i, plus(row(result, i, zero), times(turns, i, row(x, i, zero), zero)))
+        put(result, i, times(inverse, i, row(x, i, zero), zero))
 
 
 @kernel
-def rotations(first: int, last: int, starts: Any, columns: Any, rest: Any, x: Any, held: Any, turns: Any) -> None:
+def rotations(
+    first: int, last: int, starts: Any, columns: Any, rest: Any, x: Any, held: Any, turns: Any, zero: Any
+) -> None:
     """The rotation Q of each node: the orthogonal factor of the sum of d D^T over the nodes joined to it.
 
     D is the vector to the other node at rest, d now. In three dimensions by Newton's iteration for the polar
     factor (Higham 1986). Rows of held directions are zero: what is brought up from coarser levels does not move them.
     """
-    dim = x.shape[1]
+    dim = len(zero)  # known when compiled
     F = np.empty((dim, dim))
     G = np.empty((dim, dim))
     for i in range(first, last):
         F[:] = 0.0
         for p in range(starts[i], starts[i + 1]):
-            j = columns[p]
+            j = columns[unsigned(p)]
+            d, D = minus(row(x, j, zero), row(x, i, zero)), minus(row(rest, j, zero), row(rest, i, zero))
             for c in range(dim):
                 for e in range(dim):
-                    F[c, e] += (x[j, c] - x[i, c]) * (rest[j, e] - rest[i, e])
+                    F[c, e] += d[c] * D[e]
         if dim == 2:
             cosine, sine = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
             size = np.sqrt(cosine * cosine + sine * sine)

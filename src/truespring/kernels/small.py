@@ -308,3 +308,29 @@ def _take_symmetric(blocks, p, m, zero):
         blocks[unsigned(p), 2, 2] -= m[5]
 
     return {2: two, 3: three}[len(zero)]
+
+
+def write_symmetric(blocks, p, m, zero):
+    """Write the symmetric matrix of upper half -m to block p."""
+
+
+@overload(write_symmetric)
+def _write_symmetric(blocks, p, m, zero):
+    def two(blocks, p, m, zero):
+        blocks[unsigned(p), 0, 0] = -m[0]
+        blocks[unsigned(p), 0, 1] = -m[1]
+        blocks[unsigned(p), 1, 0] = -m[1]
+        blocks[unsigned(p), 1, 1] = -m[2]
+
+    def three(blocks, p, m, zero):
+        blocks[unsigned(p), 0, 0] = -m[0]
+        blocks[unsigned(p), 0, 1] = -m[1]
+        blocks[unsigned(p), 0, 2] = -m[2]
+        blocks[unsigned(p), 1, 0] = -m[1]
+        blocks[unsigned(p), 1, 1] = -m[3]
+        blocks[unsigned(p), 1, 2] = -m[4]
+        blocks[unsigned(p), 2, 0] = -m[2]
+        blocks[unsigned(p), 2, 1] = -m[4]
+        blocks[unsigned(p), 2, 2] = -m[5]
+
+    return {2: two, 3: three}[len(zero)]

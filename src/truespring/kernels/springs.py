@@ -15,6 +15,7 @@ from truespring.kernels.small import (
     scaled,
     take_symmetric,
     unsigned,
+    write_symmetric,
 )
 from truespring.kernels.threads import kernel
 
@@ -114,19 +115,27 @@ def hessian(
     sideways: Any,
     starts: Any,
     slots: Any,
+    alone: bool,
     data: Any,
     zero: Any,
 ) -> None:
-    """Write the rows first to last: every block is added to by its own row only."""
+    """Write the rows first to last: every block is added to by its own row only.
+
+    Where each block beside the diagonal is that of one spring `alone`, it is written at once.
+    """
     for i in range(first, last):
-        for p in range(starts[i], starts[i + 1]):
-            data[p] = 0.0
+        if not alone:
+            for p in range(starts[i], starts[i + 1]):
+                data[p] = 0.0
         here, whole, own = row(x, i, zero), nothing(zero), starts[i]
         for q in range(at_starts[i], at_starts[i + 1]):
             end = unsigned(at[unsigned(q)])
             s, a = end >> ONE, end & ONE
             block = along_and_across(lengthwise[s], sideways[s], minus(row(x, springs[s, ONE - a], zero), here))
-            take_symmetric(data, slots[s, a, ONE - a], block, zero)
+            if alone:
+                write_symmetric(data, slots[s, a, ONE - a], block, zero)
+            else:
+                take_symmetric(data, slots[s, a, ONE - a], block, zero)
             whole = minus(whole, block)
             own = slots[s, a, a]
-        take_symmetric(data, own, whole, zero)
+        write_symmetric(data, own, whole, zero)

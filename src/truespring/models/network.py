@@ -157,7 +157,8 @@ class SpringNetwork:
         parts = np.empty(len(self.springs)), np.empty(len(self.springs))
         self._run(springs.stiffen, x, pattern.elements, stiffness, tension, *parts)
         rows = (pattern.elements, pattern.at_starts, pattern.at)
-        places = (pattern.starts, pattern.slots)
+        alone = len(pattern.columns) == len(self.nodes) + 2 * len(self.springs)
+        places = (pattern.starts, pattern.slots, alone)
         run(springs.hessian, len(self.nodes), x, *rows, *parts, *places, values, pattern.zero)
         return pattern.matrix(values)
 

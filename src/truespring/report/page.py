@@ -282,6 +282,7 @@ def _effort(path: Path) -> str | None:
         return None
     parts = [cost.newton, cost.linear, _counted(cost.newton_iterations, "Newton iteration")]
     parts += [_counted(cost.cg_iterations, "CG iteration")] if cost.cg_iterations else []
+    parts += [f"{cost.lanczos_iterations} of Lanczos for stability"] if cost.lanczos_iterations else []
     return "; ".join([", ".join(parts), *cost.notes])
 
 

@@ -135,7 +135,17 @@ class Balance:
 
         centred = np.minimum(np.abs(positions - positions.mean(axis=0)), _LARGEST_STRETCH * self.size)
         rows = (tangent.indptr, tangent.indices, tangent.data)
-        return 8 * _EPS * float(np.sqrt(sum(run(blocks.rounding, len(centred), *rows, centred, self.loading.held))))
+        return (
+            8
+            * _EPS
+            * float(
+                np.sqrt(
+                    sum(
+                        run(blocks.rounding, len(centred), *rows, centred, self.loading.held, (0.0,) * centred.shape[1])
+                    )
+                )
+            )
+        )
 
     def judged(self, state: Equilibrium) -> Found:
         """Add the stability of the tangent to an equilibrium."""
@@ -177,8 +187,9 @@ class Balance:
             self.note(f"{reason}: a factorisation, which would help, does not fit in memory")
             return False
         self.note(f"{reason}: {directly.name} from there on instead of {self.linear.name}")
-        directly.cg_iterations, directly.memory = self.linear.cg_iterations, self.linear.memory
-        directly.factorisations = self.linear.factorisations
+        before = self.linear
+        directly.cg_iterations, directly.lanczos_iterations = before.cg_iterations, before.lanczos_iterations
+        directly.factorisations, directly.memory = before.factorisations, before.memory
         self.linear = directly
         return True
 

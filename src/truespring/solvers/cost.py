@@ -12,6 +12,7 @@ class Cost:
         linear: what solved the linear systems, in words.
         newton_iterations: all of them, those of attempts that were given up included.
         cg_iterations: of conjugate gradients; 0 for a direct solver.
+        lanczos_iterations: of the search for the lowest eigenvalue, which tells of stability; 0 for a direct solver.
         factorisations: of tangents, or how often coarse levels were built.
         memory: the most that factors or coarse levels took [bytes].
         threads: how many the compiled loops may take.
@@ -22,6 +23,7 @@ class Cost:
     linear: str
     newton_iterations: int = 0
     cg_iterations: int = 0
+    lanczos_iterations: int = 0
     factorisations: int = 0
     memory: int = 0
     threads: int = 1

@@ -119,7 +119,7 @@ class Direct:
         chosen = next(filter(present, FACTORISERS)) if name == "direct" else name
         self._library = FACTORISERS[chosen]
         self.name = f"direct ({self._library.title})"
-        self.factorisations, self.cg_iterations, self.memory = 0, 0, 0
+        self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
         self._free = np.flatnonzero(~held.ravel())
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> "Factorisation":

@@ -38,10 +38,11 @@ class Solved(NamedTuple):
 
 def norm(x: Floats) -> float:
     """Return the Euclidean norm of an array of shape (n, k)."""
-    return float(np.sqrt(_scalar_product(x, x)))
+    return float(np.sqrt(scalar_product(x, x)))
 
 
-def _scalar_product(a: Floats, b: Floats) -> float:
+def scalar_product(a: Floats, b: Floats) -> float:
+    """Return a . b, arrays of one shape."""
     from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
@@ -68,7 +69,8 @@ def conjugate_gradients(
 ) -> Solved:
     """Solve A x = right until the residual is `accuracy` of `right` in size, shapes (n, k).
 
-    `product(x, result)` writes A x and returns x . A x; `precondition(r)` returns an approximate solution.
+    `product(x, result)` writes A x and returns x . A x; `precondition(r)` returns an approximate solution,
+    good until it is called again.
     Raises IndefiniteError where the matrix is not positive along a direction that was met, SlowError where the
     iterations do not suffice or the preconditioner is not positive.
     """
@@ -78,7 +80,7 @@ def conjugate_gradients(
     previous = np.inf
     for iteration in range(1, max_iterations + 1):
         z = precondition(r)
-        slope = _scalar_product(r, z)
+        slope = scalar_product(r, z)
         if not slope > 0:
             raise SlowError(x)  # the preconditioner is that of another state, which was not positive
         _turn_towards(z, slope / previous, p)
@@ -112,7 +114,7 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     beside: list[float] = []
     for iteration in range(1, _MOST + 1):
         z = precondition(r)
-        slope = _scalar_product(r, z)
+        slope = scalar_product(r, z)
         if not slope > 0:
             return Lowest(None, iteration)
         share = slope / previous

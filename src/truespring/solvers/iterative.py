@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats
+from truespring.arrays import Bools, Floats, ShortInts
 from truespring.potential import SparseMatrix, rigid_body_modes
 from truespring.solvers.direct import SingularMatrixError
 from truespring.solvers.gradients import IndefiniteError, SlowError, conjugate_gradients, lowest_eigenvalue
-from truespring.solvers.multigrid import Hierarchy, Level, build, condense, empty_level
+from truespring.solvers.multigrid import Hierarchy, Level, Matrix, build, condense, empty_level
 
 # Coarse levels that need more iterations than this for two digits are built anew for the state at hand.
 _STALE = 25
@@ -24,9 +24,10 @@ class Multigrid:
 
     def __init__(self, nodes: Floats, held: Bools) -> None:
         """Take the reference positions [m] and the directions that are held, shape (n_nodes, dim) both."""
-        self.factorisations, self.cg_iterations, self.memory = 0, 0, 0
+        self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
         self._held = np.ascontiguousarray(held)
         self._level: Level | None = None
+        self._columns: ShortInts = np.empty(0, np.int32)
         self._coarse: Hierarchy | None = None
         self._built_at = nodes
         self._scale = 1.0
@@ -37,32 +38,33 @@ class Multigrid:
         from truespring.kernels import multigrid
         from truespring.kernels.threads import run, writable
 
-        level = self._room(matrix)
+        level, tangent = self._room(matrix), Matrix(matrix.indptr, matrix.indices, matrix.data, self._held)
         if self._coarse is None or self._stale:
             self._scale = 2.0 ** -float(np.frexp(np.abs(matrix.data).max())[1])
         if not np.isfinite(self._scale):
             raise SingularMatrixError("the matrix holds values that are not finite")
-        positive = condense(level, matrix.data, self._held, self._scale)
+        positive = condense(level, tangent, self._scale)
         if positive and (self._coarse is None or self._stale):
-            self._build(level, positions)
+            self._build(level, tangent, positions)
         if self._coarse is None:
             raise SingularMatrixError("the matrix is not positive on the directions of a single node")
         turns = np.empty(matrix.data[: len(positions)].shape)
-        around = (level.starts, level.columns, writable(self._built_at), writable(positions), self._held)
-        run(multigrid.rotations, len(positions), *around, turns)
+        around = (matrix.indptr, matrix.indices, writable(self._built_at), writable(positions), self._held)
+        run(multigrid.rotations, len(positions), *around, turns, (0.0,) * positions.shape[1])
         return Preconditioned(self, level, self._coarse, turns, self._scale, positive)
 
     def _room(self, matrix: SparseMatrix) -> Level:
         """The level that tangents are written to, made for their sparsity."""
-        level = self._level
-        if level is None or not (level.columns is matrix.indices or np.array_equal(level.columns, matrix.indices)):
-            self._level = level = empty_level(matrix.indptr, matrix.indices, matrix.blocksize[0], np.float32)
-        return level
+        columns: ShortInts = matrix.indices
+        if self._level is None or (columns is not self._columns and not np.array_equal(columns, self._columns)):
+            self._level = empty_level(matrix.indptr, columns, matrix.blocksize[0], np.float32)
+            self._columns = columns
+        return self._level
 
-    def _build(self, level: Level, positions: Floats) -> None:
+    def _build(self, level: Level, tangent: Matrix, positions: Floats) -> None:
         modes = rigid_body_modes(positions).reshape(*positions.shape, -1)
         modes = np.where(self._held[:, :, None], 0.0, modes)
-        self._coarse = build(level, modes)
+        self._coarse = build(level, tangent, self._scale, modes)
         self._built_at, self._stale = positions, False
         self.factorisations += 1
         self.memory = max(self.memory, self._coarse.n_bytes + level.n_bytes)
@@ -114,7 +116,7 @@ class Preconditioned:
             return 1
         start = np.random.default_rng(5).normal(size=self.turns.shape[:2])
         found = lowest_eigenvalue(self.level.product, self._precondition, np.where(self.solver._held, 0.0, start))
-        self.solver.cg_iterations += found.iterations
+        self.solver.lanczos_iterations += found.iterations
         return None if found.eigenvalue is None else int(found.eigenvalue < 0)
 
     def lowest_mode(self) -> None:

@@ -45,13 +45,14 @@ class LinearSolver(Protocol):
 
     Attributes:
         name: what is used, in words.
-        factorisations, cg_iterations: what was spent so far.
+        factorisations, cg_iterations, lanczos_iterations: what was spent so far.
         memory: the most that factors or coarse levels took [bytes].
     """
 
     name: str
     factorisations: int
     cg_iterations: int
+    lanczos_iterations: int
     memory: int
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:

@@ -8,14 +8,15 @@ level are in single precision, half the memory to move.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, ShortInts, Singles
 from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import norm
+from truespring.solvers.gradients import norm, scalar_product
 
 Real = Floats | Singles
 
@@ -27,8 +28,25 @@ _STRONG = 0.04
 _POWER_ITERATIONS = 10
 # Rows of a product of matrices are made so many at a time; threads share them from so many on.
 _SLICE, _SMALLEST_SLAB = 16_384, 64
+# So many numbers of a matrix are worth another thread.
+_SMALLEST_PIECE = 80_000
 # The largest eigenvalue of D^-1 A is estimated from below.
 _SAFETY = 1.1
+
+
+class Matrix(NamedTuple):
+    """A symmetric matrix of node blocks as it was assembled, and the directions that are kept out of it.
+
+    Attributes:
+        starts, columns: of its rows, columns ascending.
+        data: the blocks, shape (n_blocks, k, k).
+        held: shape (n_nodes, k).
+    """
+
+    starts: ShortInts
+    columns: ShortInts
+    data: Floats
+    held: Bools
 
 
 @dataclass(eq=False)
@@ -37,8 +55,7 @@ class Level:
 
     starts: ShortInts
     columns: ShortInts
-    diagonal: ShortInts
-    off: Real
+    lower: Real
     rest: Floats
     inverse: Real
 
@@ -50,7 +67,19 @@ class Level:
     @property
     def n_bytes(self) -> int:
         """Memory taken [bytes]."""
-        return sum(array.nbytes for array in (self.columns, self.off, self.rest, self.inverse))
+        return sum(array.nbytes for array in (self.columns, self.lower, self.rest, self.inverse))
+
+    @property
+    def smallest(self) -> int:
+        """The fewest rows that are worth another thread."""
+        return _worth(len(self.rest), self.lower.size)
+
+    @property
+    def bounds(self) -> ShortInts:
+        """Where the rows of each thread begin, and their number."""
+        from truespring.kernels.threads import pieces
+
+        return np.array([0, *(last for _, last in pieces(len(self.rest), self.smallest))], dtype=np.int32)
 
     def product(self, x: Floats, result: Floats) -> float:
         """Write A x to `result`, shape (n, k) both, and return x . A x."""
@@ -58,9 +87,15 @@ class Level:
         from truespring.kernels.threads import run
 
         n, size = self.shape
-        return float(
-            sum(run(blocks.product, n, self.starts, self.columns, self.off, self.rest, x, result, (0.0,) * size))
-        )
+        zero, matrix = (0.0,) * size, (self.starts, self.columns, self.lower)
+        run(blocks.product, n, *matrix, self.rest, x, result, zero, smallest=self.smallest)
+        blocks.product_across(self.bounds, *matrix, x, result, zero)
+        return scalar_product(x, result)
+
+
+def _worth(n: int, size: int) -> int:
+    """How many of n rows have the fewest numbers of a matrix of this size that are worth another thread."""
+    return max(1, n * _SMALLEST_PIECE // max(size, 1))
 
 
 def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: type[np.floating[Any]]) -> Level:
@@ -69,21 +104,24 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     from truespring.kernels.threads import run
 
     n = len(starts) - 1
-    diagonal = np.full(n, -1, np.int32)
-    run(blocks.find_diagonal, n, starts, columns, diagonal)
-    if (diagonal < 0).any():
-        raise SingularMatrixError(f"the matrix has nothing on the diagonal of node {int(diagonal.argmin())}")
-    off = np.empty((len(columns), size, size), precision)
-    return Level(starts, columns, diagonal, off, np.empty((n, size, size)), np.empty((n, size, size), precision))
+    counts = np.empty(n, np.int32)
+    run(blocks.count_lower, n, starts, columns, counts)
+    if (counts < 0).any():
+        raise SingularMatrixError(f"the matrix has nothing on the diagonal of node {int(counts.argmin())}")
+    lower_starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    lower_columns = np.empty(lower_starts[-1], np.int32)
+    run(blocks.take_lower, n, starts, columns, lower_starts, lower_columns)
+    lower = np.empty((len(lower_columns), size, size), precision)
+    return Level(lower_starts, lower_columns, lower, np.empty((n, size, size)), np.empty((n, size, size), precision))
 
 
-def condense(level: Level, data: Floats, held: Bools, scale: float) -> bool:
-    """Fill a level with values of shape (n_blocks, k, k); tell whether every block of the diagonal is positive."""
+def condense(level: Level, matrix: Matrix, scale: float) -> bool:
+    """Fill a level with a matrix times `scale`; tell whether every block of the diagonal is positive."""
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
 
-    given = (level.starts, level.columns, level.diagonal, data, held, scale, level.off, level.rest, level.inverse)
-    return not any(run(blocks.condense, len(level.rest), *given))
+    room = (level.starts, level.lower, level.rest, level.inverse, (0.0,) * level.shape[1])
+    return not any(run(blocks.condense, len(level.rest), *matrix, scale, *room))
 
 
 @dataclass(eq=False)
@@ -117,6 +155,12 @@ class Hierarchy:
     levels: list[Level]
     inverse: Floats
 
+    @cached_property
+    def _room(self) -> list[tuple[Floats, Floats]]:
+        """For two vectors of each level: to get it anew for every cycle takes longer than many a loop."""
+        shapes = [(len(transfer.starts) - 1, transfer.data.shape[1]) for transfer in self.transfers]
+        return [(np.empty(shape), np.empty(shape)) for shape in shapes]
+
     @property
     def n_bytes(self) -> int:
         """Memory taken [bytes]."""
@@ -124,7 +168,10 @@ class Hierarchy:
         return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
 
     def cycle(self, finest: Level, turns: Floats, residual: Floats) -> Floats:
-        """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim)."""
+        """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim).
+
+        It is good until the next cycle.
+        """
         return self._cycle(0, finest, residual, turns)
 
     def _cycle(self, depth: int, level: Level, r: Floats, turns: Floats | None) -> Floats:
@@ -136,11 +183,11 @@ class Hierarchy:
             blocks.dense(0, r.size, self.inverse, r.ravel(), solution)
             return solution.reshape(r.shape)
         n, size = level.shape
-        zero = (0.0,) * size
-        matrix = (level.starts, level.columns, level.diagonal, level.off)
-        z, left = np.empty_like(r), np.empty_like(r)
-        run(blocks.sweep_forward, n, *matrix, level.inverse, r, z, zero)
-        run(blocks.left_over, n, *matrix, z, left, zero)
+        zero, smallest, bounds = (0.0,) * size, level.smallest, level.bounds
+        matrix = (level.starts, level.columns, level.lower)
+        z, left = self._room[depth]
+        run(blocks.sweep_forward, n, *matrix, level.inverse, r, z, left, zero, smallest=smallest)
+        blocks.subtract_across(bounds, *matrix, z, left, zero)
         if turns is not None:
             run(multigrid.turn_back, n, turns, left, zero)
         transfer = self.transfers[depth]
@@ -148,30 +195,37 @@ class Hierarchy:
         modes = (0.0,) * n_modes
         coarse = np.empty((n_coarse, n_modes))
         by_column = (transfer.column_starts, transfer.node, transfer.column_data)
-        run(multigrid.restrict, n_coarse, *by_column, left, coarse, modes, zero)
+        share = _worth(n_coarse, transfer.data.size)
+        run(multigrid.restrict, n_coarse, *by_column, left, coarse, modes, zero, smallest=share)
         coarser = self.levels[depth] if depth < len(self.levels) else level
         correction = self._cycle(depth + 1, coarser, coarse, None)
         by_row = (transfer.starts, transfer.columns, transfer.data)
+        share = _worth(n, transfer.data.size)
         if turns is None:
-            run(multigrid.prolong, n, *by_row, correction, z, modes, zero)
+            run(multigrid.prolong, n, *by_row, correction, z, modes, zero, smallest=share)
         else:
-            left[:] = 0
-            run(multigrid.prolong, n, *by_row, correction, left, modes, zero)
-            run(multigrid.add_turned, n, turns, left, z, zero)
-        run(blocks.sweep_backward, n, *matrix, level.inverse, r, z.copy(), z, zero)
+            run(multigrid.prolong_turned, n, *by_row, turns, correction, z, modes, zero, smallest=share)
+        left[:] = r
+        blocks.subtract_across(bounds, *matrix, z, left, zero)
+        run(blocks.sweep_backward, n, *matrix, level.inverse, left, z, zero, smallest=smallest)
         return z
 
 
-def build(finest: Level, modes: Floats) -> Hierarchy:
-    """Return the coarser levels of a matrix with near-kernel `modes` of shape (n, k, n_modes)."""
+def build(finest: Level, matrix: Matrix, scale: float, modes: Floats) -> Hierarchy:
+    """Return the coarser levels of a matrix times `scale` with near-kernel `modes` of shape (n, k, n_modes).
+
+    `finest` is that matrix, condensed; modes are zero in directions that are held.
+    """
     transfers: list[Transfer] = []
     levels: list[Level] = []
     level = finest
     while level.shape[0] * level.shape[1] > _COARSEST and len(transfers) < _MAX_LEVELS:
-        coarsened = _coarsen(level, modes)
+        coarsened = _coarsen(level, matrix, scale, modes)
         if coarsened is None:
             break
-        transfer, modes, level = coarsened
+        transfer, modes, matrix = coarsened
+        level, scale = empty_level(matrix.starts, matrix.columns, modes.shape[2], np.float64), 1.0
+        condense(level, matrix, scale)
         transfers.append(transfer)
         levels.append(level)
     return Hierarchy(transfers, levels[:-1], _inverse(level))
@@ -192,14 +246,14 @@ def _inverse(level: Level) -> Floats:
     return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
 
 
-def _coarsen(level: Level, modes: Floats) -> tuple[Transfer, Floats, Level] | None:
+def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple[Transfer, Floats, Matrix] | None:
     """Return the prolongation, the coarse modes and the coarse matrix; None where nothing is gained."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
     n = level.shape[0]
     n_modes = modes.shape[2]
-    aggregate, n_coarse = _aggregates(level)
+    aggregate, n_coarse = _aggregates(matrix)
     if not 0 < n_coarse < n:
         return None
     members = np.argsort(aggregate, kind="stable").astype(np.int32)
@@ -207,30 +261,29 @@ def _coarsen(level: Level, modes: Floats) -> tuple[Transfer, Floats, Level] | No
     basis, coarse_modes = np.zeros(modes.shape), np.zeros((n_coarse, n_modes, n_modes))
     run(multigrid.tentative, n_coarse, member_starts, members, modes, basis, coarse_modes)
 
-    omega = 4 / 3 / _largest_eigenvalue(level)
-    transfer = _smoothed(level, aggregate, basis, n_coarse, omega)
-    coarse_data, starts, columns = _galerkin(level, transfer, n_coarse)
-    coarse = empty_level(starts, columns, n_modes, np.float64)
-    # Modes that an aggregate does not know leave rows of zeros: ones on the diagonal keep them out.
+    omega = scale * 4 / 3 / _largest_eigenvalue(level)
+    transfer = _smoothed(level, matrix, aggregate, basis, n_coarse, omega)
+    # Modes that an aggregate does not know leave rows of zeros: they are held.
     unknown = coarse_modes[:, np.arange(n_modes), np.arange(n_modes)] == 0
-    condense(coarse, coarse_data, unknown, 1.0)
-    return transfer, coarse_modes, coarse
+    starts, columns, data = _galerkin(matrix, transfer, n_coarse)
+    data *= scale
+    return transfer, coarse_modes, Matrix(starts, columns, data, unknown)
 
 
-def _aggregates(level: Level) -> tuple[ShortInts, int]:
+def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:
     """The aggregate of each node, -1 where it stands alone, and their number."""
     from pyamg.aggregation import standard_aggregation
 
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
-    n = level.shape[0]
-    keep, sizes = np.zeros(len(level.columns), bool), np.empty(n)
-    run(multigrid.diagonal_sizes, n, level.starts, level.off, level.rest, sizes)
-    run(multigrid.strong, n, level.starts, level.columns, level.off, sizes, _STRONG, keep)
-    counts = np.add.reduceat(keep, level.starts[:-1], dtype=np.int32)
+    n = len(matrix.held)
+    keep, sizes = np.zeros(len(matrix.columns), bool), np.empty(n)
+    run(multigrid.diagonal_sizes, n, *matrix, sizes)
+    run(multigrid.strong, n, *matrix, sizes, _STRONG, keep)
+    counts = np.add.reduceat(keep, matrix.starts[:-1], dtype=np.int32)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    graph = sparse.csr_array((np.ones(starts[-1], np.int8), level.columns[keep], starts), shape=(n, n))
+    graph = sparse.csr_array((np.ones(starts[-1], np.int8), matrix.columns[keep], starts), shape=(n, n))
     joined = sparse.csr_array(standard_aggregation(graph)[0])
     aggregate = np.full(n, -1, np.int32)
     aggregate[np.diff(joined.indptr) > 0] = joined.indices
@@ -247,46 +300,35 @@ def _largest_eigenvalue(level: Level) -> float:
     value = 1.0
     for _ in range(_POWER_ITERATIONS):
         level.product(x, image := np.empty_like(x))
-        smoothed = np.zeros_like(x)
-        run(multigrid.add_turned, n, level.inverse, image, smoothed, (0.0,) * size)
+        run(multigrid.smoothed, n, level.inverse, image, smoothed := np.empty_like(x), (0.0,) * size)
         grown = norm(smoothed)
         value, x = grown / norm(x), smoothed / grown
     return _SAFETY * value
 
 
-def _smoothed(level: Level, aggregate: ShortInts, basis: Floats, n_coarse: int, omega: float) -> Transfer:
+def _smoothed(
+    level: Level, matrix: Matrix, aggregate: ShortInts, basis: Floats, n_coarse: int, omega: float
+) -> Transfer:
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
     n, size = level.shape
     counts = np.zeros(n, np.int32)
-    run(multigrid.count_smoothed, n, level.starts, level.columns, aggregate, n_coarse, counts)
+    run(multigrid.count_smoothed, n, matrix.starts, matrix.columns, aggregate, n_coarse, counts)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     columns = np.empty(starts[-1], np.int32)
     values = np.empty((starts[-1], size, basis.shape[2]), np.float32)
-    matrix = (level.starts, level.columns, level.off, level.rest, level.inverse)
-    run(
-        multigrid.smooth,
-        n,
-        *matrix,
-        aggregate,
-        basis,
-        n_coarse,
-        omega,
-        starts,
-        columns,
-        values,
-        (0.0,) * basis.shape[2],
-    )
+    known = (*matrix, level.inverse, aggregate, basis, n_coarse, omega)
+    run(multigrid.smooth, n, *known, starts, columns, values, (0.0,) * basis.shape[2])
     return Transfer(starts, columns, values, *multigrid.transpose(starts, columns, values, n_coarse))
 
 
-def _galerkin(level: Level, transfer: Transfer, n_coarse: int) -> tuple[Floats, ShortInts, ShortInts]:
-    """P^T A P: values of shape (n_blocks, modes, modes), starts, columns."""
+def _galerkin(matrix: Matrix, transfer: Transfer, n_coarse: int) -> tuple[ShortInts, ShortInts, Floats]:
+    """P^T A P: starts, columns, values of shape (n_blocks, modes, modes)."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
-    n, size = level.shape
+    n, size = matrix.held.shape
     n_modes = transfer.data.shape[2]
 
     def pattern(n_rows: int, *factors: ShortInts) -> tuple[ShortInts, ShortInts]:
@@ -297,10 +339,10 @@ def _galerkin(level: Level, transfer: Transfer, n_coarse: int) -> tuple[Floats, 
         run(multigrid.fill_product, n_rows, *factors, n_coarse, starts, columns)
         return starts, columns
 
-    ap_starts, ap_columns = pattern(n, level.starts, level.columns, transfer.starts, transfer.columns)
+    ap_starts, ap_columns = pattern(n, matrix.starts, matrix.columns, transfer.starts, transfer.columns)
     starts, columns = pattern(n_coarse, transfer.column_starts, transfer.node, ap_starts, ap_columns)
     data = np.zeros((len(columns), n_modes, n_modes))
-    a, p = (level.starts, level.columns, level.off, level.rest), (transfer.starts, transfer.columns, transfer.data)
+    a, p = (matrix.starts, matrix.columns, matrix.data), (transfer.starts, transfer.columns, transfer.data)
     modes = (0.0,) * n_modes
     for begin in range(0, n, _SLICE):  # A P is larger than A itself: a slice of it at a time
         end = min(begin + _SLICE, n)
@@ -311,4 +353,4 @@ def _galerkin(level: Level, transfer: Transfer, n_coarse: int) -> tuple[Floats, 
             low, n_reached = int(reached.min()), int(np.ptp(reached)) + 1
             to = (*p, *ap, starts, columns, data, modes)
             run(multigrid.add_transposed, n_reached, low, begin, end, *to, smallest=_SMALLEST_SLAB)
-    return data, starts, columns
+    return starts, columns, data

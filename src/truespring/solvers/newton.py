@@ -109,6 +109,7 @@ class Newton:
                 linear=balance.linear.name,
                 newton_iterations=balance.spent,
                 cg_iterations=balance.linear.cg_iterations,
+                lanczos_iterations=balance.linear.lanczos_iterations,
                 factorisations=balance.linear.factorisations,
                 memory=balance.linear.memory,
                 threads=n_threads(),
