@@ -257,7 +257,7 @@ def stepped(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
 ) -> Floats | None:
     """Return the solution of a tangent that is positive; None where it is not."""
-    if not np.isfinite(tangent.data).all():
+    if not np.isfinite(tangent.data.sum()):
         return None
     try:
         step = _solved(balance, tangent, positions, right, accuracy)

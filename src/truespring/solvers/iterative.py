@@ -40,7 +40,7 @@ class Multigrid:
 
         level, tangent = self._room(matrix), Matrix(matrix.indptr, matrix.indices, matrix.data, self._held)
         if self._coarse is None or self._stale:
-            self._scale = 2.0 ** -float(np.frexp(np.abs(matrix.data).max())[1])
+            self._scale = 2.0 ** -float(np.frexp(max(matrix.data.max(), -matrix.data.min()))[1])
         if not np.isfinite(self._scale):
             raise SingularMatrixError("the matrix holds values that are not finite")
         positive = condense(level, tangent, self._scale)

@@ -43,12 +43,14 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
             break
         tangent = balance.hessian(positions)
         if watch.balanced(tangent, positions):
+            del tangent  # the next one takes its room
             return watch.equilibrium()
         if undamped_iterations or watch.drowned:
             moved = _leap(balance, positions, tangent, watch.force)
         else:
             step = _step(balance, positions, tangent, watch.force, watch.residual)
             moved = step and _search(balance, load_factor, positions, step)
+        del tangent
         if moved is None:
             break
         positions = moved

@@ -60,8 +60,10 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
             break
         tangent = balance.hessian(positions, stress)
         if motion is None and watch.balanced(tangent, positions):
+            del tangent  # the next one takes its room
             return watch.equilibrium()
         step = _step(balance, positions, tangent, watch, motion)
+        del tangent
         if step is None:
             break
         moved = _moved(balance, positions, step, 0 if motion is not None else _MAX_HALVINGS)
