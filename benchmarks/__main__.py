@@ -26,10 +26,9 @@ def measured(small: bool) -> dict:
         "limit_seconds": runs.LIMIT,
         "bandwidth": limits,
         "kernels": [
-            row
+            runs.kernels(dim, depth)
             for dim in sizes
             for depth in sorted({min(REFERENCE[dim], sizes[dim][-1]), sizes[dim][-1]})
-            for row in runs.kernels(dim, depth)
         ],
         "command_line": runs.command_line(),
         "runs": [asdict(one) for one in found],

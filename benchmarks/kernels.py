@@ -5,8 +5,12 @@ python -m benchmarks.kernels CASE.npz RULE prints them, and without a case the b
 
 import json
 import sys
+import time
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +19,7 @@ from benchmarks.cases import Case
 from benchmarks.limits import Kernel, Moved, bandwidth, measure
 from benchmarks.programs.common import TOLERANCE
 from benchmarks.programs.truespring import problem_of
+from truespring.kernels import threads
 from truespring.solvers.iterative import Multigrid, Preconditioned
 from truespring.solvers.multigrid import Hierarchy, Level
 
@@ -53,12 +58,35 @@ def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
     return matrices + sum(transfer.n_bytes for transfer in coarse.transfers) + coarse.inverse.nbytes
 
 
-def measured(case: Case, rule: str) -> list[Moved]:
-    """Return the kernels at the equilibrium of a case, and the whole solve."""
+@contextmanager
+def profile() -> Iterator[Counter[str]]:
+    """Count the seconds that each kernel takes, the hand-over to threads included."""
+    taken: Counter[str] = Counter()
+    run = threads.run
+
+    def timed(function: Any, *arguments: Any, **options: Any) -> list[Any]:
+        started = time.perf_counter()
+        found = run(function, *arguments, **options)
+        module = function.__module__.rpartition(".")[2] if hasattr(function, "py_func") else "assembly"
+        taken[f"{module}: {function.__name__.replace('_', ' ')}"] += time.perf_counter() - started
+        return found
+
+    threads.run = timed
+    try:
+        yield taken
+    finally:
+        threads.run = run
+
+
+def measured(case: Case, rule: str) -> tuple[list[Moved], Counter[str]]:
+    """Return the kernels at the equilibrium of a case and the whole solve, and where its time goes."""
     problem = problem_of(case)
     model, newton = ts.Springs(rule), ts.Newton(load_steps=1, tolerance=TOLERANCE, linear="multigrid")
     ts.solve(problem, model, newton)
     path = ts.solve(problem, model, newton)
+    with profile() as shares:
+        again = ts.solve(problem, model, newton)
+    shares["all else: small loops, NumPy, Python"] = again.seconds - shares.total()
     positions = path.states[-1].positions
     solver = Multigrid(path.potential.nodes, problem.loading.held)
     ready = solver.ready(path.potential.hessian(positions), positions)
@@ -66,7 +94,7 @@ def measured(case: Case, rule: str) -> list[Moved]:
     assembly, product, cycle = (one.bytes_moved for one in found)
     step = product + cycle + _VECTORS * positions.nbytes
     whole = path.newton_iterations * assembly + (path.cost.cg_iterations + path.cost.lanczos_iterations) * step
-    return [*found, Moved("whole solve", path.seconds, whole)]
+    return [*found, Moved("whole solve", path.seconds, whole)], shares
 
 
 def main() -> None:
@@ -74,7 +102,8 @@ def main() -> None:
     if len(sys.argv) == 1:
         found = bandwidth()
     else:
-        found = [asdict(one) for one in measured(Case.read(sys.argv[1]), sys.argv[2])]
+        rows, shares = measured(Case.read(sys.argv[1]), sys.argv[2])
+        found = {"rows": [asdict(row) for row in rows], "shares": dict(shares.most_common())}
     sys.stdout.write(json.dumps(found) + "\n")
 
 

@@ -20,6 +20,9 @@ _SOLVERS = {
     "skfem": "plain Newton, MKL Pardiso; residual to 1e-8 of the load",
 }
 
+# Of a solve's time, for a kernel to have a row of its own.
+_LEAST_SHARE = 0.03
+
 
 def build(results_file: Path, folder: Path) -> str:
     """Write performance.md and performance.svg to `folder`; return the text."""
@@ -243,13 +246,29 @@ def _limit(results: dict) -> Iterator[str]:
         "and write once, at the largest of these bandwidths. Below 1 what is moved fits into a cache.\n"
     )
     rows = []
-    for row in results["kernels"]:
-        moved = Moved(row["name"], row["seconds"], row["bytes_moved"])
-        where = f"{row['dim']}D, {row['n_nodes']:,} nodes: {moved.name}"
-        megabytes, least = moved.bytes_moved / 1e6, 1e3 * moved.bytes_moved / limit
-        times = f"{moved.over(limit):.1f}"
-        rows.append((where, f"{megabytes:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}", times))
+    for one in results["kernels"]:
+        for row in one["rows"]:
+            moved = Moved(row["name"], row["seconds"], row["bytes_moved"])
+            least = 1e3 * moved.bytes_moved / limit
+            numbers = f"{moved.bytes_moved / 1e6:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}"
+            rows.append((f"{_where(one)}: {moved.name}", *numbers, f"{moved.over(limit):.1f}"))
     yield from table(("", "MB", "ms", "limit, ms", "times the limit"), rows)
+    yield "Where the time of a whole solve goes, each share with what it takes to hand work to the threads:\n"
+    shares = [
+        {name: value / sum(one["shares"].values()) for name, value in one["shares"].items()}
+        for one in results["kernels"]
+    ]
+    names = sorted({name for one in shares for name in one}, key=lambda name: -sum(one.get(name, 0) for one in shares))
+    large = [name for name in names if max(one.get(name, 0) for one in shares) >= _LEAST_SHARE]
+    rows = [(name, *(f"{one.get(name, 0):.0%}" for one in shares)) for name in large]
+    rest = (f"{1 - sum(one.get(name, 0) for name in large):.0%}" for one in shares)
+    yield from table(
+        ("", *map(_where, results["kernels"])), [*rows, (f"{len(names) - len(large)} smaller ones", *rest)]
+    )
+
+
+def _where(one: dict) -> str:
+    return f"{one['dim']}D, {one['n_nodes']:,} nodes"
 
 
 def _accuracy(runs: list[Measured]) -> Iterator[str]:
@@ -292,10 +311,17 @@ def _reached(found: errors.Accuracy) -> Iterator[str]:
 def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
     yield "## Figures aimed at\n"
     rows = []
+    reasons = {}
     for aim in aims.aims(results, runs):
+        if aim.verdict.startswith("missed") and aim.why:
+            reasons[aim.what] = aim.why
         measured = "" if aim.measured is None else f"{aim.measured:.3g}"
         rows.append((aim.what, f"{'at least' if aim.at_least else 'at most'} {aim.wanted:g}", measured, aim.verdict))
     yield from table(("springs, bent by half the length", "wanted", "measured", ""), rows, words=(0, 3))
+    if reasons:
+        yield "Why:\n"
+        yield from (f"* {what}: {why}" for what, why in reasons.items())
+        yield ""
 
 
 def _recorded(recorded: dict) -> Iterator[str]:

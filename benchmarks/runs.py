@@ -224,14 +224,14 @@ def bandwidth() -> dict[str, float]:
     return json.loads(done.stdout)
 
 
-def kernels(dim: int, depth: int) -> list[dict[str, Any]]:
-    """Return the kernels of springs on the bent body, see `kernels.measured`; none if that failed."""
+def kernels(dim: int, depth: int) -> dict[str, Any]:
+    """Return the kernels of springs on the bent body, see `kernels.measured`; no rows if that failed."""
     rule = SPRINGS[dim]
     job = Job(rule, dim, "bending", depth)
     found = cached(
         f"kernels-{dim}d-{depth}", fingerprint(rule), lambda: in_process("kernels", job, PROGRAMS[rule].arguments)
     )
-    return [{"dim": dim, "n_nodes": job.n_nodes, **row} for row in found] if isinstance(found, list) else []
+    return {"dim": dim, "n_nodes": job.n_nodes, "rows": [], "shares": {}, **found}
 
 
 def python(peer: bool) -> str:
