@@ -20,8 +20,8 @@ from benchmarks.limits import Kernel, Moved, bandwidth, measure
 from benchmarks.programs.common import TOLERANCE
 from benchmarks.programs.truespring import problem_of
 from truespring.kernels import threads
-from truespring.solvers.iterative import Multigrid, Preconditioned
-from truespring.solvers.multigrid import Hierarchy, Level
+from truespring.linear.iterative import Multigrid, Preconditioned
+from truespring.linear.multigrid import Hierarchy, Level
 
 # How much of a copy of the vectors conjugate gradients read and write an iteration beside product and preconditioner:
 # x, r, p, q read and x, r, p written, and to and from single precision.
