@@ -15,6 +15,7 @@ import numpy as np
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
+from docs.loads_and_paths import ROWS  # noqa: E402
 from tests.closed_forms import bending_factor, elastica_tip, lattice_tension, principal_state  # noqa: E402
 from tests.test_fem import TRUE_DEFLECTION  # noqa: E402
 from tests.test_moduli import JITTERED, pulled_modulus, triangulated  # noqa: E402
@@ -298,6 +299,13 @@ def locking() -> Iterator[Row]:
             yield Row(what, tip / (1e-7 * 4**3 / 3 * 12), limit, source)
 
 
+def loads_and_paths() -> Iterator[Row]:
+    """Loads that follow, limit points, buckling."""
+    for make in ROWS:
+        for found in make():
+            yield Row(*found)
+
+
 def shipped_studies() -> str:
     """What the shipped studies show: among it the two findings of Lembryk and Ciszkiewicz."""
     lines = ["| study | springs | reference | error at the probe | rms error | largest error |"]
@@ -343,6 +351,7 @@ largest nodal distance over largest displacement, or distance at the tip over it
 | the same, stretching, tip | 1e-4 and 5e-5 |
 | spring lattices (SPRINGA), plane and in space, bending, stretching, prescribed motion | 1e-6 |
 | hexahedra (C3D8), tetrahedra (C3D4, C3D10), linear and NLGEOM, bending, tension, torsion, rms | 1e-6 |
+| pressure that follows, gravity, traction, twisted ends, linear and NLGEOM, plane strain and in space | 1e-3 |
 """
 
 
@@ -354,6 +363,7 @@ def page() -> str:
         ("Springs", (two_springs, uniform_tension, moduli, lattices, irregular, elastica)),
         ("Any Poisson's ratio", (volume_terms, biquadratic_springs)),
         ("Where springs are wrong, and the moduli say so", (cook_springs,)),
+        ("Loads, and paths past limit points", (loads_and_paths,)),
         ("Finite elements", (cook, locking)),
     ):
         table = ["| what | truespring | reference | apart | source |", "|---|---|---|---|---|"]

@@ -6,7 +6,8 @@ CalculiX is a finite element program of its own (Dhondt and Wittig, https://www.
 import os
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ import pytest
 
 import truespring as ts
 from truespring.arrays import Floats
+from truespring.loading import nodal_force
+from truespring.mesh import facets_within, select
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import Loading
 
@@ -29,6 +32,7 @@ _FORCE_UNIT = 1e-6
 def continuum_deck(problem: ts.Problem, increments: int | None, element: str = "linear") -> str:
     """Write the elements of first order CPS4 or CPE4 by the section, C3D8, C3D4, or the quadratic C3D10.
 
+    Pressure and gravity are CalculiX's own, other loads come as forces on nodes.
     With `increments` equal load increments NLGEOM makes `*ELASTIC` the St. Venant-Kirchhoff law; None solves linearly.
     """
     assert problem.material is not None and problem.section is not None
@@ -50,7 +54,39 @@ def continuum_deck(problem: ts.Problem, increments: int | None, element: str = "
         "*SOLID SECTION, ELSET=BODY, MATERIAL=M",
         *([_real(problem.section.thickness)] if problem.mesh.dim == 2 else []),
     ]
-    return _deck(nodes, loading, lines, increments)
+    if problem.material.density:
+        place = lines.index("*SOLID SECTION, ELSET=BODY, MATERIAL=M")
+        lines[place:place] = ["*DENSITY", _real(problem.material.density / _FORCE_UNIT)]
+    own = list(_own_loads(problem))
+    weight = nodal_force(
+        (load.spread(problem.body) for load in problem.loads if isinstance(load, ts.Gravity)), nodes.shape
+    )
+    rest = replace(loading, external_force=loading.external_force - weight, following=())
+    return _deck(nodes, rest, lines, increments, own)
+
+
+# Corners of CalculiX's faces, in its order, from 0.
+_FACES = {
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
+
+
+def _own_loads(problem: ts.Problem) -> Iterator[str]:
+    """Pressure on faces, which follows them under NLGEOM, and gravity."""
+    mesh = problem.mesh
+    for load in problem.loads:
+        if isinstance(load, ts.Gravity):
+            size = float(np.linalg.norm(load.acceleration))
+            direction = [*(np.array(load.acceleration) / size), 0.0][:3]
+            yield f"BODY, GRAV, {_real(size)}, {_joined(map(_real, direction))}"
+        elif isinstance(load, ts.Pressure):
+            pressed = {tuple(sorted(facet)) for facet in facets_within(mesh, select(mesh, load.on)).tolist()}
+            for number, corners in enumerate(mesh.elements.tolist(), 1):
+                for face, local in enumerate(_FACES[mesh.element], 1):
+                    if tuple(sorted(corners[place] for place in local)) in pressed:
+                        yield f"{number}, P{face}, {_real(load.pressure / _FORCE_UNIT)}"
 
 
 def spring_deck(problem: ts.Problem, network: ts.SpringNetwork, increments: int) -> str:
@@ -85,7 +121,10 @@ def displacement(deck: str, folder: Path) -> Floats:
     return _last_block(printed.read_text())
 
 
-def _deck(nodes: Floats, loading: Loading, model: list[str], increments: int | None) -> str:
+def _deck(
+    nodes: Floats, loading: Loading, model: list[str], increments: int | None, own_loads: Sequence[str] = ()
+) -> str:
+    motion = loading.motion()
     return "\n".join(
         [
             "*NODE, NSET=NALL",
@@ -95,10 +134,11 @@ def _deck(nodes: Floats, loading: Loading, model: list[str], increments: int | N
             *(["*STATIC"] if increments is None else [_CONTROLS, "*STATIC, DIRECT", f"{_real(1 / increments)}, 1."]),
             "*BOUNDARY",
             *(
-                f"{node + 1}, {axis + 1}, {axis + 1}, {_real(loading.displacement[node, axis])}"
+                f"{node + 1}, {axis + 1}, {axis + 1}, {_real(motion[node, axis])}"
                 for node, axis in np.argwhere(loading.held)
             ),
             *_loads(loading.external_force),
+            *(["*DLOAD", *own_loads] if own_loads else []),
             f"*NODE PRINT, NSET=NALL, FREQUENCY={increments or 1}",
             "U",
             "*END STEP",

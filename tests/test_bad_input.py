@@ -9,6 +9,10 @@ from truespring.cli import main
 
 STL = '[models.other]\nkind = "stl"\nfile = "other.stl"\n\n[compare]'
 
+RECTANGLE = '[mesh]\nshape = "rectangle"\nsize = ["40 mm", "10 mm"]\nelements = [8, 2]\n'
+ON, FORCE = 'on = "right"\n', 'force = ["0 N", "-0.01 N"]\n'
+TURNED = '[[support]]\non = "right"\nabout = ["0 mm", "0 mm"]\n\n[solver]'
+
 # What is changed in a good study, and what the message must name: the key, the value or what is allowed.
 BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "not TOML": (("[mesh]", "[mesh"), ("TOML", "line 3")),
@@ -98,7 +102,7 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
     "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
-    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, stl")),
+    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, network, stl")),
     "decimal comma": (('["0 N", "-0.01 N"]', '["0 N", "-0,01 N"]'), ("load.1.force.2", "-0,01 N", "comma")),
     "blank in a number": (('["0 N", "-0.01 N"]', '["0 N", "1 000 N"]'), ("load.1.force.2", "1 000 N")),
     "arithmetic in a number": (('["0 N", "-0.01 N"]', '["0 N", "9**9**9 N"]'), ("load.1.force.2", "9**9**9 N")),
@@ -128,6 +132,30 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "reference is the model": (("[compare]", '[compare]\nreferences = ["springs"]'), ("compare.references", "itself")),
     "tolerance zero": (("[compare]", "[compare]\ntolerance = 0.0"), ("compare.tolerance", "0")),
     "STL missing": (("[compare]", STL), ("models.other", "other.stl")),
+    "no material": (('[material]\nyoung = "10 kPa"\npoisson = 0.3\n', ""), ("material", "required and missing")),
+    "load without a kind": ((FORCE, ""), ("load.1", "nothing is given", "force, traction, pressure")),
+    "two loads in one": ((FORCE, f'{FORCE}pressure = "1 Pa"\n'), ("load.1", "force and pressure are given")),
+    "load nowhere": (('on = "right"\nforce', "force"), ("load.1", "on is required")),
+    "pressure in newton": ((FORCE, 'pressure = "1 N"\n'), ("load.1.pressure", "stress")),
+    "pressure on an open edge": ((FORCE, 'pressure = "1 Pa"\n'), ("load.1", "no potential", "edge of its surface")),
+    "gravity somewhere": ((FORCE, 'gravity = ["0 m/s^2", "-1 m/s^2"]\n'), ("load.1", "whole body", "leave out on")),
+    "weight of nothing": ((ON + FORCE, 'gravity = ["0 m/s^2", "-1 m/s^2"]\n'), ("load.1", "density")),
+    "gravity downwards": ((ON + FORCE, 'gravity = ["0 m/s^2", "-1 m"]\n'), ("load.1.gravity.2", "acceleration")),
+    "moment on a point": ((ON + FORCE, 'on = "right-top"\nmoment = "1 N m"\n'), ("load.1", "two nodes")),
+    "centre without a turn": (("[solver]", TURNED), ("support", "about is given without a rotation")),
+    "control unknown": (("[solver]", '[solver]\ncontrol = "arclength"'), ("solver.control", "arc-length")),
+    "nothing controlled": (("[solver]", '[solver]\ncontrol = "displacement"'), ("solver.on", "required and missing")),
+    "control of no use": (("[solver]", '[solver]\nto = "1 mm"'), ("solver.to", 'for control = "displacement"')),
+    "multigrid past limits": (
+        ("[solver]", '[solver]\ncontrol = "arc-length"\nlinear = "multigrid"'),
+        ("solver.linear", "only factorisations"),
+    ),
+    "no such image": ((RECTANGLE, '[mesh]\nvoxels = "organ.nii"\nlabel = 1\n'), ("mesh.voxels", "does not exist")),
+    "image without a label": ((RECTANGLE, '[mesh]\nvoxels = "organ.nii"\n'), ("mesh.label", "required")),
+    "network of elements": (
+        ("[compare]", '[models.net]\nkind = "network"\n\n[compare]'),
+        ("models.net", "nodes and springs"),
+    ),
 }
 
 

@@ -290,3 +290,42 @@ def test_a_wrong_deck_is_noticed(tmp_path: Path) -> None:
     deck = continuum_deck(problem, None).replace("MATERIAL=M", "MATERIAL=OTHER")
     with pytest.raises(AssertionError, match="ERROR"):
         displacement(deck, tmp_path)
+
+
+# --- loads other than forces -----------------------------------------------------------------------------------------
+
+
+def slab(loads: object, **more: object) -> ts.Problem:
+    """A slab of 8 by 2 by 4 cubes' worth, clamped on the left unless said otherwise."""
+    values = {"supports": ts.Fixed("left"), **more}
+    return ts.Problem(
+        ts.box((0.16, 0.03, 0.08), (8, 2, 4)), ts.Material(10e3, 0.3, density=1000.0), None, loads=loads, **values
+    )  # type: ignore[arg-type]
+
+
+ALL_AROUND = [ts.Fixed("left"), ts.Fixed("right"), ts.Fixed("back"), ts.Fixed("front")]
+LOADED = {
+    "gravity": lambda: slab(ts.Gravity((0.3, -0.4, 0.1))),
+    "traction": lambda: slab(ts.Traction("top", (0.0, -4.0, 2.0))),
+    "pressure": lambda: slab(ts.Pressure("top", 1200.0), supports=ALL_AROUND),
+    "pressure from below": lambda: slab(ts.Pressure("bottom", 1200.0), supports=ALL_AROUND),
+    "twist": lambda: slab((), supports=[ts.Fixed("left"), ts.Fixed("right", rotation=1.0, axis=(1.0, 0.0, 0.0))]),
+    "pressure in the plane": lambda: ts.Problem(
+        ts.rectangle((0.16, 0.04), (16, 4)),
+        ts.Material(10e3, 0.3, density=1000.0),
+        ts.PlaneStrain(0.01),
+        [ts.Fixed("left"), ts.Fixed("right")],
+        [ts.Pressure("top", 900.0), ts.Gravity((0.2, -0.5))],
+    ),
+}
+
+
+@laws
+@pytest.mark.parametrize("name", LOADED)
+def test_loads_have_their_twins(name: str, law: str, tmp_path: Path) -> None:
+    """The body moves by a share of its size that rotations of the surface matter for."""
+    problem = LOADED[name]()
+    ours = solved(problem, ts.Fem(law))
+    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    assert np.linalg.norm(ours, axis=1).max() > 0.05 * problem.mesh.diameter
+    assert gap(theirs, ours) < 1e-3

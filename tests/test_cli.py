@@ -169,7 +169,11 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
 def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert set(schema["required"]) == {"mesh", "material", "support", "models"}  # a body in 3D has no section
+    assert set(schema["required"]) == {
+        "mesh",
+        "support",
+        "models",
+    }  # a body in 3D has no section, a network no material
     assert schema["$defs"]["SpringsTable"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
 
 

@@ -1,6 +1,7 @@
 """The README and the pages of docs: their Python runs, their studies are read, their numbers and keys are true."""
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,8 @@ def test_python_on_the_pages_runs(page: str, code: str) -> None:
 def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
     file.write_text(text, encoding="utf-8")
+    for table in (ROOT / "examples").glob("*.csv"):
+        shutil.copy(table, tmp_path)
     assert run(read_study(file)).converged
 
 

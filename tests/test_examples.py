@@ -1,6 +1,7 @@
 """The shipped studies: they run, their twins in Python agree, and the paper's two findings come out."""
 
 import importlib.util
+import math
 from pathlib import Path
 from types import ModuleType
 
@@ -29,7 +30,18 @@ def script(name: str) -> ModuleType:
 
 
 def test_every_example_is_run_here() -> None:
-    assert {file.stem for file in EXAMPLES.iterdir() if file.is_file()} == set(NAMES)
+    names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
+    assert names == {*NAMES, "truss"}
+
+
+def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:
+    study, twin = run(read_study(EXAMPLES / "truss.toml")).paths["truss"], script("truss").main()
+    assert study.complete and [state.critical for state in study.states].count("limit point") == 2
+    limit = 2000 * (1 - (1 / math.hypot(1.0, 0.2)) ** (2 / 3)) ** 1.5
+    for path in (study, twin):
+        first, second = (4 * state.load_factor for state in path.states if state.critical)
+        assert first == pytest.approx(limit, rel=1e-6) and second == pytest.approx(-limit, rel=1e-6)
+    assert study.states[-1].positions == pytest.approx(twin.states[-1].positions, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["stretching", "bending"])

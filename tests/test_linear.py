@@ -11,8 +11,8 @@ from scipy.sparse.linalg import spsolve
 import truespring as ts
 from truespring.errors import ProblemError
 from truespring.kernels import threads
-from truespring.solvers import direct, linear
-from truespring.solvers.gradients import IndefiniteError
+from truespring.linear import choice, direct
+from truespring.linear.gradients import IndefiniteError
 
 SOFT, THIN = ts.Material(young=1e4, poisson=0.3), ts.PlaneStress(thickness=0.01)
 LIBRARIES = [name for name in direct.FACTORISERS if direct.present(name)]
@@ -115,7 +115,7 @@ def test_every_linear_solver_solves(name: str) -> None:
     turned = nodes + 0.1 * np.sin(nodes[:, ::-1])
     right = np.where(held, 0.0, np.random.default_rng(0).normal(size=nodes.shape))
     matrix = potential.hessian(turned)
-    solver = linear.choose(name, nodes, held)
+    solver = choice.choose(name, nodes, held)
     found = solver.ready(matrix, turned).solve(right, 1e-10)
     free = np.flatnonzero(~held.ravel())
     exact = spsolve(matrix.tocsc()[free][:, free], right.ravel()[free])
@@ -131,7 +131,7 @@ def test_a_negative_direction_is_seen(name: str) -> None:
     potential = ts.Springs(rule="isotropic").potential(problem)
     nodes, held = problem.mesh.nodes, problem.loading.held
     free = np.flatnonzero(~held.ravel())
-    solver = linear.choose(name, nodes, held)
+    solver = choice.choose(name, nodes, held)
     assert solver.ready(potential.hessian(nodes), nodes).negative_eigenvalues == 0
     pressed = nodes * [0.99, 1.0]
     matrix = potential.hessian(pressed)
@@ -198,7 +198,7 @@ def test_pieces_cover_the_range_once() -> None:
 
 
 def test_a_factorisation_that_does_not_fit_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(linear, "available_memory", lambda: 2**20)
+    monkeypatch.setattr(choice, "available_memory", lambda: 2**20)
     with pytest.raises(ProblemError, match=r"needs about .* GiB.*multigrid"):
         ts.solve(strip(), ts.Springs(rule="isotropic"), ts.Newton(linear="direct"))
     unstable = ts.solve(strip(), ts.Springs(rule="isotropic"), ts.Newton(load_steps=1, linear="multigrid"))

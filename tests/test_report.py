@@ -73,6 +73,7 @@ def path(
                 all_positions=nodes + displacement,
                 displacement=displacement,
                 reaction=np.zeros_like(nodes),
+                applied_force=level * problem.loading.external_force.sum(axis=0),
                 energy=0.0,
                 iterations=3,
                 residual=1e-12,
@@ -80,6 +81,7 @@ def path(
                 branched=False,
                 area_ratio=0.9,
                 stretch=None,
+                level=level,
             )
         )
     values = {"label": "linear FEM", "kind": "fem", "status": ts.Status.CONVERGED, **more}

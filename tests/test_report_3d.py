@@ -65,6 +65,7 @@ def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5,
             all_positions=nodes + level * share * shape,
             displacement=level * share * shape,
             reaction=np.zeros_like(nodes),
+            applied_force=level * problem.loading.external_force.sum(axis=0),
             energy=0.0,
             iterations=3,
             residual=1e-12,
@@ -72,6 +73,7 @@ def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5,
             branched=False,
             area_ratio=0.9,
             stretch=None,
+            level=level,
         )
         for level in levels
     )

@@ -12,7 +12,7 @@ import truespring as ts
 from truespring.errors import MeshError
 from truespring.mesh import select, select_elements, shapes, shares
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.mesh.selections import facet_measures
+from truespring.mesh.measures import facet_measures
 
 PLANE = [("quadrilateral", "right"), *(("triangle", diagonal) for diagonal in ("right", "left", "alternating"))]
 SOLID = ("hexahedron", "tetrahedron", "bcc-tetrahedron")

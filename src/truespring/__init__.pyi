@@ -7,6 +7,12 @@ from .equilibrium import State as State
 from .equilibrium import Status as Status
 from .equilibrium import solve as solve
 from .errors import TruespringError as TruespringError
+from .loading import Fixed as Fixed
+from .loading import Force as Force
+from .loading import Gravity as Gravity
+from .loading import Moment as Moment
+from .loading import Pressure as Pressure
+from .loading import Traction as Traction
 from .material import Material as Material
 from .material import PlaneStrain as PlaneStrain
 from .material import PlaneStress as PlaneStress
@@ -18,6 +24,7 @@ from .mesh import box as box
 from .mesh import named_point as named_point
 from .mesh import nearest_node as nearest_node
 from .mesh import read_mesh as read_mesh
+from .mesh import read_voxels as read_voxels
 from .mesh import rectangle as rectangle
 from .models import LAWS as LAWS
 from .models import RULES as RULES
@@ -29,9 +36,11 @@ from .models import Springs as Springs
 from .models import UserStiffness as UserStiffness
 from .models import judge as judge
 from .models import moduli as moduli
-from .problem import Fixed as Fixed
-from .problem import Force as Force
 from .problem import Problem as Problem
 from .problem import Region as Region
 from .reference import read_stl as read_stl
+from .solvers import ArcLength as ArcLength
+from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
+from .study import converge as converge
+from .study import read_network as read_network

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +83,10 @@ def _parser() -> argparse.ArgumentParser:
     ):
         verb = add(name, run, summary)
         verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    verb = add("converge", _converge, "solve a study on finer and finer meshes until what is watched settles")
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    verb.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relative, default: 0.01")
+    verb.add_argument("--meshes", type=_positive, default=5, metavar="N", help="at most so many, default: 5")
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
@@ -196,6 +201,28 @@ def _moduli(options: argparse.Namespace) -> int:
     return CONVERGED
 
 
+def _converge(options: argparse.Namespace) -> int:
+    from truespring.report.tables import settling_table
+    from truespring.study import converge, read_studies, write_settling
+
+    studies = read_studies(options.study)
+    if not 0 < options.tolerance < 1:
+        raise TruespringError(f"--tolerance {options.tolerance:g}: a relative error between 0 and 1 is wanted")
+    _make_folders(options.out, studies)
+    console = _console(options)
+    found: dict[str, Any] = {}
+    for study in studies:
+        for told in converge(study.file, options.tolerance, options.meshes):
+            found[study.stem] = told
+            with _writing(options.out):
+                write_settling(told, options.out / study.stem)
+            console.print(settling_table(f"{study.stem}: {told[0].n_nodes[-1]:,} nodes", told))
+    if options.json:
+        values = {stem: [asdict(one) for one in told] for stem, told in found.items()}
+        _print_json(values if len(values) > 1 else values[studies[0].stem])
+    return CONVERGED if all(one.settled for told in found.values() for one in told) else NOT_CONVERGED
+
+
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:
     """What springs realise beside each material, and whether they are fit for all of them."""
     from truespring.report.tables import moduli_table
@@ -275,7 +302,8 @@ def _print_plan(console: "Console", plan: dict[str, Any]) -> None:
     size = " by ".join(f"{extent:g} m" for extent in plan["size"])
     across = f", {section['kind']}, thickness {section['thickness']:g} m" if section else ""
     console.print(f"{plan['title']}\n{size}{across}")
-    console.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
+    if material:
+        console.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
     for region in plan["regions"]:
         console.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
     console.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")

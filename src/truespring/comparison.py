@@ -118,7 +118,7 @@ def compare(
     if isinstance(probe, str):
         probe = named_point(model.problem.mesh, probe)
     watched = most_moved(model) if probe is None else probe
-    pairs = [(state, reference.at(state.load_factor)) for state in model.states if state.load_factor > 0]
+    pairs = [(state, reference.at(state.level)) for state in model.states if state.level > 0]
     both = [(mine, theirs) for mine, theirs in pairs if theirs is not None]
     errors = np.array([_errors(mine, theirs, watched) for mine, theirs in both]).reshape(-1, 3)
     return Comparison(
@@ -126,7 +126,7 @@ def compare(
         reference=reference,
         probe=watched,
         tolerance=tolerance,
-        load_factors=np.array([mine.load_factor for mine, _ in both]),
+        load_factors=np.array([mine.level for mine, _ in both]),
         rms_errors=errors[:, 0],
         max_errors=errors[:, 1],
         probe_errors=errors[:, 2],

@@ -1,5 +1,6 @@
 """solve(problem, model, solver) -> Path: the equilibria of a body and where they should not be trusted."""
 
+import math
 import time
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -8,12 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.errors import ModelError
-from truespring.mesh import Surface
-from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli
+from truespring.errors import ModelError, ProblemError
+from truespring.mesh import Surface, select
+from truespring.mesh.selections import AXES
+from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli, refuse_mechanism
 from truespring.potential import Loading, Potential, Refined, Stretched
 from truespring.problem import Problem
-from truespring.solvers import Cost, Equilibrium, Newton, Reporter
+from truespring.solvers import ArcLength, Cost, DisplacementControl, Equilibrium, Newton, Reporter
 
 # A relative residual above this is worth a word; it can only come from loads that drown in rounding.
 _LOOSE = 1e-6
@@ -52,12 +54,17 @@ class State:
         positions, displacement: [m], shape (n_nodes, dim).
         all_positions: of every node of the potential, the mesh's first: quadratic elements have more [m].
         reaction: force of the supports [N], shape (n_nodes, dim), zero where nothing is held.
+        applied_force: total of the loads [N], shape (dim,).
         energy: stored elastic energy [J].
         iterations: Newton iterations.
         residual: relative unbalanced force [-].
         negative_eigenvalues: of the tangent; 0 is stable, None is not proven.
         branched: true where an unstable equilibrium was left for a stable one nearby.
         snapped: true where the body moved much further than the step before lets expect.
+        critical: "limit point" or "bifurcation" where stability changes there, else empty.
+        mode: the way in which the body gives way at a critical point, largest component 1, shape (n_nodes, dim).
+        level: how far the way is gone that the solver was asked for, 0 to 1: under load control the load factor,
+            under displacement control the share of the displacement, not a number at a critical point.
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
     """
@@ -67,6 +74,7 @@ class State:
     all_positions: Floats
     displacement: Floats
     reaction: Floats
+    applied_force: Floats
     energy: float
     iterations: int
     residual: float
@@ -75,6 +83,9 @@ class State:
     area_ratio: float
     stretch: tuple[float, float] | None
     snapped: bool = False
+    critical: str = ""
+    mode: Floats | None = None
+    level: float = math.nan
 
     def __repr__(self) -> str:
         return (
@@ -132,8 +143,8 @@ class Path:
 
     @property
     def complete(self) -> bool:
-        """Whether the full load was reached."""
-        return self.load_factor == 1.0
+        """Whether the full load was reached, or the whole displacement that was controlled."""
+        return bool(self.states and self.states[-1].level == 1.0) or (not self.states and self.load_factor == 1.0)
 
     @property
     def newton_iterations(self) -> int:
@@ -141,8 +152,8 @@ class Path:
         return sum(state.iterations for state in self.states) + (self.best.iterations if self.best else 0)
 
     def at(self, load_factor: float) -> State | None:
-        """Return the state at a load level, None where the path has none there."""
-        found = np.flatnonzero(np.abs(self.load_factors - load_factor) <= 1e-9)
+        """Return the state at a level of what the solver was asked for, None where the path has none there."""
+        found = np.flatnonzero(np.abs(np.array([state.level for state in self.states]) - load_factor) <= 1e-9)
         return self.states[found[0]] if found.size else None
 
     def applied_force(self, state: State) -> Floats:
@@ -153,20 +164,26 @@ class Path:
         """
         loading = self.problem.loading
         if not loading.driven_by_motion:
-            return np.asarray(state.load_factor * loading.external_force.sum(axis=0))
-        largest = loading.displacement[np.linalg.norm(loading.displacement, axis=1).argmax()]
-        moved = loading.displacement.any(axis=1) & (loading.displacement @ largest >= 0)
+            return state.applied_force
+        motion = loading.motion()
+        largest = motion[np.linalg.norm(motion, axis=1).argmax()]
+        moved = motion.any(axis=1) & (motion @ largest >= 0)
         return np.asarray(state.reaction[moved].sum(axis=0))
+
+
+Solver = Newton | DisplacementControl | ArcLength
 
 
 def solve(
     problem: Problem,
     model: Model | Potential,
-    solver: Newton | None = None,
+    solver: Solver | None = None,
     report: Reporter | None = None,
 ) -> Path:
     """Follow the equilibria of `problem` under `model` from no load to the full one.
 
+    `solver` is Newton, which takes the load up in steps and keeps to stable states, or DisplacementControl or
+    ArcLength, which go on past limit points, through unstable states too.
     `model` is Springs, Fem, or a potential such as a SpringNetwork, which is taken as it is (the
     problem then needs no material). A failure is not an exception: see Path.status and Path.best.
     Raises ModelError where the model does not fit the problem.
@@ -182,19 +199,30 @@ def solve(
         return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=realised)
 
 
-def _solve(problem: Problem, model: Model | Potential, solver: Newton, report: Reporter | None) -> Path:
+def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: Reporter | None) -> Path:
     potential = model if isinstance(model, Potential) else model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
+    if isinstance(model, SpringNetwork):
+        refuse_mechanism(model, problem.loading.held)
     linear = isinstance(model, Fem) and not LAWS[model.law].finite
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
+    if linear:
+        loading = loading.at_rest(potential.nodes)
 
     def upright(positions: Floats) -> bool:
         return linear or problem.mesh.smallest_area_ratio(positions) > 0
 
-    found = list(solver.follow(potential, loading, report, upright))
+    match solver:
+        case Newton():
+            follow = solver.follow(potential, loading, report, upright)
+        case DisplacementControl():
+            follow = solver.follow(potential, loading, _weights(problem, potential, solver), report)
+        case ArcLength():
+            follow = solver.follow(potential, loading, report)
+    found = list(follow)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
@@ -203,8 +231,8 @@ def _solve(problem: Problem, model: Model | Potential, solver: Newton, report: R
         label="springs" if isinstance(model, SpringNetwork) else getattr(model, "label", type(model).__name__),
         kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
         states=states,
-        status=_status(states, best, linear),
-        warnings=(*known, *_path_warnings(states, best, linear)),
+        status=_status(states, best, linear, isinstance(solver, Newton)),
+        warnings=(*known, *_path_warnings(states, best, linear, isinstance(solver, Newton))),
         best=best,
         potential=potential,
         n_unknowns=int((~loading.held).sum()),
@@ -212,8 +240,19 @@ def _solve(problem: Problem, model: Model | Potential, solver: Newton, report: R
     )
 
 
+def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
+    """What makes the controlled displacement of those of all nodes, shape (n_nodes, dim): a mean."""
+    axes = AXES[: problem.mesh.dim]
+    if control.direction not in axes:
+        raise ProblemError(f"direction = {control.direction!r}: allowed are {', '.join(axes)}")
+    weights = np.zeros(potential.nodes.shape)
+    nodes = select(problem.mesh, control.on)  # type: ignore[arg-type]
+    weights[nodes, axes.index(control.direction)] = 1.0 / len(nodes)
+    return weights
+
+
 def _state(problem: Problem, potential: Potential, loading: Loading, found: Equilibrium) -> State:
-    reaction = np.where(loading.held, found.internal_force - found.load_factor * loading.external_force, 0.0)
+    reaction = np.where(loading.held, found.internal_force - found.external_force, 0.0)
     stretch = potential.stretch(found.positions) if isinstance(potential, Stretched) else None
     n_nodes = problem.mesh.n_nodes
     positions = found.positions[:n_nodes]
@@ -228,28 +267,40 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         all_positions=found.positions,
         displacement=positions - problem.mesh.nodes,
         reaction=reaction,
+        applied_force=found.external_force.sum(axis=0),
         energy=found.energy,
         iterations=found.iterations,
         residual=found.residual,
         negative_eigenvalues=found.negative_eigenvalues,
         branched=found.branched,
         snapped=found.snapped,
+        critical=found.critical,
+        mode=None if found.mode is None else found.mode[:n_nodes],
+        level=_level(found),
         area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
 
 
-def _status(states: tuple[State, ...], best: State | None, linear: bool) -> Status:
+def _level(found: Equilibrium) -> float:
+    if found.critical:
+        return math.nan
+    return found.load_factor if found.level is None else found.level
+
+
+def _status(states: tuple[State, ...], best: State | None, linear: bool, keeps_to_stable: bool) -> Status:
     if best is not None:
         return Status.NOT_CONVERGED
     if any(state.area_ratio <= 0 for state in states) and not linear:
         return Status.INVERTED
-    if any(state.negative_eigenvalues for state in states):
+    if keeps_to_stable and any(state.negative_eigenvalues for state in states):
         return Status.UNSTABLE
     return Status.CONVERGED
 
 
-def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) -> tuple[str, ...]:
+def _path_warnings(
+    states: tuple[State, ...], best: State | None, linear: bool, keeps_to_stable: bool
+) -> tuple[str, ...]:
     warnings = []
     if best is not None:
         bad = [
@@ -271,8 +322,11 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
             f"inverted from load factor {inverted[0].load_factor:.6g} on "
             f"(smallest {what} ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
         )
+    for state in states:
+        if state.critical:
+            warnings.append(_critical_warning(state))
     unstable = [state for state in states if state.negative_eigenvalues]
-    if unstable:
+    if unstable and keeps_to_stable:
         count = unstable[0].negative_eigenvalues
         warnings.append(
             f"unstable at load factor {unstable[0].load_factor:.6g} ({count} negative "
@@ -296,3 +350,15 @@ def _path_warnings(states: tuple[State, ...], best: State | None, linear: bool) 
     if any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent could not be found")
     return tuple(warnings)
+
+
+def _critical_warning(state: State) -> str:
+    assert state.mode is not None  # a critical point has one
+    node, axis = np.unravel_index(int(np.abs(state.mode).argmax()), state.mode.shape)
+    place = f"node {node} moves most, along {AXES[axis]}"
+    if state.critical == "limit point":
+        return f"limit point at load factor {state.load_factor:.6g}: under this load the body snaps through; {place}"
+    return (
+        f"bifurcation at load factor {state.load_factor:.6g}: the body buckles to the side; {place}. "
+        "The path goes on straight ahead, which a real body would leave"
+    )

@@ -24,6 +24,14 @@ class NoLoadError(ProblemError):
     """Nothing loads the body."""
 
 
+class LoadError(ProblemError):
+    """A load does not fit the body: its place among the loads, and why."""
+
+    def __init__(self, number: int, text: str) -> None:
+        super().__init__(f"loads[{number}]: {text}")
+        self.number, self.text = number, text
+
+
 class ModelError(TruespringError):
     """A model cannot be built for this problem: an unknown rule or law, or one that does not fit."""
 

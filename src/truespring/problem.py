@@ -1,45 +1,36 @@
 """The problem: what is asked, stated once and frozen. Mesh, material, section, supports, loads."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.errors import NoLoadError, ProblemError
+from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
+from truespring.loading import (
+    Body,
+    Fixed,
+    Force,
+    Gravity,
+    Held,
+    Moment,
+    Pressure,
+    Spread,
+    Traction,
+    held_by,
+    nodal_force,
+)
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
-from truespring.mesh import Mesh, Selection, select, select_elements, shares
+from truespring.mesh import Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
 from truespring.potential import Loading
 
-
-@dataclass(frozen=True)
-class Fixed:
-    """A support: the directions `fix` of the nodes `on` are held (all of them by default).
-
-    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
-    ("right-middle"), a Plane, a Box, a Near or node numbers.
-    `displacement` [m], one value a direction, moves them instead; it scales with the load factor.
-    """
-
-    on: Selection
-    fix: Sequence[str] | None = None
-    displacement: Sequence[float] | None = None
-
-
-@dataclass(frozen=True)
-class Force:
-    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`.
-
-    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
-    ("right-middle"), a Plane, a Box, a Near or node numbers.
-    """
-
-    on: Selection
-    total: Sequence[float]
+#: A load: dead, or following the body.
+Load = Force | Traction | Gravity | Pressure | Moment
 
 
 @dataclass(frozen=True)
@@ -67,13 +58,13 @@ class Problem:
     material: Material | None = None
     section: Section | None = None
     supports: Sequence[Fixed] = field(default=())
-    loads: Sequence[Force] = field(default=())
+    loads: Sequence[Load] = field(default=())
     regions: Sequence[Region] = field(default=())
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "regions", _several(self.regions, Region, "regions"))
         object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports"))
-        object.__setattr__(self, "loads", _several(self.loads, Force, "loads"))
+        object.__setattr__(self, "loads", _several(self.loads, Load, "loads"))
         if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
         if self.mesh.kind.dim == 3 and self.section is None:
@@ -84,7 +75,8 @@ class Problem:
             raise ProblemError("regions of another material need a material for the rest")
         _ = self.material_numbers  # a region that selects nothing is refused here
         loading = self.loading
-        if not loading.external_force[~loading.held].any() and not loading.displacement.any():
+        acting = loading.external_force[~loading.held].any() or loading.following
+        if not acting and not loading.motion().any():
             held = " in a direction that is free" if loading.external_force.any() else ""
             raise NoLoadError(
                 f"nothing loads the body{held}: give a load, or a support with a displacement that is not zero"
@@ -126,49 +118,55 @@ class Problem:
     @cached_property
     def loading(self) -> Loading:
         """Forces and prescribed displacements at load factor 1."""
-        held, displacement = self._supports()
-        return Loading(self._forces(), held, displacement)
+        held, displacement = np.zeros(self.mesh.nodes.shape, dtype=bool), np.zeros(self.mesh.nodes.shape)
+        moved = np.zeros(self.mesh.nodes.shape)
+        for support in self.held:
+            motion = np.tile(support.motion, (len(support.nodes), 1))
+            if support.turn is not None:
+                motion = motion + support.turn.motion(1.0)
+            for axis in support.directions:
+                self._refuse_two_motions(support.nodes, axis, held, moved, motion[:, axis])
+                held[support.nodes, axis] = True
+                displacement[support.nodes, axis] = support.motion[axis]
+                moved[support.nodes, axis] = motion[:, axis]
+        body, turns = self.body, tuple(support.turn for support in self.held if support.turn is not None)
+        following = []
+        for number, load in enumerate(self.loads):
+            if isinstance(load, Pressure | Moment):
+                with _named(number):
+                    following.append(load.following(body, held))
+        return Loading(nodal_force(self.spreads, self.mesh.nodes.shape), held, displacement, turns, tuple(following))
 
-    def _forces(self) -> Floats:
-        force = np.zeros(self.mesh.nodes.shape)
-        for load in self.loads:
-            total = _components(load.total, self.mesh.dim, "force", "N")
-            nodes = select(self.mesh, load.on)
-            force[nodes] += shares(self.mesh, nodes)[:, None] * total
-        return force
+    @cached_property
+    def held(self) -> tuple[Held, ...]:
+        """What each support holds."""
+        return tuple(held_by(self.mesh, support) for support in self.supports)
 
-    def _supports(self) -> tuple[Bools, Floats]:
-        held = np.zeros(self.mesh.nodes.shape, dtype=bool)
-        displacement = np.zeros(self.mesh.nodes.shape)
-        axes = AXES[: self.mesh.dim]
-        for support in self.supports:
-            nodes, directions, motion = self.held_by(support)
-            for axis in directions:
-                clash = nodes[held[nodes, axis] & (displacement[nodes, axis] != motion[axis])]
-                if clash.size:
-                    raise ProblemError(
-                        f"two supports move node {clash[0]} along {axes[axis]} by "
-                        f"{displacement[clash[0], axis]:g} m and by {motion[axis]:g} m: "
-                        "a node has one prescribed motion"
-                    )
-                held[nodes, axis] = True
-                displacement[nodes, axis] = motion[axis]
-        return held, displacement
+    @cached_property
+    def body(self) -> Body:
+        """What loads act on."""
+        dense = bool(self.materials) and all(material.density is not None for material in self.materials)
+        density = self.of_elements(lambda material: material.density or 0.0) if dense else None
+        return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density)
 
-    def held_by(self, support: Fixed) -> tuple[Ints, list[int], Floats]:
-        """Return the nodes that a support holds, the numbers of the directions, and its displacement [m]."""
-        axes = AXES[: self.mesh.dim]
-        directions = list(axes) if support.fix is None else list(support.fix)
-        if not directions or any(direction not in axes for direction in directions):
-            raise ProblemError(f"fix = {directions}: allowed are the directions {', '.join(axes)}")
-        given = [0.0] * self.mesh.dim if support.displacement is None else support.displacement
-        motion = _components(given, self.mesh.dim, "displacement", "m")
-        idle = [axis for axis, part in zip(axes, motion, strict=True) if part and axis not in directions]
-        if idle:
+    @cached_property
+    def spreads(self) -> tuple[Spread, ...]:
+        """The dead loads over the cells that carry them."""
+        found = []
+        for number, load in enumerate(self.loads):
+            if isinstance(load, Force | Traction | Gravity):
+                with _named(number):
+                    found.append(load.spread(self.body))
+        return tuple(found)
+
+    def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
+        clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))
+        if clash.size:
+            first = int(clash[0])
             raise ProblemError(
-                f"displacement = {list(given)} [m] moves along {', '.join(idle)}, which fix = {directions} leaves free"
+                f"two supports move node {nodes[first]} along {AXES[axis]} by {moved[nodes[first], axis]:g} m and by "
+                f"{motion[first]:g} m: a node has one prescribed motion"
             )
-        return select(self.mesh, support.on), [axes.index(direction) for direction in directions], motion
 
     def _refuse_rigid_motion(self) -> None:
         """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
@@ -189,6 +187,15 @@ class Problem:
             raise ProblemError(
                 f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
             )
+
+
+@contextmanager
+def _named(number: int) -> Iterator[None]:
+    """Tell which load does not fit."""
+    try:
+        yield
+    except TruespringError as error:
+        raise LoadError(number, str(error)) from None
 
 
 def sample(problem: Problem, elements: Ints) -> Problem:
@@ -232,12 +239,16 @@ def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
     return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
 
-def _several(given: object, kind: type, name: str) -> tuple[Any, ...]:
+def _several(given: object, kind: Any, name: str) -> tuple[Any, ...]:
     """Return one or several of a kind as a tuple."""
     several = (given,) if isinstance(given, kind) else given
     if not isinstance(several, Sequence) or not all(isinstance(one, kind) for one in several):
-        raise ProblemError(f"{name} = {given!r}: a list of {kind.__name__} is wanted")
+        raise ProblemError(f"{name} = {given!r}: a list of {_name(kind)} is wanted")
     return tuple(several)
+
+
+def _name(kind: Any) -> str:
+    return " or ".join(one.__name__ for one in get_args(kind)) or str(kind.__name__)
 
 
 def _n_modes(nodes: Floats) -> int:
@@ -261,17 +272,3 @@ def _modes(places: Floats) -> Floats:
     for turn, (first, second) in enumerate(turns):
         modes[:, first, dim + turn], modes[:, second, dim + turn] = -places[:, second], places[:, first]
     return modes.reshape(n_nodes * dim, -1)
-
-
-def _components(values: Sequence[float], dim: int, name: str, unit: str) -> Floats:
-    try:
-        components = np.array([float(value) for value in values])
-    except (TypeError, ValueError):
-        raise ProblemError(f"{name} = {values!r}: one number [{unit}] a direction is wanted") from None
-    if len(components) != dim:
-        raise ProblemError(
-            f"{name} = {list(values)} [{unit}] has {len(components)} values, the body has {dim} directions"
-        )
-    if not np.isfinite(components).all():
-        raise ProblemError(f"{name} = {list(values)} [{unit}]: values must be finite")
-    return components

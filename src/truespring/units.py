@@ -10,7 +10,7 @@ from truespring.errors import TruespringError
 if TYPE_CHECKING:
     import pint
 
-Dimension = Literal["length", "stress", "force", "density"]
+Dimension = Literal["length", "stress", "force", "density", "acceleration", "moment", "angle", "stiffness"]
 
 #: The SI unit of each dimension that a study file knows, and an example for messages.
 SI_UNITS: dict[Dimension, tuple[str, str]] = {
@@ -18,6 +18,10 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "stress": ("Pa", '"10 kPa"'),
     "force": ("N", '"-0.043 N"'),
     "density": ("kg/m^3", '"1000 kg/m^3"'),
+    "acceleration": ("m/s^2", '"9.81 m/s^2"'),
+    "moment": ("N m", '"20 N mm"'),
+    "angle": ("rad", '"30 deg"'),
+    "stiffness": ("N/m", '"5 N/mm"'),
 }
 
 # Far beyond any body, and squares of it still are numbers.
@@ -66,7 +70,8 @@ _QUANTITY = re.compile(
 # The units that studies are mostly written in: pint knows all others, and takes a third of a second to say so.
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 _COMMON = {f"{prefix}{unit}": (factor, unit) for unit in ("m", "Pa", "N") for prefix, factor in _PREFIXES.items()}
-_COMMON["kg/m^3"] = (1.0, "kg/m^3")
+_COMMON |= {unit: (1.0, unit) for unit in ("kg/m^3", "m/s^2")}
+_COMMON["deg"] = (math.pi / 180, "rad")
 
 
 def _parse(text: str, unit: str, allowed: str) -> float:

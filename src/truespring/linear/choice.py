@@ -8,10 +8,10 @@ from typing import ClassVar, Protocol
 
 from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError, nearest
+from truespring.linear.direct import FACTORISERS, Direct, direct_bytes, present
+from truespring.linear.iterative import Multigrid
 from truespring.memory import available_memory
 from truespring.potential import SparseMatrix
-from truespring.solvers.direct import FACTORISERS, Direct, direct_bytes, present
-from truespring.solvers.iterative import Multigrid
 
 # Up to so many free directions, in the plane and in space, a factorisation is as quick as multigrid, and exact.
 _DIRECT = MappingProxyType({2: 8_000, 3: 3_000})

@@ -172,14 +172,22 @@ class Factorisation:
 
         The one nearest to zero; in tiny systems the lowest.
         """
+        return self._mode("SA", lambda values: int(values.argmin()))
+
+    def nearest_mode(self) -> Floats:
+        """Return the eigenvector of the eigenvalue nearest to zero, largest component +1, shape (n_nodes, dim)."""
+        return self._mode("LM", lambda values: int(np.abs(values).argmin()))
+
+    def _mode(self, which: Any, chosen: Callable[[Floats], int]) -> Floats:
         n = self.matrix.shape[0]
         if n <= 10:
-            vector = np.linalg.eigh(self.matrix.toarray())[1][:, 0]
+            values, vectors = np.linalg.eigh(self.matrix.toarray())
+            vector = vectors[:, chosen(values)]
         else:
             inverse = LinearOperator((n, n), matvec=self.factors.solve, dtype=np.float64)
             start = np.random.default_rng(9).normal(size=n)
             try:
-                vector = eigsh(self.matrix, k=1, sigma=0.0, which="SA", OPinv=inverse, v0=start)[1][:, 0]
+                vector = eigsh(self.matrix, k=1, sigma=0.0, which=which, OPinv=inverse, v0=start)[1][:, 0]
             except ArpackError:  # inverse iteration needs no more than solves
                 vector = start
                 for _ in range(50):

@@ -15,8 +15,8 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, ShortInts, Singles
-from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import norm, scalar_product
+from truespring.linear.direct import SingularMatrixError
+from truespring.linear.gradients import norm, scalar_product
 
 Real = Floats | Singles
 

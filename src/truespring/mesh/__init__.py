@@ -3,12 +3,16 @@
 from truespring.mesh.files import read_mesh as read_mesh
 from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
+from truespring.mesh.measures import corner_measures as corner_measures
+from truespring.mesh.measures import element_corner_measures as element_corner_measures
 from truespring.mesh.mesh import Mesh as Mesh
+from truespring.mesh.refine import refined as refined
 from truespring.mesh.selections import Box as Box
 from truespring.mesh.selections import Near as Near
 from truespring.mesh.selections import Plane as Plane
 from truespring.mesh.selections import Selection as Selection
 from truespring.mesh.selections import covering as covering
+from truespring.mesh.selections import facets_within as facets_within
 from truespring.mesh.selections import named_point as named_point
 from truespring.mesh.selections import nearest_node as nearest_node
 from truespring.mesh.selections import select as select
@@ -23,3 +27,4 @@ from truespring.mesh.shapes import refuse_too_large as refuse_too_large
 from truespring.mesh.surface import Surface as Surface
 from truespring.mesh.surface import SurfaceDistance as SurfaceDistance
 from truespring.mesh.surface import surface_distance as surface_distance
+from truespring.mesh.voxels import read_voxels as read_voxels

@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.measures import corner_measures, element_corner_measures
 from truespring.mesh.mesh import Mesh
 
 #: Side names: direction and whether it is the upper end.
@@ -209,10 +210,7 @@ def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
         n_inside += inside[corner]
     whole = n_inside == mesh.elements.shape[1]
     if _reach(mesh.elements[whole], nodes):
-        found = mesh.elements[whole]
-        if mesh.dim == 3:
-            return found, np.repeat(mesh.measures[whole, None] / found.shape[1], found.shape[1], axis=1)
-        return found, corner_measures(mesh.nodes[found])
+        return mesh.elements[whole], element_corner_measures(mesh)[whole]
     facets, alone = mesh.facets_of(mesh.elements[n_inside >= len(mesh.kind.facets[0])], inside)
     for cells in (facets[alone], facets):
         if _reach(cells, nodes):
@@ -226,30 +224,17 @@ def _reach(cells: Ints, nodes: Ints) -> bool:
     return len(np.unique(cells)) == len(nodes)
 
 
-def corner_measures(corners: Floats) -> Floats:
-    """Integrate each corner's shape function over edges, triangles or quadrilaterals [m^k], shape (n, corners).
+def facets_within(mesh: Mesh, nodes: Ints) -> Ints:
+    """Return the facets of the boundary all of whose nodes are among `nodes`, seen from outside anticlockwise.
 
-    Corners of shape (n, 2 to 4, dim). Quadrilaterals by 2 x 2 Gauss points, exact where they are plane.
+    Shape (n, 2 to 4). Raises MeshError where there is none.
     """
-    n_corners = corners.shape[1]
-    if n_corners < 4:
-        return np.repeat(facet_measures(corners)[:, None] / n_corners, n_corners, axis=1)
-    share = np.zeros(corners.shape[:2])
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    for s, t in signs / np.sqrt(3):
-        shape = (1 + s * signs[:, 0]) * (1 + t * signs[:, 1]) / 4
-        along_s = np.einsum("c,nci->ni", signs[:, 0] * (1 + t * signs[:, 1]) / 4, corners)
-        along_t = np.einsum("c,nci->ni", signs[:, 1] * (1 + s * signs[:, 0]) / 4, corners)
-        gram = (along_s**2).sum(axis=1) * (along_t**2).sum(axis=1) - (along_s * along_t).sum(axis=1) ** 2
-        share += np.sqrt(np.maximum(gram, 0.0))[:, None] * shape
-    return share
-
-
-def facet_measures(corners: Floats) -> Floats:
-    """Length [m] of edges or area [m^2] of triangles and quadrilaterals; corners of shape (n, 2 to 4, dim)."""
-    if corners.shape[1] == 2:
-        return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
-    if corners.shape[1] == 4:
-        return np.asarray(corner_measures(corners).sum(axis=1))
-    spans = corners[:, 1:] - corners[:, :1]
-    return np.asarray(np.sqrt(np.maximum(np.linalg.det(spans @ spans.swapaxes(1, 2)), 0.0)) / 2)
+    inside = np.zeros(mesh.n_nodes, dtype=bool)
+    inside[nodes] = True
+    found = mesh.boundary[inside[mesh.boundary].all(axis=1)] if mesh.element != "line" else mesh.boundary[:0]
+    if not len(found):
+        raise MeshError(
+            f"the {len(nodes)} node{'s' * (len(nodes) != 1)} selected make no part of the boundary's surface: "
+            "select a side, or all nodes of a face"
+        )
+    return found

@@ -11,6 +11,7 @@ from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
 from truespring.models.laws import LAWS as LAWS
+from truespring.models.mechanism import refuse_mechanism as refuse_mechanism
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli
 from truespring.models.network import SpringNetwork as SpringNetwork

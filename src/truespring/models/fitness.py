@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools
 from truespring.errors import ModelError
+from truespring.loading import Fixed
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.memory import remembered
 from truespring.mesh import Mesh, box, rectangle
@@ -19,7 +20,7 @@ from truespring.models.rules import RULES, require_body
 from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
 from truespring.potential import rigid_body_modes
-from truespring.problem import Fixed, Problem
+from truespring.problem import Problem
 
 # Poisson's ratio of an isotropic lattice of plain springs (Cauchy's relation lam = mu), in the plane and in space.
 _CAUCHY = {2: 1 / 3, 3: 1 / 4}

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import skfem
 
-from truespring.arrays import Floats, Ints
-from truespring.mesh import Mesh, covering, select
+from truespring.arrays import Bools, Floats, Ints
+from truespring.errors import ModelError
+from truespring.mesh import Mesh
 from truespring.models.fem import FemPotential, Reference, reference_element
-from truespring.potential import Loading
+from truespring.potential import Loading, Turn
 
 # scikit-fem's element of second order and its order of quadrature, 3 points in a triangle and 4 in a tetrahedron;
 # its nodes are the corners, then the middles of these edges.
@@ -19,7 +20,7 @@ _QUADRATIC: dict[str, tuple[Any, int, tuple[tuple[int, int], ...]]] = {
 }
 
 # What a uniform load on a cell of so many corners gives to each corner and to the middle of each edge.
-_CONSISTENT = {2: (1 / 6, 2 / 3), 3: (0.0, 1 / 3), 4: (-1 / 20, 1 / 5)}
+_CONSISTENT = {1: (1.0, 0.0), 2: (1 / 6, 2 / 3), 3: (0.0, 1 / 3), 4: (-1 / 20, 1 / 5)}
 
 
 class QuadraticPotential(FemPotential):
@@ -62,8 +63,7 @@ class QuadraticPotential(FemPotential):
         given, ends = self.problem.loading, self.mesh.edges
         by_edge = np.zeros((len(ends), self.mesh.dim), dtype=bool)
         alone = np.zeros_like(given.held)
-        for support in self.problem.supports:
-            nodes, directions, _ = self.problem.held_by(support)
+        for nodes, directions, _, _ in self.problem.held:
             inside = np.zeros_like(given.held)
             inside[np.ix_(nodes, np.array(directions))] = True
             by_edge |= inside[ends].all(axis=1)
@@ -71,33 +71,42 @@ class QuadraticPotential(FemPotential):
         by_edge |= alone[ends].all(axis=1)
         facets = self.mesh.boundary
         alike = (given.held[facets] == given.held[facets[:, :1]]).all(axis=(1, 2))
-        alike &= (given.displacement[facets] == given.displacement[facets[:, :1]]).all(axis=(1, 2))
+        motion = given.motion()
+        alike &= (motion[facets] == motion[facets[:, :1]]).all(axis=(1, 2))
         local = np.array([(i, j) for j in range(facets.shape[1]) for i in range(j)])
         edges = _edge_numbers(self.mesh, facets[alike][:, local]).ravel()
         by_edge[edges] |= given.held[ends[edges, 0]]
         held = np.concatenate([given.held, by_edge])
         displacement = np.concatenate([given.displacement, given.displacement[ends].mean(axis=1)])
-        force = np.zeros(self.nodes.shape)
-        for load in self.problem.loads:
-            nodes = select(self.mesh, load.on)
-            force += self._shares(nodes)[:, None] * np.asarray(load.total, dtype=float)
-        return Loading(force, held, np.where(held, displacement, 0.0))
+        turns = tuple(self._turn(turn, np.asarray(by_edge.all(axis=1))) for turn in given.turns)
+        if given.following:
+            raise ModelError(
+                "pressure and moments act on elements of first order only: give the model an element of these, "
+                "or a traction, which acts on both"
+            )
+        return Loading(self._force(), held, np.where(held, displacement, 0.0), turns)
 
-    def _shares(self, nodes: Ints) -> Floats:
-        """The share of a uniform total that each node takes, shape (n_nodes + n_edges,), sum 1."""
-        share = np.zeros(len(self.nodes))
-        covered = covering(self.mesh, nodes)
-        if covered is None:
-            share[nodes] = 1 / len(nodes)
-            return share
-        cells, measures = covered
-        at_corner, at_middle = _CONSISTENT[cells.shape[1]]
-        local = np.array([(i, j) for j in range(cells.shape[1]) for i in range(j)])
-        middles = self.mesh.n_nodes + _edge_numbers(self.mesh, cells[:, local])
-        whole = measures.sum(axis=1, keepdims=True)
-        np.add.at(share, cells, at_corner * whole)
-        np.add.at(share, middles, at_middle * whole)
-        return np.asarray(share / share.sum())
+    def _turn(self, turn: Turn, held: Bools) -> Turn:
+        """A turn of the held edges between its nodes too."""
+        arms = np.full(self.mesh.nodes.shape, np.nan)
+        arms[turn.nodes] = turn.arms
+        middles = arms[self.mesh.edges].mean(axis=1)
+        inside = np.flatnonzero(held & ~np.isnan(middles).any(axis=1))
+        nodes = np.concatenate([turn.nodes, self.mesh.n_nodes + inside])
+        return turn._replace(nodes=nodes, arms=np.concatenate([turn.arms, middles[inside]]))
+
+    def _force(self) -> Floats:
+        """The dead loads on the nodes [N], shape (n_nodes + n_edges, dim)."""
+        force = np.zeros(self.nodes.shape)
+        for cells, measures, density in self.problem.spreads:
+            whole = measures.sum(axis=1)[:, None, None] * density[:, None, :]
+            at_corner, at_middle = _CONSISTENT[cells.shape[1]]
+            np.add.at(force, cells, at_corner * whole)
+            if cells.shape[1] > 1:
+                local = np.array([(i, j) for j in range(cells.shape[1]) for i in range(j)])
+                middles = self.mesh.n_nodes + _edge_numbers(self.mesh, cells[:, local])
+                np.add.at(force, middles, at_middle * whole)
+        return force
 
 
 def _edge_numbers(mesh: Mesh, pairs: Ints) -> Ints:

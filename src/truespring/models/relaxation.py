@@ -6,6 +6,9 @@ import numpy as np
 from scipy import linalg, sparse
 
 from truespring.arrays import Bools, Floats
+from truespring.linear.choice import choose
+from truespring.linear.direct import SingularMatrixError
+from truespring.linear.gradients import IndefiniteError
 from truespring.mesh import Mesh
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
@@ -13,9 +16,6 @@ from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
 from truespring.potential import SparseMatrix, rigid_body_modes
 from truespring.problem import Problem
-from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError
-from truespring.solvers.linear import choose
 
 # Unbalanced forces below this share of E h^(d-1) are rounding: a uniform strain is an equilibrium.
 _BALANCED = 1e-8

@@ -311,6 +311,7 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path
         all_positions=positions,
         displacement=displacement,
         reaction=np.full_like(positions, math.nan),
+        applied_force=problem.loading.force(positions, surface.load_factor).sum(axis=0),
         energy=math.nan,
         iterations=0,
         residual=math.nan,
@@ -318,6 +319,7 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path
         branched=False,
         area_ratio=mesh.smallest_area_ratio(positions),
         stretch=None,
+        level=surface.load_factor,
     )
 
 

@@ -184,7 +184,7 @@ def undeformed_figure(result: Result) -> Sheet:
 def _supports(area: Area, result: Result, scale: Scale, size: float) -> None:
     """Clamped edges hatched, edges held in one direction on rollers, single nodes on a pin or roller."""
     mesh, loading = result.problem.mesh, result.problem.loading
-    still = loading.held & (loading.displacement == 0)
+    still = loading.held & (loading.motion() == 0)
     clamped = loading.held.all(axis=1) & still.all(axis=1)
     hatched = np.zeros(mesh.n_nodes, dtype=bool)
     if mesh.boundary.shape[1] == 2:

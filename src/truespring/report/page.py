@@ -199,10 +199,10 @@ def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
 
 def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
     facts = []
-    total = problem.loading.external_force.sum(axis=0)
-    if problem.loading.external_force.any():
+    total = problem.loading.force(problem.mesh.nodes).sum(axis=0)
+    if not problem.loading.driven_by_motion:
         facts.append(("total force", f"({', '.join(given(float(value), 'N') for value in total)})"))
-    motion = problem.loading.displacement
+    motion = problem.loading.motion()
     if motion.any():
         moved = int(motion.any(axis=1).sum())
         largest = given(float(np.linalg.norm(motion, axis=1).max()), "m")

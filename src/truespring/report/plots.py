@@ -1,18 +1,18 @@
 """Plots: displacement against force, errors by load level, Young's modulus by direction."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Bools, Floats, Ints
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import BLUE, FAINT, POINT, is_strong, label_and_name, path_styles
+from truespring.report.style import BLUE, FAINT, POINT, RED, is_strong, label_and_name, path_styles
 from truespring.report.verdict import display_name, drive, material_name
 from truespring.report.words import draw_words, text_width
 from truespring.report.young import Known, young_figure
@@ -27,6 +27,8 @@ class _Curve:
     marker: str
     label: str
     strong: bool
+    unstable: Bools | None = None
+    critical: Ints | None = None
 
 
 def curves_figure(result: Result) -> Sheet:
@@ -47,6 +49,8 @@ def curves_figure(result: Result) -> Sheet:
             *styles[name],
             label=_two_lines(result, name),
             strong=is_strong(result, name),
+            unstable=np.array([bool(state.negative_eigenvalues) for state in result.paths[name].states]),
+            critical=np.flatnonzero([bool(state.critical) for state in result.paths[name].states]),
         )
         for name in forces
     ]
@@ -111,9 +115,36 @@ def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_r
     draw_frame(area, x_label, y_label)
     draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)
     for curve in curves:
-        area.add(Line2D(curve.x, curve.y, label=curve.label.replace("\n", ", "), **_look(curve)))
+        label, look = curve.label.replace("\n", ", "), _look(curve)
+        for part, dashed in _stretches(curve):
+            area.add(
+                Line2D(curve.x[part], curve.y[part], label=label, **look | ({"ls": (0, (3, 2))} if dashed else {}))
+            )
+        if curve.critical is not None and curve.critical.size:
+            at: dict[str, Any] = {
+                "ls": "",
+                "marker": "D",
+                "ms": 6,
+                "mfc": "white",
+                "mec": RED,
+                "mew": 1.4,
+                "zorder": 6,
+                "gid": "critical",
+            }
+            area.add(Line2D(curve.x[curve.critical], curve.y[curve.critical], **at))
     _name_ends(area, curves)
     return area
+
+
+def _stretches(curve: _Curve) -> Iterator[tuple[slice, bool]]:
+    """Cut a curve into stretches that are stable or not: a step is stable where both its ends are."""
+    if curve.unstable is None or not curve.unstable.any():
+        yield slice(None), False
+        return
+    steps = curve.unstable[:-1] | curve.unstable[1:]
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(steps)) + 1, [len(steps)]])
+    for begin, end in itertools.pairwise(ends.tolist()):
+        yield slice(begin, end + 1), bool(steps[begin])
 
 
 def _span(several: Sequence[Floats]) -> tuple[float, float]:

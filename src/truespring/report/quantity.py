@@ -6,6 +6,8 @@ from dataclasses import dataclass
 _PREFIXES: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
     "N": ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN")),
+    "N m": ((1e3, "kN m"), (1.0, "N m"), (1e-3, "mN m"), (1e-6, "µN m")),
+    "m/s^2": ((1.0, "m/s²"),),
     "Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa")),
 }
 
@@ -22,7 +24,7 @@ class Scale:
 
 
 def natural_scale(largest: float, unit: str) -> Scale:
-    """Return the largest prefix of `unit` (m, N or Pa) in which `largest`, in SI, is at least 1."""
+    """Return the largest prefix of `unit` (of _PREFIXES) in which `largest`, in SI, is at least 1."""
     prefixes = _PREFIXES[unit]
     # A hair below 1 still is 1: lengths come out of sums.
     fitting = [Scale(*one) for one in prefixes if abs(largest) >= one[0] * (1 - 1e-9)]

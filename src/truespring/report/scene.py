@@ -63,7 +63,7 @@ def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Pack
     if name == result.model or result.model is None:
         return values
     model = result.paths[result.model]
-    pairs = [(model.at(state.load_factor), state) for state in states]
+    pairs = [(model.at(state.level), state) for state in states]
     distances = [
         None if mine is None else float(np.linalg.norm(mine.displacement - state.displacement, axis=1).max())
         for mine, state in pairs

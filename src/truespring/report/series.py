@@ -1,5 +1,6 @@
 """Deformed bodies as files: a VTU series for ParaView and an STL of the last state."""
 
+from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
@@ -32,10 +33,13 @@ def write_series(path: Path, folder: FilePath, name: str) -> None:
     if not bodies and path.surface is not None:
         bodies = [(path.surface.load_factor, _surface_mesh(path.surface))]
     entries = []
+    forwards = all(one[0] < other[0] for one, other in pairwise(bodies))
     for number, (load_factor, body) in enumerate(bodies):
         file = levels / f"{name}_{number:04d}.vtu"
         body.write(file, file_format="vtu")
-        entries.append(f'<DataSet timestep="{load_factor!r}" file={quoteattr(f"{name}/{file.name}")}/>')
+        entries.append(
+            f'<DataSet timestep="{load_factor if forwards else number!r}" file={quoteattr(f"{name}/{file.name}")}/>'
+        )
     collection = "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries])
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
 

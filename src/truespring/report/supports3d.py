@@ -16,7 +16,7 @@ _SUPPORT = "#3d4248"
 def clamped_nodes(result: Result) -> Bools:
     """Tell which nodes are held in every direction, shape (n_nodes,)."""
     loading = result.problem.loading
-    return np.asarray((loading.held & (loading.displacement == 0)).all(axis=1))
+    return np.asarray((loading.held & (loading.motion() == 0)).all(axis=1))
 
 
 def draw_supports(area: Area, result: Result, scale: Scale, size: float) -> None:
@@ -31,7 +31,7 @@ def draw_supports(area: Area, result: Result, scale: Scale, size: float) -> None
     hatched[facets[patch]] = True
     visible = np.zeros(mesh.n_nodes, dtype=bool)
     visible[facets[facing[:, 2] > 0]] = True
-    still = loading.held & (loading.displacement == 0) & ~hatched[:, None]
+    still = loading.held & (loading.motion() == 0) & ~hatched[:, None]
     pinned = still.all(axis=1)
     for node in _thinned(mesh.nodes, np.flatnonzero(pinned), 3.2 * size):
         at = points[node, :2] / scale.size

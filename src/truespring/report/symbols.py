@@ -1,13 +1,15 @@
 """Marks on a picture of a body: the probe, loads and prescribed motions as arrows, supports on pins and rollers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.mesh import select
+from truespring.loading import Force, Gravity, Moment, Pressure, Traction
+from truespring.mesh import Mesh, select
+from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, given
 from truespring.report.result import Result
@@ -50,21 +52,71 @@ class Arrow:
     color: str
 
 
+class Acting(NamedTuple):
+    """A load or a prescribed motion: the nodes it acts on, the way it pulls them, what it is, its colour."""
+
+    nodes: Ints
+    vector: Floats
+    text: str
+    color: str
+
+
+def find_acting(problem: Problem) -> Iterator[Acting]:
+    """Yield the loads of a problem, then its prescribed motions."""
+    mesh = problem.mesh
+    everywhere = np.arange(mesh.n_nodes)
+    for load in problem.loads:
+        match load:
+            case Force():
+                yield _along(select(mesh, load.on), load.total, "F", "N", LOAD)
+            case Traction():
+                yield _along(select(mesh, load.on), load.traction, "t", "Pa", LOAD)
+            case Gravity():
+                yield _along(everywhere, load.acceleration, "g", "m/s^2", LOAD)
+            case Pressure():
+                force = -load.following(problem.body, problem.loading.held).gradient(mesh.nodes)
+                nodes = select(mesh, load.on)
+                total = force.sum(axis=0)
+                if np.linalg.norm(total) < 1e-6 * np.abs(force).sum():  # all around: one place stands for all
+                    nodes = nodes[[mesh.nodes[nodes, 0].argmax()]]
+                    total = force[nodes[0]]
+                yield Acting(nodes, total, f"p = {_size(load.pressure, 'Pa')}", LOAD)
+            case Moment():
+                nodes = select(mesh, load.on)
+                yield Acting(nodes, _around(mesh, nodes, load.moment), f"M = {_size(load.moment, 'N m')}", LOAD)
+    for support, held in zip(problem.supports, problem.held, strict=True):
+        if held.motion.any():
+            yield _along(held.nodes, held.motion, "u", "m", MOTION)
+        if held.turn is not None:
+            way = held.turn.motion(1e-3 / abs(held.turn.angle))
+            outermost = int(np.linalg.norm(way, axis=1).argmax())
+            yield Acting(held.nodes, way[outermost], f"turn {np.degrees(support.rotation):.4g}°", MOTION)
+
+
+def _along(nodes: Ints, vector: Sequence[float] | Floats, symbol: str, unit: str, color: str) -> Acting:
+    components = np.array(vector, dtype=float)
+    return Acting(nodes, components, f"{symbol} = {_size(np.linalg.norm(components), unit)}", color)
+
+
+def _size(value: float | np.floating[Any], unit: str) -> str:
+    return given(float(f"{value:.4g}"), unit)
+
+
+def _around(mesh: Mesh, nodes: Ints, moment: float) -> Floats:
+    """The way in which a moment moves the outer end of a face of a plane body."""
+    arm = mesh.nodes[nodes] - mesh.nodes[nodes].mean(axis=0)
+    x, y = arm[np.linalg.norm(arm, axis=1).argmax()]
+    return moment * np.array([-y, x])
+
+
 def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arrow]:
     """Return the arrows of all loads and motions of a body that is about `size` [m] large."""
     mesh = result.problem.mesh
-    acting = [(load.on, np.array(load.total, dtype=float), "N", LOAD) for load in result.problem.loads]
-    acting += [
-        (support.on, np.array(support.displacement, dtype=float), "m", MOTION)
-        for support in result.problem.supports
-        if support.displacement is not None
-    ]
     middle = (mesh.lower + mesh.upper) / 2
     found = []
-    for on, vector, unit, color in acting:
+    for nodes, vector, text, color in find_acting(result.problem):
         if not vector.any():
             continue
-        nodes = select(mesh, on)
         direction = vector / np.linalg.norm(vector)
         centre = mesh.nodes[nodes].mean(axis=0)
         outward = centre - middle
@@ -76,8 +128,6 @@ def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arro
         else:  # it shears: beside the face
             beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
             tail = centre + 2 * gap * beside - length / 2
-        symbol = "F" if unit == "N" else "u"
-        text = f"{symbol} = {given(float(f'{np.linalg.norm(vector):.4g}'), unit)}"
         start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
         side = 1 if seen[0] + 1e-9 * size >= seen_middle[0] else -1
         near = start if (side > 0) == (end[0] >= start[0]) else end

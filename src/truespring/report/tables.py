@@ -1,11 +1,12 @@
 """Tables for a terminal, as rich renderables: moduli before a solve, status and errors after it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
 from truespring.report.verdict import verdict
+from truespring.settling import Settling
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -87,6 +88,18 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     for name, path in result.paths.items():
         for warning in path.warnings:
             yield f"warning: {name}: {warning}"
+
+
+def settling_table(title: str, several: Iterable[Settling]) -> "Table":
+    """Return what quantities come to on finer meshes: value, change, order, extrapolated value, error."""
+    table = _table(title, "model", "", "value", "order", "at h = 0", "error", "")
+    for one in several:
+        order = "-" if one.order is None else f"{one.order:.2f}"
+        limit = "-" if one.extrapolated is None else f"{one.extrapolated:.6g}"
+        error = "-" if one.error is None else f"{one.error:.2%}"
+        value = f"{one.values[-1]:.6g} {one.unit}"
+        table.add_row(one.model, one.quantity, value, order, limit, error, "settled" if one.settled else "")
+    return table
 
 
 def _error_table(result: Result) -> "Table":

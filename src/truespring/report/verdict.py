@@ -253,9 +253,10 @@ class Drive:
 def drive(result: Result) -> Drive:
     """Return the dominant direction of the total force, or of the prescribed motion where no load is given."""
     loading = result.problem.loading
-    total = loading.external_force.sum(axis=0)
+    force = loading.force(result.problem.mesh.nodes)
+    total = force.sum(axis=0)
     # Loads that balance each other have no total: the largest single one decides, and so for motions.
-    each = loading.displacement if _driven_by_motion(result) else loading.external_force
+    each = loading.motion() if _driven_by_motion(result) else force
     largest = each.ravel()[np.abs(each).argmax()]
     if _driven_by_motion(result) or np.abs(total).max() <= 1e-9 * abs(largest):
         return Drive(int(np.abs(each).argmax()) % each.shape[1], float(np.sign(largest)))
@@ -413,7 +414,7 @@ def _everyone(result: Result, names: Sequence[str]) -> str:
 
 
 def _driven_by_motion(result: Result) -> bool:
-    return not result.problem.loading.external_force.any()
+    return result.problem.loading.driven_by_motion
 
 
 def _full(result: Result) -> str:

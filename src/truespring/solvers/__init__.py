@@ -2,5 +2,7 @@
 
 from truespring.solvers.balance import Equilibrium as Equilibrium
 from truespring.solvers.balance import Reporter as Reporter
+from truespring.solvers.continuation import ArcLength as ArcLength
+from truespring.solvers.continuation import DisplacementControl as DisplacementControl
 from truespring.solvers.cost import Cost as Cost
 from truespring.solvers.newton import Newton as Newton

@@ -9,11 +9,11 @@ from scipy import sparse
 
 from truespring.arrays import Floats
 from truespring.errors import ProblemError
+from truespring.linear.choice import LinearSolver, Tangent, choose
+from truespring.linear.direct import Direct, SingularMatrixError
+from truespring.linear.gradients import IndefiniteError, SlowError, norm
 from truespring.potential import Loading, Potential, SparseMatrix
 from truespring.solvers.cost import Cost
-from truespring.solvers.direct import Direct, SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError, SlowError, norm
-from truespring.solvers.linear import LinearSolver, Tangent, choose
 
 #: Called after each iteration with load factor, iteration and relative residual.
 Reporter = Callable[[float, int, float], None]
@@ -37,16 +37,21 @@ class Equilibrium:
         internal_force: gradient of the potential [N], shape (n_nodes, dim).
         energy: stored elastic energy [J].
         iterations: Newton iterations spent, those of attempts that were cut back included.
+        external_force: of the loads at the state [N], shape (n_nodes, dim).
         residual: unbalanced force over the largest of applied, reaction and internal force [-].
         negative_eigenvalues: of the tangent on the free directions: 0 if stable, None if not known.
         branched: true where an unstable equilibrium was left for a stable one nearby.
         snapped: true where the body moved much further than the step before lets expect.
+        critical: "limit point" or "bifurcation" where stability changes there, else empty.
+        mode: the way in which a body gives way at a critical point, largest component 1, shape (n_nodes, dim).
+        level: how far the way is gone that the solver was asked for, 0 to 1, where that is not the load factor.
         cost: of the path up to here.
     """
 
     load_factor: float
     positions: Floats
     internal_force: Floats
+    external_force: Floats
     energy: float
     iterations: int
     residual: float
@@ -54,6 +59,9 @@ class Equilibrium:
     negative_eigenvalues: int | None = None
     branched: bool = False
     snapped: bool = False
+    critical: str = ""
+    mode: Floats | None = None
+    level: float | None = None
     cost: Cost | None = None
 
 
@@ -95,21 +103,26 @@ class Balance:
         with np.errstate(over="ignore", invalid="ignore"):
             stored = self.potential.energy(positions)
         work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
-        return stored - float(work.sum()), abs(stored) + float(np.abs(work).sum())
+        following = [load_factor * load.energy(positions) for load in self.loading.following]
+        total = stored - float(work.sum()) + sum(following)
+        return total, abs(stored) + float(np.abs(work).sum()) + sum(map(abs, following))
 
     def force(self, positions: Floats, load_factor: float) -> Floats:
         """Return the unbalanced force on the free directions [N]."""
-        return self.unbalanced(self.potential.gradient(positions), load_factor)[0]
+        applied = self.loading.force(positions, load_factor)
+        return self.unbalanced(self.potential.gradient(positions), applied)[0]
 
-    def unbalanced(self, internal: Floats, load_factor: float) -> tuple[Floats, float]:
+    def unbalanced(self, internal: Floats, applied: Floats) -> tuple[Floats, float]:
         """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
-        applied = load_factor * self.loading.external_force
         scale = max(norm(applied), norm(internal))
         return np.where(self.free, internal - applied, 0.0), scale
 
-    def hessian(self, positions: Floats, *stress: Floats) -> SparseMatrix:
-        """Return the tangent in blocks of one row a direction, whatever form the potential gives it in."""
-        return self.in_blocks(self.potential.hessian(positions, *stress))
+    def hessian(self, positions: Floats, load_factor: float, *stress: Floats) -> SparseMatrix:
+        """Return the tangent in blocks of one row a direction, loads that follow the body included."""
+        tangent = self.in_blocks(self.potential.hessian(positions, *stress))
+        for load in self.loading.following if load_factor else ():
+            tangent = self.in_blocks(tangent + load_factor * load.hessian(positions))
+        return tangent
 
     def in_blocks(self, matrix: SparseMatrix) -> SparseMatrix:
         """Return a matrix in blocks of one row a direction."""
@@ -152,7 +165,7 @@ class Balance:
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
         try:
-            tangent = self.ready(self.hessian(state.positions), state.positions)
+            tangent = self.ready(self.hessian(state.positions, state.load_factor), state.positions)
         except SingularMatrixError:
             return Found(replace(state, negative_eigenvalues=None))
         negative = tangent.negative_eigenvalues
@@ -203,14 +216,15 @@ class Watch:
     """Keeps the best state of an iteration at one level, and tells when it is balanced."""
 
     def __init__(self, balance: Balance, load_factor: float, positions: Floats) -> None:
-        self._balance, self._load_factor = balance, load_factor
+        self._balance, self.load_factor = balance, load_factor
         nowhere = np.full_like(positions, np.nan)
-        self.best = Equilibrium(load_factor, positions, nowhere, np.inf, 0, np.inf, converged=False)
+        self.best = Equilibrium(load_factor, positions, nowhere, nowhere, np.inf, 0, np.inf, converged=False)
         self.force: Floats = nowhere
         self.residual = np.inf
         #: Whether the unbalanced force is below what rounding makes.
         self.drowned = False
         self._size, self._scale, self._drowned_before = np.inf, 0.0, np.inf
+        self._here, self._best_size = self.best, np.inf
 
     def at(self, positions: Floats, iteration: int, held_moved: bool = True) -> bool:
         """Look at a state; tell whether it is one: an iteration that ran away is over.
@@ -218,13 +232,23 @@ class Watch:
         A state whose held nodes have not made their motion yet is none to return.
         """
         internal = self._balance.potential.gradient(positions)
-        self.force, self._scale = self._balance.unbalanced(internal, self._load_factor)
+        applied = self._balance.loading.force(positions, self.load_factor)
+        self.force, self._scale = self._balance.unbalanced(internal, applied)
         self._size = norm(self.force)
         self.residual = self._size / self._scale if self._scale else 0.0
         if self._balance.report:
-            self._balance.report(self._load_factor, iteration, self.residual)
+            self._balance.report(self.load_factor, iteration, self.residual)
+        self._here = replace(
+            self.best,
+            load_factor=self.load_factor,
+            positions=positions,
+            internal_force=internal,
+            external_force=applied,
+            residual=self.residual,
+            iterations=iteration,
+        )
         if held_moved and self.residual < self.best.residual:
-            self.best = replace(self.best, positions=positions, internal_force=internal, residual=self.residual)
+            self.best, self._best_size = self._here, self._size
         self.best = replace(self.best, iterations=iteration)
         return bool(np.isfinite(self.residual))
 
@@ -236,15 +260,19 @@ class Watch:
         """
         below = self._size <= self._balance.rounding(tangent, positions)
         self.drowned = below and self.residual <= _NEAR_BEST * self.best.residual
-        helpless = self.drowned and (self._load_factor == 0 or self._size > self._drowned_before / 2)
+        helpless = self.drowned and (self.load_factor == 0 or self._size > self._drowned_before / 2)
         self._drowned_before = self._size if self.drowned else np.inf
         return helpless or self._size <= self._balance.tolerance * self._scale
 
     def equilibrium(self) -> Found:
-        """Return the best state as the equilibrium that it is."""
-        energy = self._balance.potential.energy(self.best.positions)
-        self._balance.spent += self.best.iterations
-        return self._balance.judged(replace(self.best, energy=energy, converged=True))
+        """Return the state looked at as the equilibrium that it is, or a former one that is better balanced.
+
+        By the force itself: where all forces vanish, as in a body moved as a whole, their ratio tells nothing.
+        """
+        state = self.best if self._best_size < self._size else self._here
+        energy = self._balance.potential.energy(state.positions)
+        self._balance.spent += state.iterations
+        return self._balance.judged(replace(state, energy=energy, converged=True))
 
     def failure(self) -> Found:
         """Return the best state as no equilibrium."""

@@ -7,10 +7,10 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.linear.direct import SingularMatrixError
+from truespring.linear.gradients import IndefiniteError
 from truespring.potential import Projectable, SparseMatrix
 from truespring.solvers.balance import Balance, Found, Watch, stepped
-from truespring.solvers.direct import SingularMatrixError
-from truespring.solvers.gradients import IndefiniteError
 
 # Energies that differ by less than this share cannot be told apart; see `_search`.
 _DROWNED = 1e-9
@@ -41,7 +41,7 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
     for iteration in range((undamped_iterations or balance.max_iterations) + 1):
         if not watch.at(positions, iteration):
             break
-        tangent = balance.hessian(positions)
+        tangent = balance.hessian(positions, load_factor)
         if watch.balanced(tangent, positions):
             del tangent  # the next one takes its room
             return watch.equilibrium()

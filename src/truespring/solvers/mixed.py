@@ -38,9 +38,10 @@ def start_from(balance: Balance, level: float, last: Equilibrium, previous: Equi
     if previous is not None and not last.branched:
         ratio = advance / (last.load_factor - previous.load_factor)
         ahead = last.positions + ratio * (last.positions - previous.positions)
+        ahead = np.where(loading.held, potential.nodes + loading.motion(level), ahead)
         if np.isfinite(balance.total_energy(ahead, level)[0]):
             return Start(ahead, stress + ratio * (stress - potential.stress(previous.positions)))
-    motion = np.where(loading.held, advance * loading.displacement, 0.0)
+    motion = loading.motion(level) - loading.motion(last.load_factor)
     return Start(last.positions, stress, motion if motion.any() else None)
 
 
@@ -58,7 +59,7 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
     for iteration in range(min(_MAX_ITERATIONS, balance.max_iterations) + 1):
         if not watch.at(positions, iteration, motion is None):
             break
-        tangent = balance.hessian(positions, stress)
+        tangent = balance.hessian(positions, load_factor, stress)
         if motion is None and watch.balanced(tangent, positions):
             del tangent  # the next one takes its room
             return watch.equilibrium()

@@ -7,14 +7,14 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ProblemError, nearest
+from truespring.linear.choice import check_linear, choose
+from truespring.linear.gradients import norm
 from truespring.potential import Loading, Potential, Stressed
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
 from truespring.solvers.cost import Cost
-from truespring.solvers.gradients import norm
 from truespring.solvers.line_search import descend
-from truespring.solvers.linear import check_linear, choose
 
 #: What `method` may be: how balance is found at a load level.
 METHODS = ("auto", "mixed", "line-search")
@@ -183,12 +183,12 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
     """Yield starting points for a level: where the last one ended, along the tangent, and by extrapolation."""
     state, loading = last.state, balance.loading
     advance = level - state.load_factor
-    motion = np.where(loading.held, advance * loading.displacement, 0.0)
+    motion = loading.motion(level) - loading.motion(state.load_factor)
     yield state.positions + motion
     if last.tangent is not None:
-        push = advance * loading.external_force.ravel()
+        push = advance * loading.force(state.positions).ravel()
         if motion.any():
-            push = push - balance.hessian(state.positions) @ motion.ravel()
+            push = push - balance.hessian(state.positions, state.load_factor) @ motion.ravel()
         push = np.where(balance.free, push.reshape(motion.shape), 0.0)
         yield state.positions + motion + last.tangent.solve(push)
     if previous is not None and not state.branched:

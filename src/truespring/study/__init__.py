@@ -1,5 +1,8 @@
 """Study files: read, checked, run."""
 
+from truespring.study.converge import converge as converge
+from truespring.study.converge import write_settling as write_settling
+from truespring.study.network import read_network as read_network
 from truespring.study.read import Study as Study
 from truespring.study.read import read_study as read_study
 from truespring.study.run import Realised as Realised

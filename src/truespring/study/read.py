@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -10,8 +10,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.equilibrium import Path
-from truespring.errors import NoLoadError, StudyError, TruespringError, close_words, nearest
+from truespring.equilibrium import Path, Solver
+from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest
+from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
 from truespring.mesh import (
     Mesh,
@@ -19,16 +20,19 @@ from truespring.mesh import (
     named_point,
     nearest_node,
     read_mesh,
+    read_voxels,
     rectangle,
+    refined,
     refuse_too_large,
     select,
     select_elements,
 )
-from truespring.models import Fem, Model, Springs, UserStiffness, moduli
-from truespring.problem import Fixed, Force, Problem, Region
+from truespring.models import Fem, Model, SpringNetwork, Springs, UserStiffness, moduli, refuse_mechanism
+from truespring.problem import Load, Problem, Region
 from truespring.reference import read_stl
-from truespring.solvers import Newton
+from truespring.solvers import ArcLength, DisplacementControl, Newton
 from truespring.study import schema
+from truespring.study.network import read_network
 from truespring.units import to_si
 
 
@@ -50,8 +54,8 @@ class Study:
     file: FilePath
     source: str
     problem: Problem
-    solver: Newton
-    entries: Mapping[str, Model | Path]
+    solver: Solver
+    entries: Mapping[str, Model | SpringNetwork | Path]
     model: str
     references: tuple[str, ...]
     probe: int | None
@@ -63,8 +67,11 @@ class Study:
         return self.file.stem
 
 
-def read_study(file: str | FilePath) -> Study:
-    """Read and check a study file; raise StudyError with file, key, value and what is allowed."""
+def read_study(file: str | FilePath, halvings: int = 0) -> Study:
+    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+
+    With `halvings` its mesh is that many times finer: elements of half the size, each time.
+    """
     place = FilePath(file)
     try:
         source = place.read_text(encoding="utf-8-sig")
@@ -80,15 +87,16 @@ def read_study(file: str | FilePath) -> Study:
         table = schema.StudyTable.model_validate(tables)
     except ValidationError as error:
         raise StudyError("\n".join(_messages(place, error, _line_numbers(source)))) from None
-    return _Builder(place, source, table).study()
+    return _Builder(place, source, table, halvings).study()
 
 
 class _Builder:
     """Makes the objects table by table, so that every error names its table."""
 
-    def __init__(self, file: FilePath, source: str, table: schema.StudyTable) -> None:
-        self.file, self.source, self.table = file, source, table
+    def __init__(self, file: FilePath, source: str, table: schema.StudyTable, halvings: int) -> None:
+        self.file, self.source, self.table, self.halvings = file, source, table, halvings
         self.lines = _line_numbers(source)
+        self.network: SpringNetwork | None = None
 
     @contextmanager
     def at(self, *key: str | int) -> Iterator[None]:
@@ -114,7 +122,7 @@ class _Builder:
             file=self.file,
             source=self.source,
             problem=problem,
-            solver=self.solver(),
+            solver=self.solver(problem),
             entries=entries,
             model=model,
             references=references,
@@ -122,8 +130,24 @@ class _Builder:
             tolerance=table.compare.tolerance,
         )
 
-    def solver(self) -> Newton:
+    def solver(self, problem: Problem) -> Solver:
         table = self.table.solver
+        past: dict[str, Any] = {"tolerance": table.tolerance, "max_iterations": table.max_iterations}
+        past["linear"] = "direct" if table.linear == "auto" else table.linear
+        for key in ("on", "direction", "to"):
+            given = getattr(table, key) is not None
+            if given != (table.control == "displacement"):
+                with self.at("solver", key):
+                    wanted = "is required and missing" if not given else "is"
+                    raise StudyError(f'{wanted} for control = "displacement"')
+        if table.direction is not None and table.to is not None:
+            with self.at("solver", "on"):
+                select(problem.mesh, table.on)
+            with self.at("solver"):
+                return DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
+        if table.control == "arc-length":
+            with self.at("solver", "linear"):
+                return ArcLength(table.load_steps, table.max_steps, **past)
         with self.at("solver", "linear"):
             return Newton(
                 load_steps=table.load_steps,
@@ -137,9 +161,13 @@ class _Builder:
         table = self.table
         with self.at("mesh"):
             mesh = self.mesh()
+        material = None
         with self.at("material"):
-            material = _material(table.material)
-        section = self.section(mesh)
+            if table.material is not None:
+                material = _material(table.material)
+            elif self.network is None:
+                raise StudyError("is required and missing")
+        section = None if self.network else self.section(mesh)
         regions = []
         for number, region in enumerate(table.region):
             with self.at("region", number):
@@ -151,15 +179,24 @@ class _Builder:
                 select(mesh, support.on)
             with self.at("support", number, "displacement"):
                 _one_a_direction(support.displacement, mesh)
-            supports.append(Fixed(support.on, support.fix, support.displacement))
+            with self.at("support", number, "about"):
+                _one_a_direction(support.about, mesh)
+            supports.append(
+                Fixed(support.on, support.fix, support.displacement, support.rotation, support.about, support.axis)
+            )
         for number, load in enumerate(table.load):
-            with self.at("load", number, "on"):
-                select(mesh, load.on)
-            with self.at("load", number, "force"):
-                _one_a_direction(load.force, mesh)
-            loads.append(Force(load.on, load.force))
+            if load.on is not None:
+                with self.at("load", number, "on"):
+                    select(mesh, load.on)
+            ((key, value),) = ((key, getattr(load, key)) for key in schema.LOADS if getattr(load, key) is not None)
+            with self.at("load", number, key):
+                _one_a_direction(value if isinstance(value, list) else None, mesh)
+            loads.append(_LOADS[key](load.on, value))
         try:
             return Problem(mesh, material, section, supports, loads, regions)
+        except LoadError as error:
+            with self.at("load", error.number):
+                raise StudyError(error.text) from None
         except TruespringError as error:
             with self.at("load" if isinstance(error, NoLoadError) else "support"):
                 raise
@@ -167,16 +204,37 @@ class _Builder:
     def mesh(self) -> Mesh:
         match self.table.mesh:
             case schema.RectangleTable() as table:
-                return rectangle(table.size, table.elements, table.element, table.diagonal)
+                return rectangle(table.size, self.finer(table.elements), table.element, table.diagonal)
             case schema.BoxTable() as table:
-                return box(table.size, table.elements, table.element)
+                return box(table.size, self.finer(table.elements), table.element)
+            case schema.VoxelsTable() as table:
+                with self.at("mesh", "unit"):
+                    scale = _unit(table.unit)
+                with self.at("mesh", "voxels"):
+                    ready = table.voxels if table.voxels.startswith("pyvista:") else self.file.parent / table.voxels
+                    mesh = read_voxels(ready, table.label, table.edge, scale)
+                    return self.halved(mesh)
+            case schema.NetworkMeshTable() as table:
+                if self.halvings:
+                    raise StudyError("a network cannot be refined: it is as fine as its springs are")
+                self.network = read_network(*(self.file.parent / one for one in (table.nodes, table.springs)))
+                return self.network.mesh
             case table:
                 with self.at("mesh", "unit"):
-                    scale = to_si(f"1 {table.unit}", "length")
+                    scale = _unit(table.unit)
                 with self.at("mesh", "file"):
                     mesh = read_mesh(self.file.parent / table.file, scale)
                     refuse_too_large(mesh.n_nodes, mesh.dim)
-                    return mesh
+                    return self.halved(mesh)
+
+    def finer(self, elements: list[int]) -> list[int]:
+        return [count * 2**self.halvings for count in elements]
+
+    def halved(self, mesh: Mesh) -> Mesh:
+        for _ in range(self.halvings):
+            refuse_too_large(2**mesh.dim * mesh.n_nodes, mesh.dim)
+            mesh = refined(mesh)
+        return mesh
 
     def section(self, mesh: Mesh) -> Section | None:
         table = self.table.section
@@ -189,7 +247,7 @@ class _Builder:
                 raise StudyError(f"is required and missing; kind: {', '.join(_SECTIONS)}, and a thickness")
             return _SECTIONS[table.kind](table.thickness)
 
-    def entry(self, problem: Problem, name: str, table: Any) -> Model | Path:
+    def entry(self, problem: Problem, name: str, table: Any) -> Model | SpringNetwork | Path:
         with self.at("models", name):
             match table:
                 case schema.StlTable():
@@ -197,6 +255,11 @@ class _Builder:
                     undeformed = None if table.undeformed is None else beside / table.undeformed
                     read: Path = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
                     return read
+                case schema.NetworkTable():
+                    if self.network is None:
+                        raise StudyError('kind = "network" is for a mesh of nodes and springs')
+                    refuse_mechanism(self.network, problem.loading.held)
+                    return self.network
                 case schema.FemTable():
                     model: Model = Fem(table.law, table.element)
                 case _:
@@ -207,7 +270,7 @@ class _Builder:
                 moduli(problem.homogeneous[0], model)
             return model
 
-    def compared(self, entries: Mapping[str, Model | Path]) -> tuple[str, tuple[str, ...]]:
+    def compared(self, entries: Mapping[str, Model | SpringNetwork | Path]) -> tuple[str, tuple[str, ...]]:
         """Return the model that is compared, by default the first springs, and its references, by default the rest."""
         compare = self.table.compare
         springs = [name for name, entry in entries.items() if isinstance(entry, Springs)]
@@ -228,6 +291,11 @@ class _Builder:
                 raise StudyError(f"'{name}' is not among the models{nearest(name, entries)}: {', '.join(entries)}")
 
 
+def _unit(text: str) -> float:
+    """The size of a unit of length [m]: "mm", or "0.2 mm" where one of the file's is so long."""
+    return to_si(text if text[:1].isdigit() else f"1 {text}", "length")
+
+
 def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
     if values is not None and len(values) != mesh.dim:
         raise StudyError(f"{values} has {len(values)} values, the body has {mesh.dim} directions")
@@ -237,6 +305,14 @@ def _material(table: schema.MaterialTable) -> Material:
     return Material(table.young, table.poisson, table.density)
 
 
+_LOADS: dict[str, Callable[[Any, Any], Load]] = {
+    "force": Force,
+    "traction": Traction,
+    "pressure": Pressure,
+    "moment": Moment,
+    "gravity": lambda _, acceleration: Gravity(acceleration),
+}
+_OTHER_MESHES = "file = a mesh file, voxels = a label image, nodes and springs = CSV files"
 _SECTIONS: dict[str, type[Section]] = {"plane-stress": PlaneStress, "plane-strain": PlaneStrain}
 
 
@@ -279,12 +355,12 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
         case "union_tag_invalid" | "union_tag_not_found" if key == ("mesh",):
             given = value.get("shape") if isinstance(value, dict) else value
             if given is None:
-                return f"{place}: shape is required and missing; allowed: rectangle, box; or file = a mesh file"
+                return f"{place}: shape is required and missing; allowed: rectangle, box; or {_OTHER_MESHES}"
             close = nearest(str(given), ("rectangle", "box"))
-            return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or file = a mesh file"
+            return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or {_OTHER_MESHES}"
         case "union_tag_invalid" | "union_tag_not_found":
             given = value.get("kind") if isinstance(value, dict) else value
-            kinds = ("springs", "fem", "stl")
+            kinds = ("springs", "fem", "network", "stl")
             return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
         case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
             return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
@@ -314,6 +390,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
     kinds: dict[str | int, type[schema.Table]] = {
         "springs": schema.SpringsTable,
         "fem": schema.FemTable,
+        "network": schema.NetworkTable,
         "stl": schema.StlTable,
     }
     if not loc:
@@ -321,6 +398,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
     if loc[0] == "mesh":
         meshes: dict[str, type[schema.Table]]
         meshes = {"rectangle": schema.RectangleTable, "box": schema.BoxTable, "file": schema.FileTable}
+        meshes |= {"voxels": schema.VoxelsTable, "springs": schema.NetworkMeshTable}
         return list(meshes[str(loc[1])].model_fields)
     if loc[-1] == "stiffness":
         return list(schema.StiffnessTable.model_fields)

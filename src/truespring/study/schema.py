@@ -13,6 +13,7 @@ from pydantic import (
     Tag,
     WithJsonSchema,
     field_validator,
+    model_validator,
 )
 
 from truespring.errors import TruespringError, nearest
@@ -64,6 +65,9 @@ Length = Annotated[float, _si("length"), _quantity("length")]
 Stress = Annotated[float, _si("stress"), _quantity("stress")]
 Force = Annotated[float, _si("force"), _quantity("force")]
 Density = Annotated[float, _si("density"), _quantity("density")]
+Acceleration = Annotated[float, _si("acceleration"), _quantity("acceleration")]
+Moment = Annotated[float, _si("moment"), _quantity("moment")]
+Angle = Annotated[float, _si("angle"), _quantity("angle")]
 RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
 LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
 FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
@@ -168,15 +172,35 @@ class FileTable(Table):
     unit: str = "m"
 
 
+class VoxelsTable(Table):
+    """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
+
+    voxels: str
+    label: int
+    edge: Length | None = None
+    unit: str = "mm"
+
+
+class NetworkMeshTable(Table):
+    """A plain network from two CSV files; the model of kind "network" takes their stiffness."""
+
+    nodes: str
+    springs: str
+
+
 def _mesh_form(value: Any) -> str | None:
     """Tell the table of a mesh by its keys."""
     if not isinstance(value, dict):
         return None
-    return "file" if "file" in value else str(value.get("shape"))
+    return next((form for form in ("file", "voxels", "springs") if form in value), str(value.get("shape")))
 
 
 MeshTable = Annotated[
-    Annotated[RectangleTable, Tag("rectangle")] | Annotated[BoxTable, Tag("box")] | Annotated[FileTable, Tag("file")],
+    Annotated[RectangleTable, Tag("rectangle")]
+    | Annotated[BoxTable, Tag("box")]
+    | Annotated[FileTable, Tag("file")]
+    | Annotated[VoxelsTable, Tag("voxels")]
+    | Annotated[NetworkMeshTable, Tag("springs")],
     Discriminator(_mesh_form),
 ]
 
@@ -208,20 +232,47 @@ class SupportTable(Table):
     on: On
     fix: Annotated[list[Direction], Field(min_length=1)] | None = None
     displacement: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = None
+    rotation: Angle = 0.0
+    about: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = None
+    axis: Annotated[list[Number], _three] | None = None
 
 
 class LoadTable(Table):
-    """A total force, shared consistently."""
+    """A load: one key of LOADS tells which; all but gravity act on a selection."""
 
-    on: On
-    force: Annotated[list[Force], Field(min_length=2, max_length=3)]
+    on: On = None
+    force: Annotated[list[Force], Field(min_length=2, max_length=3)] | None = None
+    traction: Annotated[list[Stress], Field(min_length=2, max_length=3)] | None = None
+    pressure: Stress | None = None
+    moment: Moment | None = None
+    gravity: Annotated[list[Acceleration], Field(min_length=2, max_length=3)] | None = None
+
+    @model_validator(mode="after")
+    def _one_load(self) -> "LoadTable":
+        given = [name for name in LOADS if getattr(self, name) is not None]
+        if len(given) != 1:
+            told = f"{' and '.join(given)} are given" if given else "nothing is given"
+            raise ValueError(f"{told}: a load has one of {', '.join(LOADS)}")
+        if given == ["gravity"] and self.on is not None:
+            raise ValueError("gravity acts on the whole body: leave out on")
+        if given != ["gravity"] and self.on is None:
+            raise ValueError(f"on is required and missing: where the {given[0]} acts")
+        return self
+
+
+#: What a load may be.
+LOADS = ("force", "traction", "pressure", "moment", "gravity")
 
 
 class SolverTable(Table):
     """How equilibrium is found."""
 
     load_steps: Annotated[int, Field(ge=1, le=100_000)] = 10
-    control: Literal["load"] = "load"
+    control: Literal["load", "displacement", "arc-length"] = "load"
+    on: On = None
+    direction: Direction | None = None
+    to: Length | None = None
+    max_steps: Annotated[int, Field(ge=1, le=100_000)] = 200
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
     max_iterations: Annotated[int, Field(ge=1)] = 50
     method: Literal["auto", "mixed", "line-search"] = "auto"
@@ -256,6 +307,12 @@ class FemTable(Table):
     element: FemElement | None = None
 
 
+class NetworkTable(Table):
+    """The network of the mesh itself."""
+
+    kind: Literal["network"]
+
+
 class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
@@ -275,7 +332,7 @@ class CompareTable(Table):
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
 
 
-ModelTable = Annotated[SpringsTable | FemTable | StlTable, Discriminator("kind")]
+ModelTable = Annotated[SpringsTable | FemTable | NetworkTable | StlTable, Discriminator("kind")]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 
@@ -284,7 +341,7 @@ class StudyTable(Table):
 
     title: str | None = None
     mesh: MeshTable
-    material: MaterialTable
+    material: MaterialTable | None = None
     region: list[RegionTable] = []
     section: SectionTable | None = None
     support: Annotated[list[SupportTable], Field(min_length=1)]

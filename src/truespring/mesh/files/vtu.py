@@ -37,6 +37,17 @@ _DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
 
 def read_vtu(data: bytes) -> Contents:
     """Read a .vtu file; raise MeshError where it is damaged, in several pieces or compressed in another way."""
+    root, reader = open_vtk(data, "UnstructuredGrid")
+    grid = root.find("UnstructuredGrid")
+    assert grid is not None  # open_vtk has looked
+    pieces = [piece for piece in grid.iter("Piece") if piece.get("NumberOfPoints") != "0"]
+    if len(pieces) != 1:
+        raise MeshError(f"there are {len(pieces)} pieces: merge them into one grid")
+    return reader.contents(pieces[0])
+
+
+def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
+    """Return the XML of a VTK file of a kind, and what reads its arrays; raise MeshError where it is none."""
     tag = re.search(rb"<AppendedData[^>]*>", data)
     end = data.rfind(b"</AppendedData>")
     if tag and end < tag.end():
@@ -44,17 +55,13 @@ def read_vtu(data: bytes) -> Contents:
     try:  # what is appended may be raw, which is no XML
         root = ElementTree.fromstring(data[: tag.end()] + data[end:] if tag else data)
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise MeshError(f"this is no .vtu file, or not a whole one: {error}") from None
-    grid = root.find("UnstructuredGrid")
-    if root.tag != "VTKFile" or grid is None:
-        raise MeshError(f"a VTKFile of type UnstructuredGrid is wanted, not {root.tag[:40]} of type {root.get('type')}")
-    pieces = [piece for piece in grid.iter("Piece") if piece.get("NumberOfPoints") != "0"]
-    if len(pieces) != 1:
-        raise MeshError(f"there are {len(pieces)} pieces: merge them into one grid")
-    return _Reader(root, data[tag.end() : end] if tag else b"").contents(pieces[0])
+        raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
+    if root.tag != "VTKFile" or root.find(kind) is None:
+        raise MeshError(f"a VTKFile of type {kind} is wanted, not {root.tag[:40]} of type {root.get('type')}")
+    return root, Reader(root, data[tag.end() : end] if tag else b"")
 
 
-class _Reader:
+class Reader:
     """Reads the arrays of a file, which are written in one way."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes) -> None:
@@ -68,10 +75,10 @@ class _Reader:
     def contents(self, piece: ElementTree.Element) -> Contents:
         """Return what a piece holds."""
         n_points, n_cells = (_count(piece, name) for name in ("NumberOfPoints", "NumberOfCells"))
-        points = next(iter(self._arrays(piece, "Points", n_points).values()), np.zeros((0, 0)))
+        points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 0)))
         if points.shape != (n_points, 3):
             raise MeshError(f"<Points> holds an array of shape {points.shape}, wanted is ({n_points}, 3)")
-        cells = self._arrays(piece, "Cells", None)
+        cells = self.arrays(piece, "Cells", None)
         connectivity, ends, types = (_integers(cells, name) for name in ("connectivity", "offsets", "types"))
         if len(ends) != n_cells:
             raise MeshError(f"{n_cells} cells are announced, there are {len(ends)} offsets")
@@ -80,11 +87,11 @@ class _Reader:
             np.concatenate([[0], ends]),
             connectivity,
             types,
-            self._arrays(piece, "PointData", n_points),
-            self._arrays(piece, "CellData", n_cells),
+            self.arrays(piece, "PointData", n_points),
+            self.arrays(piece, "CellData", n_cells),
         )
 
-    def _arrays(self, piece: ElementTree.Element, section: str, n_rows: int | None) -> dict[str, NDArray[Any]]:
+    def arrays(self, piece: ElementTree.Element, section: str, n_rows: int | None) -> dict[str, NDArray[Any]]:
         """Return the arrays of a section by name, shape (n_rows,) or (n_rows, components); texts are passed over."""
         arrays = {}
         for element in piece.findall(f"{section}/DataArray"):

@@ -1,0 +1,6 @@
+"""Linear solvers: what solves a tangent, and what it tells of it. They see matrices and nodes only."""
+
+from truespring.linear.choice import LinearSolver as LinearSolver
+from truespring.linear.choice import Tangent as Tangent
+from truespring.linear.choice import check_linear as check_linear
+from truespring.linear.choice import choose as choose

@@ -1,0 +1,94 @@
+"""Dead loads: forces that keep their direction, shared consistently with linear elements over what they act on."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import ProblemError
+from truespring.loading.values import components
+from truespring.mesh import Mesh, Selection, corner_measures, covering, element_corner_measures, facets_within, select
+
+
+class Body(NamedTuple):
+    """What loads act on: `thickness` [m] is 1 in space, `density` [kg/m^3] of each element None where not known."""
+
+    mesh: Mesh
+    thickness: float
+    density: Floats | None
+
+
+class Spread(NamedTuple):
+    """A dead load over cells of the mesh.
+
+    Attributes:
+        cells: elements, facets, edges or nodes, shape (n, corners).
+        measures: what each corner's shape function integrates to [m^k], shape (n, corners); 1 for nodes alone.
+        density: force per measure of each cell [N/m^k], shape (n, dim).
+    """
+
+    cells: Ints
+    measures: Floats
+    density: Floats
+
+
+def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
+    """Return the sum of loads on the nodes [N], of shape (n_nodes, dim)."""
+    force = np.zeros(shape)
+    for cells, measures, density in spreads:
+        np.add.at(force, cells, measures[:, :, None] * density[:, None, :])
+    return force
+
+
+@dataclass(frozen=True)
+class Force:
+    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`.
+
+    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
+    ("right-middle"), a Plane, a Box, a Near or node numbers.
+    """
+
+    on: Selection
+    total: Sequence[float]
+
+    def spread(self, body: Body) -> Spread:
+        """Return the load over the cells that carry it: those that cover the nodes, else the nodes alone."""
+        total = components(self.total, body.mesh.dim, "force", "N")
+        nodes = select(body.mesh, self.on)
+        cells, measures = covering(body.mesh, nodes) or (nodes[:, None], np.ones((len(nodes), 1)))
+        return Spread(cells, measures, np.tile(total / measures.sum(), (len(cells), 1)))
+
+
+@dataclass(frozen=True)
+class Traction:
+    """A dead load: force per area at rest [Pa], one value a direction, on the facets of the boundary `on`.
+
+    `on` is a side, a group of the mesh, a Plane, a Box or node numbers: all facets whose nodes are among them.
+    """
+
+    on: Selection
+    traction: Sequence[float]
+
+    def spread(self, body: Body) -> Spread:
+        """Return the load over the facets."""
+        traction = components(self.traction, body.mesh.dim, "traction", "Pa")
+        facets = facets_within(body.mesh, select(body.mesh, self.on))
+        density = np.tile(body.thickness * traction, (len(facets), 1))
+        return Spread(facets, corner_measures(body.mesh.nodes[facets]), density)
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """The weight of the whole body under an `acceleration` [m/s^2], one value a direction; needs a density."""
+
+    acceleration: Sequence[float]
+
+    def spread(self, body: Body) -> Spread:
+        """Return the load over all elements."""
+        acceleration = components(self.acceleration, body.mesh.dim, "gravity", "m/s^2")
+        if body.density is None:
+            raise ProblemError("gravity needs the material's density [kg/m^3], and that of each region")
+        measures = body.thickness * element_corner_measures(body.mesh)
+        return Spread(body.mesh.elements, measures, body.density[:, None] * acceleration)

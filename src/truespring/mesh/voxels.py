@@ -1,0 +1,115 @@
+"""From a label image to a body: each voxel of an organ a cube, as large as wanted."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.errors import MeshError
+from truespring.mesh.files.images import Labels, read_labels
+from truespring.mesh.mesh import Mesh
+from truespring.mesh.shapes import refuse_too_large
+
+# The image is looked at in so many places along each edge of a cube: it is part of the body where more than
+# half of them are.
+_SAMPLES = 3
+_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+# Labels beside which a list of all of them is of no help.
+_MANY = 30
+
+
+def read_voxels(file: str | Path, label: int, edge: float | None = None, scale: float = 1e-3) -> Mesh:
+    """Read the body of one label from a label image, a hexahedron a voxel.
+
+    Args:
+        file: the image: .vti, .npy, .nii, .nii.gz, .nrrd, .mha or .mhd.
+        label: the body's own.
+        edge: of the cubes wanted [m]; None takes the voxels as they are, cuboids where their spacing is.
+        scale: the image's unit of length [m]; most know millimetres only.
+
+    Of several parts that no face joins the largest is taken; the notes say what was left out. Places are those of
+    the image: origin, spacing and direction count. Raises MeshError, with the file, where the image cannot be read
+    or has no such label, or nothing is left of it.
+    """
+    if not (math.isfinite(scale) and scale > 0):
+        raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
+    if edge is not None and not (math.isfinite(edge) and edge > 0):
+        raise MeshError(f"{file}: edge = {edge:g} m: the edge of the cubes must be above 0")
+    labels = read_labels(file)
+    try:
+        return _mesh(labels, label, edge, scale)
+    except MeshError as error:
+        raise MeshError(f"{file}: {error}") from None
+
+
+def _mesh(labels: Labels, label: int, edge: float | None, scale: float) -> Mesh:
+    inside = labels.values == label
+    n_inside = int(inside.sum())
+    if not n_inside:
+        there = np.unique(labels.values)
+        told = ", ".join(map(str, there[:_MANY].tolist())) + (", ..." if len(there) > _MANY else "")
+        raise MeshError(f"no voxel has the label {label}; there are {told}")
+    (box,) = ndimage.find_objects(inside.astype(np.uint8))
+    low = np.array([part.start for part in box])
+    inside, spacing = inside[box], scale * labels.spacing
+    filled, sides = (inside, spacing) if edge is None else (_resampled(inside, spacing, edge), np.full(3, edge))
+    if not filled.any():
+        raise MeshError(
+            f"cubes of {edge:g} m are too large: none is filled by half with label {label}, "
+            f"{' by '.join(f'{side:.3g}' for side in inside.shape * spacing)} m large"
+        )
+    filled, notes = _largest_part(filled, label)
+    refuse_too_large(int(filled.sum()), 3)
+    nodes, elements = _cubes(filled)
+    # The corner of the first voxel; its place is its middle.
+    corner = scale * labels.origin + labels.direction @ ((low - 0.5) * spacing)
+    if np.linalg.det(labels.direction) < 0:  # the axes of a mirror image: the order of nodes is mirrored too
+        elements = elements[:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    places = corner + (nodes * sides) @ labels.direction.T
+    thin = [axis for axis, count in zip("xyz", np.ptp(nodes, axis=0), strict=True) if count == 1]
+    if thin:
+        notes.append(f"one cube thick along its {' and '.join(thin)} axis: it bends as no real body does")
+    return Mesh(places, elements, "hexahedron", notes=tuple(notes))
+
+
+def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
+    """Which cubes of an edge [m] are filled by more than half."""
+    counts = np.ceil(np.array(inside.shape) * spacing / edge - 1e-9).astype(int)
+    refuse_too_large(int(counts.prod()) // 8, 3)  # a body fills that much of its box at least, if it is one
+    at = [
+        ((np.arange(count * _SAMPLES) + 0.5) / _SAMPLES * edge / side).astype(int)
+        for count, side in zip(counts, spacing, strict=True)
+    ]
+    seen = inside[np.ix_(*(np.minimum(place, n - 1) for place, n in zip(at, inside.shape, strict=True)))]
+    for axis, (place, n) in enumerate(zip(at, inside.shape, strict=True)):
+        beyond: list[slice | Bools] = [slice(None)] * 3
+        beyond[axis] = place >= n
+        seen[tuple(beyond)] = False
+    by_cube = seen.reshape(*(part for count in counts for part in (count, _SAMPLES)))
+    return np.asarray(by_cube.sum(axis=(1, 3, 5)) > _SAMPLES**3 / 2)
+
+
+def _largest_part(filled: Bools, label: int) -> tuple[Bools, list[str]]:
+    """The largest part whose cubes share faces, without the empty layers around it, and a note on what is left out."""
+    parts, n_parts = ndimage.label(filled)
+    if n_parts == 1:
+        return filled, []
+    sizes = np.bincount(parts.ravel())[1:]
+    left = int(sizes.sum() - sizes.max())
+    note = (
+        f"label {label} has {n_parts} parts that no face joins: the largest has {sizes.max()} cubes, "
+        f"{left} of the others {'is' if left == 1 else 'are'} left out"
+    )
+    return parts == sizes.argmax() + 1, [note]
+
+
+def _cubes(filled: Bools) -> tuple[Floats, Ints]:
+    """Corners of cubes, counted along the axes, and the eight of each cube."""
+    shape = np.array(filled.shape) + 1
+    corners = np.argwhere(filled)[:, None] + _CORNERS
+    numbers = np.ravel_multi_index(tuple(corners.reshape(-1, 3).T), tuple(shape))
+    used, elements = np.unique(numbers, return_inverse=True)
+    nodes = np.stack(np.unravel_index(used, tuple(shape)), axis=1).astype(np.float64)
+    return nodes, elements.reshape(-1, 8)

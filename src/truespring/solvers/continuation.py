@@ -1,0 +1,341 @@
+"""Paths past limit points: the load factor is an unknown, and a displacement, or the way gone, is prescribed.
+
+One more equation w . u = c stands beside the balance of forces (Riks 1979; Batoz and Dhatt 1979): of displacement
+control w picks what is controlled, of arc length it is the direction of the path (Crisfield's cylinder, linearised).
+Where the number of negative eigenvalues changes from one state to the next, the point where it does is found, and is a
+limit point if the load has a part along the mode there, a bifurcation if it has none (Wriggers and Simo 1990).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from truespring.arrays import Floats
+from truespring.errors import ProblemError
+from truespring.linear import check_linear, choose
+from truespring.linear.direct import Factorisation, SingularMatrixError
+from truespring.linear.gradients import norm
+from truespring.potential import Loading, Potential, SparseMatrix
+from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter, Watch
+from truespring.solvers.cost import Cost
+from truespring.solvers.line_search import descend
+
+# A step that takes so many iterations keeps its length; one of fewer is followed by a longer one, of more by a shorter.
+_WANTED_ITERATIONS = 4
+# Turns of the path by more than this, as a cosine, are not taken for the same path: the step is cut.
+_STRAIGHT = 0.5
+# A step is cut back to this share of the first one at least.
+_SHORTEST = 2.0**-12
+# Along the step between two states a critical point is found to this share of it.
+_PLACE = 1e-12
+# A load whose part along the mode is below this share of it leaves a point a bifurcation.
+_NO_PART = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementControl:
+    """The displacement `to` [m] of what is selected `on`, the mean along a `direction` "x", "y" or "z", in equal steps.
+
+    Attributes:
+        steps: as many states are reached, and recorded.
+        tolerance: relative residual at which a state counts as balanced [-].
+        max_iterations: Newton iterations for one state before its step is cut back.
+        linear: a library for factorisations by name, or "direct": "scipy", "rslab", "pardiso".
+    """
+
+    on: object
+    direction: str
+    to: float
+    steps: int = 20
+    tolerance: float = 1e-10
+    max_iterations: int = 20
+    linear: str = "direct"
+
+    def __post_init__(self) -> None:
+        _check(self.steps, self.max_iterations, self.tolerance, self.linear)
+        if not (np.isfinite(self.to) and self.to):
+            raise ProblemError(f"to = {self.to!r} m: the displacement to reach must be finite and not zero")
+
+    def follow(
+        self, potential: Potential, loading: Loading, weights: Floats, report: Reporter | None = None
+    ) -> Iterator[Equilibrium]:
+        """Yield the equilibria in the order of the path; `weights` of shape (n_nodes, dim) make what is controlled.
+
+        Where a state cannot be reached the last one yielded is not converged: the best one there.
+        """
+        if weights[loading.held].any():
+            raise ProblemError("the displacement that is controlled is held by a support: choose another")
+        balance = _balance(potential, loading, self, report)
+        yield from _controlled(balance, weights, self.to, self.steps)
+
+
+@dataclass(frozen=True, slots=True)
+class ArcLength:
+    """Along the path from no load to the full one, through every limit point on the way.
+
+    Attributes:
+        load_steps: the first step is what the body at rest would need for this part of the load.
+        max_steps: states at most; a path that has not come to the full load by then ends where it is.
+        longest: steps are no longer than so many times the first.
+        tolerance: relative residual at which a state counts as balanced [-].
+        max_iterations: Newton iterations for one state before its step is cut back.
+        linear: a library for factorisations by name, or "direct": "scipy", "rslab", "pardiso".
+    """
+
+    load_steps: int = 10
+    max_steps: int = 200
+    longest: float = 4.0
+    tolerance: float = 1e-10
+    max_iterations: int = 20
+    linear: str = "direct"
+
+    def __post_init__(self) -> None:
+        _check(self.load_steps, self.max_iterations, self.tolerance, self.linear)
+        if self.max_steps < 1 or not self.longest >= 1:
+            raise ProblemError("max_steps and longest must be at least 1")
+
+    def follow(self, potential: Potential, loading: Loading, report: Reporter | None = None) -> Iterator[Equilibrium]:
+        """Yield the equilibria in the order of the path.
+
+        Where a state cannot be reached the last one yielded is not converged: the best one there.
+        """
+        balance = _balance(potential, loading, self, report)
+        yield from _along(balance, 1.0 / self.load_steps, self.max_steps, self.longest)
+
+
+def _check(steps: int, max_iterations: int, tolerance: float, linear: str) -> None:
+    if steps < 1 or max_iterations < 1:
+        raise ProblemError("steps and max_iterations must be at least 1")
+    if not 0 < tolerance < 1:
+        raise ProblemError(f"tolerance = {tolerance}: a relative residual between 0 and 1 is wanted")
+    check_linear(linear)
+    if linear in ("auto", "multigrid"):
+        raise ProblemError(f"linear = '{linear}': past a limit point only factorisations serve: direct, or one by name")
+
+
+def _balance(
+    potential: Potential, loading: Loading, control: DisplacementControl | ArcLength, report: Reporter | None
+) -> Balance:
+    linear = choose(control.linear, potential.nodes, loading.held)
+    return Balance(potential, loading, control.tolerance, control.max_iterations, linear, report)
+
+
+@dataclass(frozen=True, eq=False)
+class _Constraint:
+    """The equation w . (x - X) + share lambda = target."""
+
+    weights: Floats
+    share: float
+    target: float
+
+
+def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Iterator[Equilibrium]:
+    """Follow equal steps of one displacement, halved where they fail."""
+    last = _at_rest(balance)
+    yield last.state
+    reached, level, step = 0.0, 1, to / steps
+    while last.state.converged and level <= steps:
+        wanted = to * (level / steps)
+        goal = wanted if abs(wanted - reached) <= abs(step) * (1 + 1e-9) else reached + step
+        there = _corrected(balance, last.state, _Constraint(weights, 0.0, goal))
+        if not there.state.converged:
+            if abs(step) > _SHORTEST * abs(to / steps):
+                step /= 2
+                continue
+            yield _with_cost(balance, there.state)
+            return
+        yield from _critical(balance, last, there, weights)
+        there = there._replace(state=replace(there.state, level=level / steps if goal == wanted else goal / to))
+        yield _with_cost(balance, there.state)
+        last, reached = there, goal
+        if goal == wanted:
+            level += 1
+        step = np.sign(to) * min(2 * abs(step), abs(to / steps))
+
+
+def _along(balance: Balance, first: float, max_steps: int, longest: float) -> Iterator[Equilibrium]:
+    """Follow the arc length until the load factor is 1, then that state itself."""
+    last = _at_rest(balance)
+    yield last.state
+    tangent = _tangent(balance, last.state, None)
+    if tangent is None:
+        return
+    direction, slope = tangent
+    begin = step = first / slope if slope else first
+    for _ in range(max_steps):
+        while True:
+            offset = float((direction * (last.state.positions - balance.potential.nodes)).sum())
+            there = _corrected(balance, last.state, _Constraint(direction, 0.0, offset + step), direction * step)
+            turned = _tangent(balance, there.state, direction) if there.state.converged else None
+            if turned is not None and float((turned[0] * direction).sum()) > _STRAIGHT:
+                break
+            step /= 2
+            if step < _SHORTEST * begin:
+                yield _with_cost(balance, replace(there.state, converged=False))
+                return
+        if there.state.load_factor >= 1.0 - 1e-12:
+            ends = _corrected(balance, last.state, _Constraint(np.zeros_like(direction), 1.0, 1.0))
+            yield from _critical(balance, last, ends, direction)
+            yield _with_cost(balance, ends.state)
+            return
+        yield from _critical(balance, last, there, direction)
+        yield _with_cost(balance, there.state)
+        step = min(step * np.clip(_WANTED_ITERATIONS / max(there.state.iterations, 1), 0.5, 2.0), longest * begin)
+        last, (direction, slope) = there, turned
+
+
+def _at_rest(balance: Balance) -> Found:
+    found = descend(balance, 0.0, balance.potential.nodes)
+    return found._replace(state=_with_cost(balance, found.state))
+
+
+def _push(balance: Balance, positions: Floats, factor: float) -> Floats:
+    """The derivative of the unbalanced force by the load factor, its sign turned: applied forces and moved supports."""
+    loading, step = balance.loading, 1e-6
+    push = loading.force(positions)
+    motion = (loading.motion(factor + step) - loading.motion(factor - step)) / (2 * step)
+    if motion.any():
+        push = push - (balance.hessian(positions, factor) @ motion.ravel()).reshape(push.shape)
+    return np.where(balance.free, push, 0.0)
+
+
+def _tangent(balance: Balance, state: Equilibrium, before: Floats | None) -> tuple[Floats, float] | None:
+    """The direction of the path, of size 1 in the free positions, and the load factor's part; None where there is none.
+
+    It goes on as `before` did, at first with the load.
+    """
+    push = _push(balance, state.positions, state.load_factor)
+    weights, still = push if before is None else before, np.zeros_like(push)
+    tangent = balance.hessian(state.positions, state.load_factor)
+    moved, advance = _bordered(balance, tangent, push, _Constraint(weights, 0.0, 0.0), still, norm(weights))
+    size = norm(moved)
+    if not np.isfinite(size) or not size:
+        return None
+    sign = 1.0 if before is not None or advance > 0 else -1.0
+    return sign * moved / size, sign * advance / size
+
+
+def _bordered(
+    balance: Balance, matrix: SparseMatrix, push: Floats, constraint: _Constraint, force: Floats, gap: float
+) -> tuple[Floats, float]:
+    """Solve for a step and a change of the load factor that take away an unbalanced force and the gap of the equation.
+
+    The bordered matrix is regular at limit points, where the tangent is not.
+    """
+    free = np.flatnonzero(balance.free.ravel())
+    tangent = sparse.csr_array(matrix)[free][:, free]
+    along, weights = push.ravel()[free], constraint.weights.ravel()[free]
+    size = float(np.abs(tangent.data).max(initial=0.0))
+    unit = size / max(norm(along), np.finfo(float).tiny)  # of the load factor: its column then is as large as others
+    row = np.append(weights, constraint.share * unit)
+    large = size / max(norm(row), np.finfo(float).tiny)
+    parts: Any = [[tangent, -unit * along[:, None]], [large * row[None, :-1], np.array([[large * row[-1]]])]]
+    bordered = sparse.csc_array(sparse.block_array(parts))
+    right = np.append(-force.ravel()[free], large * gap)
+    try:
+        solution = splu(bordered).solve(right)
+    except RuntimeError:  # singular: a bifurcation, or nothing that the equation could hold on to
+        return np.full_like(push, np.nan), np.nan
+    step = np.zeros(push.size)
+    step[free] = solution[:-1]
+    return step.reshape(push.shape), float(unit * solution[-1])
+
+
+def _corrected(balance: Balance, start: Equilibrium, constraint: _Constraint, ahead: Floats | None = None) -> Found:
+    """Find the state that meets the equation, by Newton's method from a start; the best one where that fails."""
+    nodes = balance.potential.nodes
+    positions = start.positions if ahead is None else start.positions + ahead
+    factor, iteration = start.load_factor, 0
+    watch = Watch(balance, factor, positions)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for iteration in range(balance.max_iterations + 1):
+            gap = constraint.target - constraint.share * factor
+            gap -= float((constraint.weights * (positions - nodes)).sum())
+            met = abs(gap) <= 1e-12 * max(abs(constraint.target), norm(constraint.weights) * balance.size)
+            watch.load_factor = factor
+            if not watch.at(positions, iteration, met):
+                break
+            tangent = balance.hessian(positions, factor)
+            if met and watch.balanced(tangent, positions):
+                del tangent
+                return watch.equilibrium()
+            step, advance = _bordered(balance, tangent, _push(balance, positions, factor), constraint, watch.force, gap)
+            if not np.isfinite(advance):
+                break
+            motion = balance.loading.motion(factor + advance) - balance.loading.motion(factor)
+            positions, factor = positions + step + motion, factor + advance
+        return watch.failure()
+
+
+def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> Iterator[Equilibrium]:
+    """Yield the point between two states where the number of negative eigenvalues changes, if it does."""
+    from scipy.optimize import brentq  # a quarter of a second
+
+    before, after = last.state.negative_eigenvalues, there.state.negative_eigenvalues
+    if before is None or after is None or before == after or not there.state.converged:
+        return
+    nodes = balance.potential.nodes
+    ends = [float((weights * (one.state.positions - nodes)).sum()) for one in (last, there)]
+    found: dict[float, Found] = {}
+
+    def crossing(share: float) -> float:
+        """The size of the eigenvalue nearest to zero, positive as long as their number is that of before."""
+        if share in (0.0, 1.0):
+            one = (last, there)[int(share)]
+        else:
+            guess = (1 - share) * last.state.positions + share * there.state.positions
+            factor = (1 - share) * last.state.load_factor + share * there.state.load_factor
+            start = replace(last.state, positions=guess, load_factor=factor)
+            one = _corrected(balance, start, _Constraint(weights, 0.0, (1 - share) * ends[0] + share * ends[1]))
+        found[share] = one
+        if not one.state.converged:
+            raise ArithmeticError("the path is lost between two of its states")
+        if one.state.negative_eigenvalues is None:  # the tangent is singular: exactly there
+            return 0.0
+        size = _nearest_to_zero(balance, one.state)[0]
+        return size if one.state.negative_eigenvalues == before else -size
+
+    try:
+        share = brentq(crossing, 0.0, 1.0, xtol=_PLACE, rtol=1e-12)
+        crossing(share)
+    except (ArithmeticError, SingularMatrixError, ValueError):
+        balance.note(f"between load factors {last.state.load_factor:.6g} and {there.state.load_factor:.6g}: not found")
+        return
+    state = found[share].state
+    mode = _nearest_to_zero(balance, state)[1]
+    push = _push(balance, state.positions, state.load_factor)
+    part = abs(float((mode * push).sum())) / max(norm(mode) * norm(push), np.finfo(float).tiny)
+    kind = "bifurcation" if part < _NO_PART else "limit point"
+    fewest = min(before, after)
+    yield _with_cost(balance, replace(state, critical=kind, mode=mode, negative_eigenvalues=fewest, iterations=0))
+
+
+def _nearest_to_zero(balance: Balance, state: Equilibrium) -> tuple[float, Floats]:
+    """The size of the tangent's eigenvalue nearest to zero, and its mode, largest component 1."""
+    matrix = balance.hessian(state.positions, state.load_factor)
+    try:
+        ready = balance.linear.ready(matrix, state.positions)
+    except SingularMatrixError:  # exactly there
+        data = matrix.data
+        shifted: Any = matrix + 1e-14 * float(np.abs(data).max()) * sparse.eye_array(matrix.shape[0])
+        ready = balance.linear.ready(balance.in_blocks(shifted), state.positions)
+    assert isinstance(ready, Factorisation)  # nothing else is allowed
+    mode = ready.nearest_mode()
+    image = (matrix @ mode.ravel()).reshape(mode.shape)
+    return abs(float((mode * np.where(balance.free, image, 0.0)).sum())) / float((mode * mode).sum()), mode
+
+
+def _with_cost(balance: Balance, state: Equilibrium) -> Equilibrium:
+    cost = Cost(
+        newton="continuation",
+        linear=balance.linear.name,
+        newton_iterations=balance.spent,
+        factorisations=balance.linear.factorisations,
+        memory=balance.linear.memory,
+        notes=tuple(balance.notes),
+    )
+    return replace(state, cost=cost)

@@ -1,0 +1,88 @@
+"""Networks from CSV files, and mechanisms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from truespring.errors import TruespringError
+from truespring.study.network import read_network
+
+NODES = "node,x [mm],y [mm]\na,0,0\nb,1000,0\nc,500,400\n"
+SPRINGS = "a,b,stiffness [N/mm],rest_length [m]\na,c,2,0.6\nc,b,3,0.65\n"
+
+
+def files(folder: Path, nodes: str = NODES, springs: str = SPRINGS) -> tuple[Path, Path]:
+    (folder / "nodes.csv").write_text(nodes, encoding="utf-8")
+    (folder / "springs.csv").write_text(springs, encoding="utf-8")
+    return folder / "nodes.csv", folder / "springs.csv"
+
+
+def test_names_and_units_are_understood(tmp_path: Path) -> None:
+    network = read_network(*files(tmp_path))
+    assert network.nodes == pytest.approx(np.array([[0, 0], [1, 0], [0.5, 0.4]]))
+    assert network.springs.tolist() == [[0, 2], [2, 1]]
+    assert network.stiffness == pytest.approx([2000, 3000]) and network.rest_length == pytest.approx([0.6, 0.65])
+
+
+def test_numbers_in_si_are_enough(tmp_path: Path) -> None:
+    network = read_network(*files(tmp_path, "x,y,z\n0,0,0\n1,0,0\n", "a,b,stiffness\n0,1,5\n"))
+    assert network.nodes.shape == (2, 3) and network.rest_length == pytest.approx([1.0])
+
+
+WRONG = {
+    "missing column": ({"nodes": "node,x\na,0\n"}, r"nodes.csv:1: column y is missing"),
+    "misspelt column": (
+        {"springs": "a,b,stifness\na,b,1\n"},
+        r"springs.csv:1: column 'stifness' is unknown.*stiffness",
+    ),
+    "no number": ({"nodes": "x,y\n0,zero\n"}, r"nodes.csv:2: y = 'zero' is no number"),
+    "unknown node": ({"springs": "a,b,stiffness\na,d,1\n"}, r"springs.csv:2: b = 'd' names no node"),
+    "node twice": ({"nodes": NODES + "a,1,1\n"}, "node a is there twice"),
+    "row too short": ({"springs": "a,b,stiffness\na,b\n"}, "springs.csv:2: 2 values, there are 3 columns"),
+    "empty": ({"nodes": ""}, "a line of column names and a row"),
+    "unit of another kind": ({"nodes": "x [N],y\n0,0\n"}, "nodes.csv:1: x: "),
+    "spring of no length": ({"springs": "a,b,stiffness\na,a,1\n"}, "springs.csv: "),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_damaged_is_refused_with_its_place(name: str, tmp_path: Path) -> None:
+    given, message = WRONG[name]
+    with pytest.raises(TruespringError, match=message):
+        read_network(*files(tmp_path, **given))
+
+
+# --- mechanisms ---------------------------------------------------------------------------------------------------
+
+
+def frame(*more: tuple[int, int]) -> ts.SpringNetwork:
+    """Four bars around a square, and more."""
+    nodes = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    springs = [(0, 1), (1, 2), (2, 3), (3, 0), *more]
+    return ts.SpringNetwork(nodes, springs, np.ones(len(springs)))
+
+
+def test_a_mechanism_is_refused_by_its_nodes() -> None:
+    loose, braced = frame(), frame((0, 2))
+    problem = ts.Problem(loose.mesh, supports=ts.Fixed([0, 1]), loads=ts.Force([2], (0.1, 0.0)))
+    with pytest.raises(TruespringError, match="the network is a mechanism: nodes 2, 3 can move"):
+        ts.solve(problem, loose)
+    assert ts.solve(problem, braced).complete
+
+
+def test_a_chain_that_its_tension_holds_is_none() -> None:
+    """Pulled sideways, a straight chain has no stiffness at rest, but stiffens as it moves."""
+    chain = ts.SpringNetwork([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], [[0, 1], [1, 2]], [5.0, 5.0])
+    problem = ts.Problem(chain.mesh, supports=ts.Fixed([0, 2]), loads=ts.Force([1], (0.0, 0.1)))
+    path = ts.solve(problem, chain)
+    height = path.states[-1].displacement[1, 1]
+    assert 2 * 5 * (np.hypot(1, height) - 1) * height / np.hypot(1, height) == pytest.approx(0.1)
+
+
+def test_a_chain_that_hangs_from_one_end_is_one() -> None:
+    chain = ts.SpringNetwork([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], [[0, 1], [1, 2]], [5.0, 5.0])
+    problem = ts.Problem(chain.mesh, supports=[ts.Fixed([0]), ts.Fixed([2], ["y"])], loads=ts.Force([1], (0.0, 0.1)))
+    with pytest.raises(TruespringError, match="mechanism: node 1 can move"):
+        ts.solve(problem, chain)
