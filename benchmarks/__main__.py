@@ -21,6 +21,7 @@ def measured(small: bool) -> dict:
     found = runs.measure_all(runs.jobs(sizes, ladder), 1 if small else runs.REPEATS)
     return {
         "date": machine.today(),
+        "commit": machine.commit(),
         "machine": machine.hardware(),
         "versions": machine.versions(),
         "limit_seconds": runs.LIMIT,

@@ -62,13 +62,13 @@ def faster(runs: list[Measured], dim: int, programs: tuple[str, ...], load: str 
 FELUPE = ("felupe-svk", "felupe-nh")
 
 _WHY = {
-    "2D": "at this size a loop takes about as long as handing half of it to the second thread (0.1 to 0.2 ms), and a solve "
-    "makes some thousand such calls (both measured once, apart); the share of each loop is in the profile above. "
+    "2D": "at this size a loop takes about as long as handing half of it to the second thread (0.1 to 0.2 ms), and a "
+    "solve makes some thousand such calls (both measured once, apart); the share of each loop is in the profile above. "
     "Larger bodies do not feel it: the time grows slower than the number of nodes.",
     "3D": "the profile above: half of the time are the sweeps and transfers of multigrid, which are as far from the "
     "limit of memory as the table says; building the coarse levels and assembly share the rest.",
-    "command": "most of it is not solving. In a run under the profiler, once, apart, of 5.1 s: 0.9 s imports, 0.9 s numba "
-    "and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models at ten load levels.",
+    "command": "most of it is not solving. In a run under the profiler, once, apart, of 5.1 s: 0.9 s imports, 0.9 s "
+    "numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models at ten levels.",
     "assembly": "a spring's block is computed by both of its nodes, so that threads never write to one row, and what "
     "it is computed from is fetched by number from several arrays: arithmetic and latency bound it, not bandwidth.",
     "matrix product": "a block is kept once and serves two rows, half the bytes of a plain product: per byte it "

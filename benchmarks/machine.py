@@ -2,6 +2,7 @@
 
 import os
 import platform
+import subprocess
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -44,6 +45,14 @@ def versions() -> dict[str, str]:
         except ModuleNotFoundError:  # rslab may be absent
             continue
     return found
+
+
+def commit() -> str:
+    """Return the commit that is measured, empty outside of a repository."""
+    told = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
+    )
+    return told.stdout.strip()
 
 
 def today() -> str:

@@ -40,7 +40,7 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
     yield "# Performance\n"
     yield (
         "The numbers on this page are measured by `make bench`, which rebuilds it: all on one machine, each run in a "
-        f"process of its own. {results['date']}; {machine['processor']}, {machine['cores']} cores, "
+        f"process of its own. {results['date']}, commit {results['commit']}; {machine['processor']}, {machine['cores']} cores, "
         f"{machine['memory_bytes'] / 2**30:.0f} GiB, {machine['system']}; "
         f"{', '.join(f'{name} {number}' for name, number in versions.items())}.\n"
     )
@@ -245,8 +245,8 @@ def _limit(results: dict) -> Iterator[str]:
     yield f"Bandwidth of this machine's memory in the same run, arrays of 512 MiB: {told}.\n"
     yield (
         "What the loops of the springs take, beside the time in which memory could move the bytes that they must read "
-        "and write once, at the largest of these bandwidths. Below 1 what is moved fits into a cache. Against reading alone, "
-        f"{reading / 1e9:.1f} GB/s, the last column would be {reading / limit:.2f} times as large.\n"
+        "and write once, at the largest of these bandwidths. Below 1 what is moved fits into a cache. Against reading "
+        f"alone, {reading / 1e9:.1f} GB/s, the last column would be {reading / limit:.2f} times as large.\n"
     )
     rows = []
     for one in results["kernels"]:

@@ -1,4 +1,4 @@
-"""The study of truss.toml in Python: two bars that lean on each other are pushed through, both limit loads on the way."""
+"""The study of truss.toml in Python: two bars that lean on each other are pushed through both limit loads."""
 
 import numpy as np
 

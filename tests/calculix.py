@@ -113,7 +113,7 @@ def displacement(deck: str, folder: Path) -> Floats:
     (folder / "twin.inp").write_text(deck)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     done = subprocess.run(
-        ["ccx", "twin"], cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+        ["ccx", "twin"], cwd=folder, env=environment, capture_output=True, text=True, timeout=600, check=False
     )
     printed = folder / "twin.dat"
     # Of a wrong deck ccx leaves an empty file.

@@ -143,7 +143,7 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "gravity downwards": ((ON + FORCE, 'gravity = ["0 m/s^2", "-1 m"]\n'), ("load.1.gravity.2", "acceleration")),
     "moment on a point": ((ON + FORCE, 'on = "right-top"\nmoment = "1 N m"\n'), ("load.1", "two nodes")),
     "centre without a turn": (("[solver]", TURNED), ("support", "about is given without a rotation")),
-    "control unknown": (("[solver]", '[solver]\ncontrol = "arclength"'), ("solver.control", "arc-length")),
+    "control misspelt": (("[solver]", '[solver]\ncontrol = "arclength"'), ("solver.control", "arc-length")),
     "nothing controlled": (("[solver]", '[solver]\ncontrol = "displacement"'), ("solver.on", "required and missing")),
     "control of no use": (("[solver]", '[solver]\nto = "1 mm"'), ("solver.to", 'for control = "displacement"')),
     "multigrid past limits": (

@@ -9,6 +9,7 @@ import pytest
 import truespring as ts
 from tests.calculix import continuum_deck, displacement, needs_ccx, spring_deck
 from truespring.arrays import Floats
+from truespring.study import read_study
 
 pytestmark = needs_ccx
 
@@ -328,4 +329,22 @@ def test_loads_have_their_twins(name: str, law: str, tmp_path: Path) -> None:
     ours = solved(problem, ts.Fem(law))
     theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
     assert np.linalg.norm(ours, axis=1).max() > 0.05 * problem.mesh.diameter
+    assert gap(theirs, ours) < 1e-3
+
+
+@pytest.mark.verification
+@pytest.mark.parametrize(("law", "share"), [("linear", 1.0), ("saint-venant-kirchhoff", 0.3)])
+def test_the_organ_has_its_twin(law: str, share: float, tmp_path: Path) -> None:
+    """Ten thousand voxels under gravity, one end pulled; St. Venant-Kirchhoff's law by less, as it collapses."""
+    whole = read_study(Path(__file__).parent.parent / "examples" / "organ.toml").problem
+    held, grasped = whole.supports
+    motion = tuple(share * part for part in grasped.displacement or ())
+    problem = replace(
+        whole,
+        material=ts.Material(3e3, 0.3, density=1060.0),
+        supports=(held, replace(grasped, displacement=motion)),
+        loads=(ts.Gravity((0.0, -9.81 * share, 0.0)),),
+    )
+    ours = solved(problem, ts.Fem(law, "linear"))
+    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
     assert gap(theirs, ours) < 1e-3

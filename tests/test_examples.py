@@ -31,7 +31,7 @@ def script(name: str) -> ModuleType:
 
 def test_every_example_is_run_here() -> None:
     names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
-    assert names == {*NAMES, "truss"}
+    assert names == {*NAMES, "truss", "organ"}
 
 
 def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:
@@ -114,3 +114,19 @@ def test_the_readme_tells_what_the_studies_in_space_give(results: dict[str, Resu
     assert f"within {100 * block['neo-hookean'].rms_error:.1f} % of neo-Hookean" in readme
     assert f"{100 * block['linear'].rms_error:.0f} % off linear" in readme
     assert f"Lloyd's springs are {100 * tissue['lloyd'].rms_error:.0f} % off them" in readme
+
+
+def test_the_organ_is_what_its_image_holds() -> None:
+    problem = read_study(EXAMPLES / "organ.toml").problem
+    assert 9_900 < len(problem.mesh.elements) < 10_000
+    weight = problem.mesh.measures.sum() * 1060 * 9.81
+    assert problem.loading.external_force.sum(axis=0) == pytest.approx([0, -weight, 0])
+
+
+@pytest.mark.verification
+def test_the_organ_is_solved_as_its_twin() -> None:
+    result, twins = run(read_study(EXAMPLES / "organ.toml")), script("organ").main()
+    assert result.converged
+    for reference, comparison in result.comparisons.items():
+        assert twins[reference].rms_errors == pytest.approx(comparison.rms_errors, rel=1e-5)
+    assert all(path.cost and path.cost.linear == "multigrid" for path in result.paths.values())

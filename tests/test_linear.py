@@ -13,6 +13,7 @@ from truespring.errors import ProblemError
 from truespring.kernels import threads
 from truespring.linear import choice, direct
 from truespring.linear.gradients import IndefiniteError
+from truespring.linear.iterative import Preconditioned
 
 SOFT, THIN = ts.Material(young=1e4, poisson=0.3), ts.PlaneStress(thickness=0.01)
 LIBRARIES = [name for name in direct.FACTORISERS if direct.present(name)]
@@ -210,3 +211,36 @@ def test_names_are_checked() -> None:
         ts.Newton(linear="multigrd")
     with pytest.raises(ProblemError, match=r"method = 'mip'.*allowed: auto, mixed, line-search"):
         ts.Newton(method="mip")
+
+
+@pytest.mark.parametrize("n_threads", [1, 2, 5])
+def test_the_preconditioner_is_positive_however_rows_are_shared(n_threads: int) -> None:
+    """Nodes in no order at all: nearly every block crosses from the rows of one thread to those of another."""
+    threads.set_threads(n_threads)
+    try:
+        mesh = ts.box((1.0, 1.0, 1.0), (14, 14, 14))
+        order = np.random.default_rng(2).permutation(mesh.n_nodes)
+        shuffled = np.empty_like(mesh.nodes)
+        shuffled[order] = mesh.nodes
+        problem = ts.Problem(
+            ts.Mesh(shuffled, order[mesh.elements], mesh.element),
+            ts.Material(1.0, 0.45),
+            None,
+            ts.Fixed("left"),
+            ts.Force("right", (0.0, -0.01, 0.0)),
+        )
+        springs = ts.Springs("isotropic", volume=True)
+        potential = springs.potential(problem)
+        solver = choice.choose("multigrid", problem.mesh.nodes, problem.loading.held)
+        ready = solver.ready(potential.hessian(problem.mesh.nodes), problem.mesh.nodes)
+        assert isinstance(ready, Preconditioned)
+        free = ~problem.loading.held
+        a, b = (np.where(free, np.random.default_rng(seed).normal(size=free.shape), 0.0) for seed in (3, 4))
+        image = [ready.coarse.cycle(ready.level, ready.turns, one).copy() for one in (a, b)]
+        assert (image[0] * a).sum() > 0 and (image[1] * b).sum() > 0
+        assert (image[0] * b).sum() == pytest.approx((image[1] * a).sum(), rel=1e-4)
+        path = ts.solve(problem, springs, ts.Newton(load_steps=1, tolerance=1e-8, linear="multigrid"))
+        assert path.status is ts.Status.CONVERGED and path.cost is not None
+        assert not path.cost.notes and path.cost.linear == "multigrid"
+    finally:
+        threads.set_threads(None)

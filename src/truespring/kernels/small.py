@@ -209,6 +209,19 @@ def _scaled(a, v):
     }[len(v)]
 
 
+def each(a, b):
+    """The products of their components."""
+
+
+@overload(each)
+def _each(a, b):
+    return {
+        2: lambda a, b: (a[0] * b[0], a[1] * b[1]),
+        3: lambda a, b: (a[0] * b[0], a[1] * b[1], a[2] * b[2]),
+        6: lambda a, b: (a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3], a[4] * b[4], a[5] * b[5]),
+    }[len(a)]
+
+
 def line(blocks, p, i, zero):
     """Row i of block p, as long as `zero`."""
 

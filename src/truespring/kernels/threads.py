@@ -54,7 +54,12 @@ def pieces(n: int, smallest: int = _SMALLEST_PIECE) -> list[tuple[int, int]]:
 
 def run(function: Callable[..., Any], n: int, *arguments: Any, smallest: int = _SMALLEST_PIECE) -> list[Any]:
     """Call function(first, last, *arguments) on all pieces of 0..n and return what each returned, in order."""
-    (first, *others) = pieces(n, smallest)
+    return run_on(pieces(n, smallest), function, *arguments)
+
+
+def run_on(ranges: list[tuple[int, int]], function: Callable[..., Any], *arguments: Any) -> list[Any]:
+    """Call function(first, last, *arguments) on ranges, each in a thread, and return what each returned, in order."""
+    (first, *others) = ranges
     if not others or not _in_use.acquire(blocking=False):  # whoever comes second does without other threads
         return [function(*piece, *arguments) for piece in (first, *others)]
     try:

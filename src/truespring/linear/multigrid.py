@@ -58,6 +58,8 @@ class Level:
     lower: Real
     rest: Floats
     inverse: Real
+    added: Real
+    pieces: list[tuple[int, int]]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -69,26 +71,18 @@ class Level:
         """Memory taken [bytes]."""
         return sum(array.nbytes for array in (self.columns, self.lower, self.rest, self.inverse))
 
-    @property
-    def smallest(self) -> int:
-        """The fewest rows that are worth another thread."""
-        return _worth(len(self.rest), self.lower.size)
-
-    @property
+    @cached_property
     def bounds(self) -> ShortInts:
         """Where the rows of each thread begin, and their number."""
-        from truespring.kernels.threads import pieces
-
-        return np.array([0, *(last for _, last in pieces(len(self.rest), self.smallest))], dtype=np.int32)
+        return np.array([0, *(last for _, last in self.pieces)], dtype=np.int32)
 
     def product(self, x: Floats, result: Floats) -> float:
         """Write A x to `result`, shape (n, k) both, and return x . A x."""
         from truespring.kernels import blocks
-        from truespring.kernels.threads import run
+        from truespring.kernels.threads import run_on
 
-        n, size = self.shape
-        zero, matrix = (0.0,) * size, (self.starts, self.columns, self.lower)
-        run(blocks.product, n, *matrix, self.rest, x, result, zero, smallest=self.smallest)
+        zero, matrix = (0.0,) * self.shape[1], (self.starts, self.columns, self.lower)
+        run_on(self.pieces, blocks.product, *matrix, self.rest, x, result, zero)
         blocks.product_across(self.bounds, *matrix, x, result, zero)
         return scalar_product(x, result)
 
@@ -101,7 +95,7 @@ def _worth(n: int, size: int) -> int:
 def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: type[np.floating[Any]]) -> Level:
     """Return room for a matrix of this sparsity, with blocks of `size` rows."""
     from truespring.kernels import blocks
-    from truespring.kernels.threads import run
+    from truespring.kernels.threads import pieces, run
 
     n = len(starts) - 1
     counts = np.empty(n, np.int32)
@@ -112,7 +106,9 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     lower_columns = np.empty(lower_starts[-1], np.int32)
     run(blocks.take_lower, n, starts, columns, lower_starts, lower_columns)
     lower = np.empty((len(lower_columns), size, size), precision)
-    return Level(lower_starts, lower_columns, lower, np.empty((n, size, size)), np.empty((n, size, size), precision))
+    rest, inverse = np.empty((n, size, size)), np.empty((n, size, size), precision)
+    added = np.empty((n, size), precision)
+    return Level(lower_starts, lower_columns, lower, rest, inverse, added, pieces(n, _worth(n, lower.size)))
 
 
 def condense(level: Level, matrix: Matrix, scale: float) -> bool:
@@ -120,7 +116,7 @@ def condense(level: Level, matrix: Matrix, scale: float) -> bool:
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
 
-    room = (level.starts, level.lower, level.rest, level.inverse, (0.0,) * level.shape[1])
+    room = (level.bounds, level.starts, level.lower, level.rest, level.inverse, level.added, (0.0,) * level.shape[1])
     return not any(run(blocks.condense, len(level.rest), *matrix, scale, *room))
 
 
@@ -176,17 +172,17 @@ class Hierarchy:
 
     def _cycle(self, depth: int, level: Level, r: Floats, turns: Floats | None) -> Floats:
         from truespring.kernels import blocks, multigrid
-        from truespring.kernels.threads import run
+        from truespring.kernels.threads import run, run_on
 
         if depth == len(self.transfers):
             solution = np.empty(r.size)
             blocks.dense(0, r.size, self.inverse, r.ravel(), solution)
             return solution.reshape(r.shape)
         n, size = level.shape
-        zero, smallest, bounds = (0.0,) * size, level.smallest, level.bounds
+        zero, bounds = (0.0,) * size, level.bounds
         matrix = (level.starts, level.columns, level.lower)
         z, left = self._room[depth]
-        run(blocks.sweep_forward, n, *matrix, level.inverse, r, z, left, zero, smallest=smallest)
+        run_on(level.pieces, blocks.sweep_forward, *matrix, level.inverse, level.added, r, z, left, zero)
         blocks.subtract_across(bounds, *matrix, z, left, zero)
         if turns is not None:
             run(multigrid.turn_back, n, turns, left, zero)
@@ -207,7 +203,7 @@ class Hierarchy:
             run(multigrid.prolong_turned, n, *by_row, turns, correction, z, modes, zero, smallest=share)
         left[:] = r
         blocks.subtract_across(bounds, *matrix, z, left, zero)
-        run(blocks.sweep_backward, n, *matrix, level.inverse, left, z, zero, smallest=smallest)
+        run_on(level.pieces, blocks.sweep_backward, *matrix, level.inverse, level.added, left, z, zero)
         return z
 
 

@@ -230,7 +230,9 @@ def display_name(result: Result, name: str) -> str:
 
 def level_name(result: Result, load_factor: float) -> str:
     """Return a load level in words: full load, full motion where nothing but supports drives, or its factor."""
-    return _full(result) if load_factor == 1 else f"load factor {load_factor:.4g}"
+    if load_factor == 1:
+        return _full(result)
+    return f"{load_factor:.4g} of the displacement" if _by_displacement(result) else f"load factor {load_factor:.4g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,12 +306,31 @@ def _alone(result: Result) -> Iterator[str]:
     who, plural = _subject(result)
     if path.status is Status.CONVERGED:
         verb = "reach" if plural else "reaches"
-        yield f"{who} {verb} {_full(result)} through stable equilibria; nothing was compared with them."
+        yield f"{who} {verb} {_full(result)} through {_way(path)}; nothing was compared with them."
     else:
         yield "Nothing was compared."
     if path.states:
         moved = float(np.linalg.norm(path.states[-1].displacement[result.probe]))
-        yield f"At {level_name(result, path.load_factor)} the probe has moved by {quantity(moved, 'm')}."
+        at = _full(result) if path.complete else level_name(result, path.load_factor)
+        yield f"At {at} the probe has moved by {quantity(moved, 'm')}."
+
+
+def _way(path: Path) -> str:
+    """What a path went through."""
+    critical = [state for state in path.states if state.critical]
+    if not critical:
+        unstable = any(state.negative_eigenvalues for state in path.states)
+        return "equilibria of which some are unstable" if unstable else "stable equilibria"
+    kinds = {kind: [f"{one.load_factor:.4g}" for one in critical if one.critical == kind] for kind in _CRITICAL}
+    told = [
+        f"a {kind} at load factor {at[0]}" if len(at) == 1 else f"{kind}s at load factors {_listed(at)}"
+        for kind, at in kinds.items()
+        if at
+    ]
+    return f"{_listed(told)}, in part through unstable states"
+
+
+_CRITICAL = ("limit point", "bifurcation")
 
 
 def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[str, bool]:
@@ -417,7 +438,15 @@ def _driven_by_motion(result: Result) -> bool:
     return result.problem.loading.driven_by_motion
 
 
+def _by_displacement(result: Result) -> bool:
+    """Whether a displacement was controlled, and the load factor found."""
+    states = [state for path in result.paths.values() for state in path.states if not state.critical]
+    return any(abs(state.level - state.load_factor) > 1e-9 for state in states)
+
+
 def _full(result: Result) -> str:
+    if _by_displacement(result):
+        return "full displacement"
     return "full motion" if _driven_by_motion(result) else "full load"
 
 
