@@ -40,8 +40,9 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
     yield "# Performance\n"
     yield (
         "The numbers on this page are measured by `make bench`, which rebuilds it: all on one machine, each run in a "
-        f"process of its own. {results['date']}, commit {results['commit']}; {machine['processor']}, {machine['cores']} cores, "
-        f"{machine['memory_bytes'] / 2**30:.0f} GiB, {machine['system']}; "
+        f"process of its own. {results['date']}, commit {results['commit']}; "
+        f"{machine['processor']}, {machine['cores']} cores, {machine['memory_bytes'] / 2**30:.0f} GiB, "
+        f"{machine['system']}; "
         f"{', '.join(f'{name} {number}' for name, number in versions.items())}.\n"
     )
     yield from _compared(runs)
