@@ -106,6 +106,13 @@ def loads() -> Iterator[Found]:
         ts.Gravity((9.81, 0.0)),
     )
     state = ts.solve(problem, ts.Fem("linear"), ts.Newton(load_steps=1)).states[-1]
+    soft = pipe(4, loads=ts.Pressure(pipe(4).loads[0].on, 150.0))
+    path = ts.solve(soft, ts.Fem("neo-hookean"), ts.Newton(load_steps=80))
+    (load,) = soft.loading.following
+    swept = [-load.energy(state.positions) / 150.0 for state in path.states]
+    work = float(np.trapezoid(150.0 * path.load_factors, swept))
+    source = "work of the pressure on what it sweeps, 80 steps"
+    yield "pipe under 0.15 E, neo-Hookean: stored energy", path.states[-1].energy, work, source
     yield "hanging bar: lengthening", float(state.displacement[-1, 0]), 1000 * 9.81 * 0.2**2 / 2e5, "rho g L^2 / 2 E"
 
 

@@ -1,6 +1,7 @@
 """The verdict in words, the figures and the page, on paths whose errors are known by construction."""
 
 import base64
+import csv
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +19,7 @@ from matplotlib.patches import PathPatch, Rectangle
 import truespring as ts
 from truespring.mesh import Surface
 from truespring.report.bodies import undeformed_figure
+from truespring.report.curves import write_reactions
 from truespring.report.figures import Drawing, draw_figures, over_name, save_figures
 from truespring.report.frame import round_numbers, written
 from truespring.report.page import render_page, write_page
@@ -825,3 +827,34 @@ def test_a_page_of_a_plain_network() -> None:
     assert verdict(found) == "1 of 1 models reached full load; nothing was compared."
     page = Page(render_page([found], ""))
     assert len(page.loaded) == 2  # as asked, and the curve
+
+
+def test_reactions_of_moved_supports_are_written_and_drawn(tmp_path: FilePath) -> None:
+    """Force and moment of each support that moves; they balance the weight and the other support."""
+    problem = ts.Problem(
+        ts.rectangle((0.16, 0.04), (8, 2)),
+        ts.Material(1e4, 0.3, density=1000.0),
+        ts.PlaneStress(0.01),
+        [ts.Fixed("left"), ts.Fixed("right", displacement=(0.01, -0.02), rotation=0.2)],
+        ts.Gravity((0.0, -1.0)),
+    )
+    found = {
+        name: ts.solve(problem, model) for name, model in (("a", ts.Springs("isotropic")), ("b", ts.Fem("linear")))
+    }
+    told = result(found["a"], {"b": found["b"]}, name="a")
+    write_reactions(told, tmp_path / "reactions.csv")
+    rows = list(csv.DictReader((tmp_path / "reactions.csv").read_text().splitlines()))
+    assert len(rows) == 2 * 11 and {row["support"] for row in rows} == {"2"}
+    for row in (rows[10], rows[21]):
+        state = found[row["model"]].states[-1]
+        right = problem.held[1].nodes
+        assert [float(row["fx"]), float(row["fy"])] == pytest.approx(state.reaction[right].sum(axis=0))
+        assert [float(row["ux"]), float(row["uy"])] == pytest.approx([0.01, -0.02])
+        about = state.positions[right].mean(axis=0)
+        arms, weight = state.positions - about, state.reaction + problem.loading.external_force
+        left = np.setdiff1d(np.arange(problem.mesh.n_nodes), right)
+        others = (arms[left, 0] * weight[left, 1] - arms[left, 1] * weight[left, 0]).sum()
+        own = (arms[right, 0] * problem.loading.external_force[right, 1]).sum()
+        if row["model"] == "a":  # linear elements balance on the body at rest
+            assert float(row["mz"]) + own == pytest.approx(-others, rel=1e-6)
+    assert "reactions" in draw_figures(told)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.report.curves import moved_supports, reaction_of
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
@@ -60,6 +61,47 @@ def curves_figure(result: Result) -> Sheet:
         f"displacement along {to.name} [{y_scale.unit}]",
         curves,
     ).sheet
+
+
+def reactions_figure(result: Result) -> Sheet:
+    """The force of the support that is moved most, along its way, against how far it is moved."""
+    held, nodes = result.problem.held, result.problem.mesh.nodes
+    moved = [(number, held[number].nodes) for number in moved_supports(result.problem)]
+    motion = result.problem.loading.motion()
+    number, at = max(moved, key=lambda one: float(np.linalg.norm(motion[one[1]].mean(axis=0))))
+    way = motion[at].mean(axis=0)
+    turned = np.linalg.norm(way) <= 1e-9 * np.linalg.norm(nodes.max(axis=0) - nodes.min(axis=0))
+    styles = path_styles(result)
+    forces, moves = {}, {}
+    for name, path in result.paths.items():
+        if path.states and path.potential is not None:
+            both = [reaction_of(path, state, number) for state in path.states]
+            if turned:  # about its own middle: its moment against the angle
+                axis = held[number].turn.axis if len(both[0][1]) == 3 else np.ones(1)  # type: ignore[union-attr]
+                forces[name] = np.array([float(moment @ axis) for _, moment in both])
+                moves[name] = path.load_factors * np.degrees(held[number].turn.angle)  # type: ignore[union-attr]
+            else:
+                forces[name] = np.array([float(force @ way) for force, _ in both]) / np.linalg.norm(way)
+                moves[name] = np.array([float(state.displacement[at].mean(axis=0) @ way) for state in path.states])
+                moves[name] /= np.linalg.norm(way)
+    unit, letter = ("N m", "moment") if turned else ("N", "force")
+    x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), unit)
+    y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
+    size, name_of_y = (
+        (1.0, "turn [degrees]") if turned else (y_scale.size, f"displacement along its way [{y_scale.unit}]")
+    )
+    curves = [
+        _Curve(
+            forces[name] / x_scale.size,
+            moves[name] / size,
+            *styles[name],
+            label=_two_lines(result, name),
+            strong=is_strong(result, name),
+        )
+        for name in forces
+    ]
+    title = "What it takes to move the support" if len(moved) == 1 else f"What it takes to move support {number + 1}"
+    return _plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
 
 
 def error_figure(result: Result) -> Sheet:

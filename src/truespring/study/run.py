@@ -19,7 +19,7 @@ from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
 from truespring.models import RULES, Fem, Fitness, Moduli, Springs, follows_poisson, judge, model_warnings, moduli
 from truespring.problem import Problem
-from truespring.report.curves import write_curves
+from truespring.report.curves import moved_supports, write_curves, write_reactions
 from truespring.report.result import Result
 from truespring.report.series import write_series, write_stl
 from truespring.report.summary import moduli_values, summary
@@ -190,6 +190,9 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     _clear(folder)
     write_curves(result, folder / "curves.csv")
+    (folder / "reactions.csv").unlink(missing_ok=True)
+    if moved_supports(result.problem):
+        write_reactions(result, folder / "reactions.csv")
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     for name, path in result.paths.items():
@@ -222,7 +225,7 @@ def _clear(folder: FilePath) -> None:
             (folder / name).rmdir()
 
 
-_FIGURES = ("undeformed", "curves", "error", "moduli")
+_FIGURES = ("undeformed", "curves", "reactions", "error", "moduli")
 
 
 def write_overview(results: Sequence[Result], out: FilePath) -> None:
