@@ -283,3 +283,18 @@ def test_the_garbage_collector_works_on_and_passes_over_what_was_imported() -> N
     shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
     enabled, frozen = shown.split()[-2:]
     assert enabled == "True" and int(frozen) > 10_000
+
+
+def test_a_network_is_checked_and_solved_as_any_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truss = str(Path(__file__).parent.parent / "examples" / "truss.toml")
+    assert main(["check", truss, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["models"]["truss"] == {"kind": "network", "label": "springs", "n_springs": 2, "warnings": []}
+    assert told["material"] is None and told["load_steps"] == 18
+    assert main(["check", truss]) == 0 and "total force (0, -4) N" in capsys.readouterr().out
+    assert main(["verify", truss, "--out", str(tmp_path)]) == 0
+    assert "limit points at load factors 0.7401 and -0.7401" in " ".join(capsys.readouterr().out.split())
+    rows = (tmp_path / "truss" / "curves.csv").read_text().splitlines()
+    assert rows[0] == "model,load_factor,ux,uy,fx,fy,state"
+    assert sum(row.endswith("limit point") for row in rows) == 2 and sum(row.endswith("unstable") for row in rows) == 9
+    assert (tmp_path / "truss" / "report.html").is_file() and (tmp_path / "truss" / "truss.pvd").is_file()

@@ -68,7 +68,7 @@ def _solved(
 def _watched(path: Equilibria, probe: int) -> Iterator[tuple[str, str, float]]:
     state = path.states[-1]
     for direction, value in zip(AXES, state.displacement[probe], strict=False):
-        yield f"probe's displacement along {direction}", "m", float(value)
+        yield f"u{direction} of the probe", "m", float(value)
     yield "energy", "J", state.energy
     if path.problem.loading.driven_by_motion:
         force = path.applied_force(state)

@@ -17,7 +17,18 @@ from truespring.equilibrium import Path, solve
 from truespring.errors import StudyError
 from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
-from truespring.models import RULES, Fem, Fitness, Moduli, Springs, follows_poisson, judge, model_warnings, moduli
+from truespring.models import (
+    RULES,
+    Fem,
+    Fitness,
+    Moduli,
+    SpringNetwork,
+    Springs,
+    follows_poisson,
+    judge,
+    model_warnings,
+    moduli,
+)
 from truespring.problem import Problem
 from truespring.report.curves import moved_supports, write_curves, write_reactions
 from truespring.report.result import Result
@@ -277,6 +288,8 @@ def _section(problem: Problem) -> dict[str, Any] | None:
 
 
 def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
+    if isinstance(entry, SpringNetwork):
+        return {"kind": "network", "label": "springs", "n_springs": len(entry.springs), "warnings": []}
     if not isinstance(entry, Springs):
         known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
         law = {"law": entry.law, "element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
