@@ -60,7 +60,6 @@ def test_steps_of_a_displacement_are_met() -> None:
     levels = [state for state in path.states if not state.critical]
     assert [state.level for state in levels] == pytest.approx([k / 6 for k in range(7)])
     assert [state.displacement[1, 1] for state in levels] == pytest.approx([-0.05 * k for k in range(7)], abs=1e-13)
-    assert [state.load_factor for state in levels] == sorted(path.load_factors) or path.load_factors.max() > 0
 
 
 # --- the star dome --------------------------------------------------------------------------------------------
@@ -143,11 +142,6 @@ def test_fem_and_springs_follow_a_controlled_bending() -> None:
     paths = [ts.solve(problem, model, control) for model in (ts.Springs("isotropic"), ts.Fem("saint-venant-kirchhoff"))]
     for path in paths:
         assert path.status is ts.Status.CONVERGED
-        loaded = ts.solve(
-            problem, path.potential, ts.Newton(load_steps=4)
-        )  # the state at full load, and the controlled one, are on one path
-        tip = [state.displacement[problem.mesh.n_nodes // 2] for state in path.states]
-        assert np.isfinite(tip).all() and loaded.complete
         again = ts.solve(
             ts.Problem(
                 problem.mesh,

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -111,4 +110,4 @@ def test_a_network_is_as_fine_as_it_is() -> None:
     examples = Path(__file__).parent.parent / "examples"
     with pytest.raises(TruespringError, match="cannot be refined"):
         list(ts.converge(examples / "truss.toml"))
-    assert math.isfinite(len(list(ts.converge(examples / "bending.toml", most=1))))
+    assert len(list(ts.converge(examples / "bending.toml", most=1))) == 1

@@ -858,3 +858,15 @@ def test_reactions_of_moved_supports_are_written_and_drawn(tmp_path: FilePath) -
         if row["model"] == "a":  # linear elements balance on the body at rest
             assert float(row["mz"]) + own == pytest.approx(-others, rel=1e-6)
     assert "reactions" in draw_figures(told)
+
+
+def test_loads_without_a_total_are_drawn_by_their_factor() -> None:
+    problem = ts.Problem(
+        ts.rectangle((0.1, 0.01), (20, 2)),
+        ts.Material(1e4, 1 / 3),
+        ts.PlaneStress(0.01),
+        ts.Fixed("left"),
+        ts.Moment("right", 1e-5),
+    )
+    figure = draw_figures(result(ts.solve(problem, ts.Springs("isotropic"), ts.Newton(load_steps=2)), {}))["curves"]
+    assert {"load factor", "Displacement of the probe against load factor"} <= set(words(figure))

@@ -33,19 +33,24 @@ class _Curve:
 
 
 def curves_figure(result: Result) -> Sheet:
-    """Displacement of the probe against the force, both along the direction that drives the body."""
-    to = drive(result)
+    """Displacement of the probe against the force, both along the direction that drives the body.
+
+    Against the load factor where loads have no total, as a moment has none.
+    """
+    to, balanced = drive(result), _is_balanced(result)
     styles = path_styles(result)
     forces, moves = {}, {}
     for name, path in result.paths.items():
         if path.states:
             forces[name] = to.sign * np.array([path.applied_force(state)[to.axis] for state in path.states])
+            forces[name] = path.load_factors if balanced else forces[name]
             moves[name] = to.sign * np.array([state.displacement[result.probe, to.axis] for state in path.states])
     x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), "N")
     y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
+    name_of_x = "load factor" if balanced else f"total force along {to.name} [{x_scale.unit}]"
     curves = [
         _Curve(
-            forces[name] / x_scale.size,
+            forces[name] / (1.0 if balanced else x_scale.size),
             moves[name] / y_scale.size,
             *styles[name],
             label=_two_lines(result, name),
@@ -56,11 +61,19 @@ def curves_figure(result: Result) -> Sheet:
         for name in forces
     ]
     return _plot(
-        "Displacement of the probe against force",
-        f"total force along {to.name} [{x_scale.unit}]",
+        f"Displacement of the probe against {'load factor' if balanced else 'force'}",
+        name_of_x,
         f"displacement along {to.name} [{y_scale.unit}]",
         curves,
     ).sheet
+
+
+def _is_balanced(result: Result) -> bool:
+    """Whether the loads have no total: their sum is rounding beside them."""
+    if result.problem.loading.driven_by_motion:
+        return False
+    force = result.problem.loading.force(result.problem.mesh.nodes)
+    return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
 
 
 def reactions_figure(result: Result) -> Sheet:
