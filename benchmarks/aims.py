@@ -63,7 +63,7 @@ FELUPE = ("felupe-svk", "felupe-nh")
 
 _WHY = {
     "2D": "at this size a loop takes about as long as handing half of it to the second thread (0.1 to 0.2 ms), and a "
-    "solve makes some thousand such calls (both measured once, apart); the share of each loop is in the profile above. "
+    "solve makes about 750 such calls (both measured once, apart); the share of each loop is in the profile above. "
     "Larger bodies do not feel it: the time grows slower than the number of nodes.",
     "3D": "the profile above: half of the time are the sweeps and transfers of multigrid, which are as far from the "
     "limit of memory as the table says; building the coarse levels and assembly share the rest.",
