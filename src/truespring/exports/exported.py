@@ -1,0 +1,223 @@
+"""What every target is given: the problem, the springs, and the equilibrium that the receiver should find."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats
+from truespring.equilibrium import Path, State, Status
+from truespring.errors import ExportError
+from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
+from truespring.material import PlaneStrain, PlaneStress
+from truespring.mesh import Box, Near, Plane, Selection
+from truespring.mesh.selections import AXES
+from truespring.models import SpringNetwork, VolumeSprings
+from truespring.problem import Load, Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """A spring model that was solved, to be carried to another simulator.
+
+    Attributes:
+        title: of the study.
+        problem: mesh, material, supports and loads.
+        path: the springs' equilibria up to full load; `path.potential` is what was solved: a SpringNetwork,
+            VolumeSprings or BiquadraticSprings.
+        probe: number of the node that is watched.
+        load_steps: load levels that the study asks for.
+        remarks: what else the reader of the file should know, in sentences.
+    """
+
+    title: str
+    problem: Problem
+    path: Path
+    probe: int
+    load_steps: int
+    remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def state(self) -> State | None:
+        """Our equilibrium at full load, None where it was not reached."""
+        found = self.path.at(1.0)
+        return found if found is not None and found.load_factor == 1.0 else None
+
+    def network(self, program: str, negative: bool = True) -> SpringNetwork:
+        """Return the springs, for a program that knows nothing but springs; `negative` are stiffnesses it takes.
+
+        Raises ExportError where the model is more than springs.
+        """
+        springs = self.path.potential
+        if isinstance(springs, VolumeSprings):
+            raise ExportError(
+                f"{program} has no volume term, which these springs have: take a model without volume = true, "
+                "or the target npz or json, which carries it"
+            )
+        if not isinstance(springs, SpringNetwork):
+            raise ExportError(
+                f"{program} has no coupled springs, which '{self.path.label}' are: take another rule, "
+                "or the target npz or json, which carries their coupling"
+            )
+        below = np.flatnonzero(springs.stiffness < 0)
+        if below.size and not negative:
+            raise ExportError(
+                f"{program} takes no negative stiffness: {below.size} springs have one, the first, number {below[0]}, "
+                f"{springs.stiffness[below[0]]:g} N/m; take another rule, or elements nearer to squares and cubes"
+            )
+        return springs
+
+    @property
+    def held(self) -> Bools:
+        """True where the displacement is prescribed, shape (n_nodes, dim)."""
+        return self.problem.loading.held
+
+    @cached_property
+    def motion(self) -> Floats:
+        """The prescribed displacement at full load [m], zero where free, shape (n_nodes, dim)."""
+        return self.problem.loading.motion()
+
+    @cached_property
+    def external_force(self) -> Floats:
+        """Force on the nodes at full load [N], shape (n_nodes, dim), weights and loads that follow the body included.
+
+        Loads that follow the body are dead forces here: those on the body at our equilibrium, which is
+        then one of theirs. Raises ExportError where there are such loads and full load was not reached.
+        """
+        loading = self.problem.loading
+        if not loading.following:
+            return loading.external_force
+        if self.state is None:
+            raise ExportError(
+                "a load that follows the body is carried over as its forces at full load, which was not reached "
+                f"(load factor {self.path.load_factor:.6g}): load less, or take more load_steps"
+            )
+        return loading.force(self.state.positions)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a receiver sees otherwise than it was asked here, in sentences."""
+        return (*self.remarks, *self._notes())
+
+    def _notes(self) -> Iterator[str]:
+        if self.problem.loading.following:
+            yield (
+                "A load that follows the body is a dead force here, as it acts at our equilibrium at full load: "
+                "the equilibrium is the same, its stability and the way there are not."
+            )
+        if self.problem.loading.turns:
+            yield "Nodes that a support turns stand at their turned places."
+
+    @cached_property
+    def header(self) -> tuple[str, ...]:
+        """Title, units, material, supports, loads and what to expect, a sentence a line, for the head of a file."""
+        return tuple(" ".join(line.split()) for line in self._header())
+
+    def _header(self) -> Iterator[str]:
+        mesh = self.problem.mesh
+        yield self.title
+        yield f"{self.path.label}, written by truespring {version('truespring')}."
+        yield "Units are SI: m, N, N/m, kg, s."
+        yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.element}."
+        yield from self._body()
+        for number, (support, held) in enumerate(zip(self.problem.supports, self.problem.held, strict=True), 1):
+            yield f"Support {number}: {_support(support, held.directions)} ({_counted(len(held.nodes), 'node')})."
+        for number, load in enumerate(self.problem.loads, 1):
+            yield f"Load {number}: {_load(load)}."
+        yield "Loads and prescribed motions stand at their full values."
+        yield from self._expected()
+        yield from self.notes
+
+    def _body(self) -> Iterator[str]:
+        for number, material in enumerate(self.problem.materials):
+            count = int((self.problem.material_numbers == number).sum())
+            density = "density not given" if material.density is None else f"density {material.density:g} kg/m^3"
+            yield (
+                f"Material of {_counted(count, 'element')}: Young's modulus {material.young:g} Pa, "
+                f"Poisson's ratio {material.poisson:g}, {density}."
+            )
+        if isinstance(self.problem.section, PlaneStress | PlaneStrain):
+            yield f"Section: {self.section}, thickness {self.problem.section.thickness:g} m."
+
+    @property
+    def section(self) -> str:
+        """How the body carries the direction that its mesh does not have: "plane stress", "plane strain", or ""."""
+        match self.problem.section:
+            case PlaneStress():
+                return "plane stress"
+            case PlaneStrain():
+                return "plane strain"
+        return ""
+
+    def _expected(self) -> Iterator[str]:
+        if self.state is None:
+            yield (
+                f"Expect nothing: full load was not reached here ({self.path.status}), "
+                f"the last equilibrium has load factor {self.path.load_factor:.6g}."
+            )
+        else:
+            moved = self.state.displacement
+            yield (
+                f"Expected at full load: node {self.probe}, counted from 0, at rest at "
+                f"{_vector(self.problem.mesh.nodes[self.probe], 9)} m, has moved by "
+                f"{_vector(moved[self.probe], 9)} m; the largest displacement is "
+                f"{np.linalg.norm(moved, axis=1).max():.9g} m."
+            )
+            if self.path.status is not Status.CONVERGED:
+                yield f"Another program need not find that state: the path to it is {self.path.status}."
+        yield from (f"Warning of truespring: {warning}." for warning in self.path.warnings)
+
+
+def in_space(vectors: Floats) -> Floats:
+    """Pad vectors of a plane body with zeros to three components, shape (n, 3)."""
+    padded = np.zeros((len(vectors), 3))
+    padded[:, : vectors.shape[1]] = vectors
+    return padded
+
+
+def _support(support: Fixed, directions: Sequence[int]) -> str:
+    axes = ", ".join(AXES[axis] for axis in directions)
+    words = f"{_where(support.on)} held along {axes}"
+    if support.displacement is not None:
+        words += f", moved by {_vector(support.displacement)} m"
+    if support.rotation:
+        words += f", turned by {support.rotation:g} rad"
+    return words
+
+
+def _load(load: Load) -> str:
+    match load:
+        case Force(on, total):
+            return f"force {_vector(total)} N in total on {_where(on)}"
+        case Traction(on, traction):
+            return f"traction {_vector(traction)} Pa on {_where(on)}"
+        case Gravity(acceleration):
+            return f"gravity {_vector(acceleration)} m/s^2, as forces on nodes"
+        case Pressure(on, pressure):
+            return f"pressure {pressure:g} Pa on {_where(on)}"
+        case Moment(on, moment):
+            return f"moment {moment:g} N m on {_where(on)}"
+
+
+def _where(on: Selection) -> str:
+    match on:
+        case str():
+            return f"'{on}'"
+        case Plane(axis, value):
+            return f"the nodes at {axis} = {value:g} m"
+        case Box(lower, upper):
+            return f"the nodes from {_vector(lower)} to {_vector(upper)} m"
+        case Near(point):
+            return f"the node nearest to {_vector(point)} m"
+        case _:
+            return _counted(len(on), "chosen node")
+
+
+def _vector(values: Sequence[float] | Floats, digits: int = 6) -> str:
+    return f"({', '.join(f'{value:.{digits}g}' for value in values)})"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
