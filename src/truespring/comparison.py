@@ -1,14 +1,17 @@
 """Path against path: how far a model may be trusted, level by level and in a sentence."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Bools, Floats, Ints
+from truespring.carrying import carried, matching_points
 from truespring.equilibrium import Path, State
 from truespring.errors import ProblemError
-from truespring.mesh import SurfaceDistance, named_point, surface_distance
+from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point, nearest_node, surface_distance
+from truespring.problem import Problem
 
 #: What "agrees" means where nothing else is said: an rms error of 5 %.
 TOLERANCE = 0.05
@@ -19,13 +22,17 @@ class Comparison:
     """How a path differs from a reference. All errors are relative to the reference's displacement.
 
     Attributes:
-        model, reference: the two paths.
+        model, reference: the two paths, on the nodes of one mesh: that on which they are compared.
+        known_on: the two paths as they were given, each on its own mesh.
+        outside: nodes that lie outside of the other body, which are left out of all errors, shape (n_nodes,).
+        node_by_node: whether both had the same nodes, so that nothing was interpolated.
         probe: number of the node that is watched.
         tolerance: the rms error up to which the two agree.
         load_factors: the loaded levels that both paths have, ascending, shape (n,).
         rms_errors: root-mean-square nodal distance over root-mean-square displacement, shape (n,).
         max_errors: largest nodal distance over largest displacement, shape (n,).
         probe_errors: distance over displacement at the probe, shape (n,).
+        rms_distances, max_distances: root-mean-square and largest nodal distance [m], shape (n,).
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
     """
 
@@ -37,6 +44,11 @@ class Comparison:
     rms_errors: Floats
     max_errors: Floats
     probe_errors: Floats
+    rms_distances: Floats
+    max_distances: Floats
+    known_on: tuple[Path, Path]
+    outside: Bools
+    node_by_node: bool = True
     surface: SurfaceDistance | None = None
 
     def __repr__(self) -> str:
@@ -77,6 +89,38 @@ class Comparison:
         return float(np.linalg.norm(self.model.applied_force(mine) - wanted)) / size if size else None
 
     @property
+    def n_outside(self) -> int:
+        """The number of nodes that lie outside of the other body."""
+        return int(self.outside.sum())
+
+    @cached_property
+    def hausdorff(self) -> Gap | None:
+        """How far the deformed surfaces of both are apart at the last level that both have [m].
+
+        Corners of elements span the surfaces. None where one of both has no surface, or one lies in the plane and the
+        other in space.
+        """
+        met = float(self.load_factors[-1]) if self.load_factors.size else None
+        # One that is a surface only has no levels to meet at, but its own.
+        alone = next((path.load_factor for path in self.known_on if not path.states), None)
+        level = met if alone is None else alone
+        if level is None:
+            return None
+        mine, theirs = (_facets(path, level) for path in self.known_on)
+        if mine is None or theirs is None or mine.shape[1:] != theirs.shape[1:]:
+            return None
+        return gap(mine, theirs)
+
+    @property
+    def energy_error(self) -> float | None:
+        """Difference over size of the stored energy at full load; None where one of both does not tell it."""
+        mine, theirs = self.model.at(1.0), self.reference.at(1.0)
+        if mine is None or theirs is None or not np.isfinite(mine.energy) or not theirs.energy:
+            return None
+        error = abs(mine.energy - theirs.energy) / abs(theirs.energy)
+        return float(error) if np.isfinite(error) else None
+
+    @property
     def agrees_up_to_load_factor(self) -> float | None:
         """The largest level up to which, without a gap from zero, the rms error is under the tolerance.
 
@@ -101,37 +145,70 @@ class Comparison:
 def compare(
     model: Path,
     reference: Path,
-    probe: int | str | None = None,
+    probe: int | str | Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Comparison:
-    """Compare two paths of one problem at the loaded levels that both have.
+    """Compare two paths at the loaded levels that both have: node by node where their nodes are the same.
 
-    `probe` is a node number or a named point such as "right-middle", by default the node of `model`
-    that moves most. Raises ProblemError where the paths are not of the same mesh, MeshError where
-    there is no such point.
+    Else the reference is carried to the nodes of the model by the own interpolation of its elements; and the model to
+    those of the reference where only they will do: a reference of markers or surfaces in space, a plane one beside a
+    solid. What lies outside of the other body is left out and counted.
+
+    `probe` is a node number of the model, a named point such as "right-middle" or a place [m], by default the node of
+    the model that moves most. Raises ProblemError where neither path can be carried, MeshError where there is no such
+    point.
     """
-    nodes = model.problem.mesh.nodes
-    if nodes.shape != reference.problem.mesh.nodes.shape or not np.allclose(
-        nodes, reference.problem.mesh.nodes, rtol=0, atol=1e-9 * model.problem.mesh.diameter
-    ):
-        raise ProblemError("only paths on the same nodes can be compared")
-    if isinstance(probe, str):
-        probe = named_point(model.problem.mesh, probe)
-    watched = most_moved(model) if probe is None else probe
-    pairs = [(state, reference.at(state.level)) for state in model.states if state.level > 0]
-    both = [(mine, theirs) for mine, theirs in pairs if theirs is not None]
-    errors = np.array([_errors(mine, theirs, watched) for mine, theirs in both]).reshape(-1, 3)
+    problem = _common_problem(model, reference)
+    mine, theirs = carried(model, problem), carried(reference, problem)
+    outside = mine.outside | theirs.outside
+    inside = np.flatnonzero(~outside)
+    if not inside.size:
+        raise ProblemError(
+            f"no node of {model.label} lies within {reference.label}: are unit, axes and origin the same?"
+        )
+    watched = _watched(mine.path, inside, model, probe)
+    pairs = [(state, theirs.path.at(state.level)) for state in mine.path.states if state.level > 0]
+    both = [(one, other) for one, other in pairs if other is not None]
+    found = [_Distances.between(one, other, inside) for one, other in both]
     return Comparison(
-        model=model,
-        reference=reference,
+        model=mine.path,
+        reference=theirs.path,
         probe=watched,
         tolerance=tolerance,
-        load_factors=np.array([mine.level for mine, _ in both]),
-        rms_errors=errors[:, 0],
-        max_errors=errors[:, 1],
-        probe_errors=errors[:, 2],
-        surface=_surface_distance(model, reference),
+        load_factors=np.array([one.level for one, _ in both]),
+        rms_errors=np.array([one.rms / one.rms_size if one.rms_size else np.nan for one in found]),
+        max_errors=np.array([one.max / one.max_size if one.max_size else np.nan for one in found]),
+        probe_errors=np.array([_probe_error(one, other, watched) for one, other in both]),
+        rms_distances=np.array([one.rms for one in found]),
+        max_distances=np.array([one.max for one in found]),
+        known_on=(model, reference),
+        outside=outside,
+        node_by_node=mine.node_by_node and theirs.node_by_node,
+        surface=_surface_distance(mine.path, theirs.path),
     )
+
+
+def _common_problem(model: Path, reference: Path) -> Problem:
+    """The problem on whose nodes two paths are compared: the model's but where only those of the reference will do."""
+    mine, theirs = model.problem, reference.problem
+    if mine.mesh.dim != theirs.mesh.dim:
+        return mine if mine.mesh.dim == 2 else theirs
+    if not reference.whole.fills and model.whole.fills:  # markers, networks, surfaces in space
+        return theirs
+    if theirs.stated and not mine.stated and mine.mesh.n_nodes == theirs.mesh.n_nodes:
+        return theirs if matching_points(model.whole, theirs.mesh.nodes) is not None else mine
+    return mine
+
+
+def _watched(on: Path, inside: Ints, model: Path, probe: int | str | Sequence[float] | None) -> int:
+    """The node to watch, by its number where the paths are compared."""
+    mesh = on.problem.mesh
+    if isinstance(probe, str):
+        return named_point(mesh, probe)
+    if isinstance(probe, int | np.integer):
+        given = model.problem.mesh
+        return int(probe) if given is mesh else nearest_node(mesh, given.nodes[probe, : mesh.dim].tolist())
+    return most_moved(on, inside) if probe is None else nearest_node(mesh, list(probe))
 
 
 def closest(comparisons: Mapping[str, Comparison]) -> str | None:
@@ -143,34 +220,68 @@ def closest(comparisons: Mapping[str, Comparison]) -> str | None:
     return min(order, key=lambda name: order[name]) if order else None
 
 
-def most_moved(path: Path) -> int:
-    """Return the node that moves most at the last level; of several, the one with smaller coordinates."""
+def most_moved(path: Path, among: Ints | None = None) -> int:
+    """Return the node that moves most at the last level, of all or `among` some; of several, by smaller coordinates."""
     if not path.states:
         return 0
     # A node whose motion is prescribed in full tells nothing of the model.
     told = path.problem.loading.held.all(axis=1)
     moved = np.linalg.norm(path.states[-1].displacement, axis=1) * (told.all() | ~told)
+    if among is not None:
+        apart = np.ones(len(moved), dtype=bool)
+        apart[among] = False
+        moved[apart] = -1.0
     ties = np.flatnonzero(moved >= moved.max() * (1 - 1e-9))
     return int(min(ties, key=lambda node: tuple(path.problem.mesh.nodes[node])))
 
 
-def _errors(mine: State, theirs: State, probe: int) -> tuple[float, float, float]:
-    distance = np.linalg.norm(mine.displacement - theirs.displacement, axis=1)
-    size = np.linalg.norm(theirs.displacement, axis=1)
-    return (
-        _ratio(float(np.sqrt((distance**2).mean())), float(np.sqrt((size**2).mean()))),
-        _ratio(float(distance.max()), float(size.max())),
-        _ratio(float(distance[probe]), float(size[probe])),
-    )
+@dataclass(frozen=True, slots=True)
+class _Distances:
+    """Root-mean-square and largest nodal distance of two states, and size of the reference's displacement [m]."""
+
+    rms: float
+    max: float
+    rms_size: float
+    max_size: float
+
+    @staticmethod
+    def between(mine: State, theirs: State, inside: Ints) -> "_Distances":
+        distance = np.linalg.norm(mine.displacement[inside] - theirs.displacement[inside], axis=1)
+        size = np.linalg.norm(theirs.displacement[inside], axis=1)
+        means = (float(np.sqrt((one**2).mean())) for one in (distance, size))
+        rms, rms_size = means
+        return _Distances(rms, float(distance.max()), rms_size, float(size.max()))
 
 
-def _ratio(distance: float, size: float) -> float:
-    """The relative error; not a number where the reference does not move."""
-    return distance / size if size else float("nan")
+def _probe_error(mine: State, theirs: State, probe: int) -> float:
+    """The relative error at the probe; not a number where the reference does not move there."""
+    size = float(np.linalg.norm(theirs.displacement[probe]))
+    return float(np.linalg.norm(mine.displacement[probe] - theirs.displacement[probe])) / size if size else np.nan
+
+
+def _facets(path: Path, level: float) -> Floats | None:
+    """The deformed surface by its segments or triangles [m], shape (n, 2, 2) or (n, 3, 3); None where there is none."""
+    if not path.states:
+        known = path.surface or path.shell
+        return None if known is None else known.facets
+    state, grid, mesh = path.at(level), path.whole, path.problem.mesh
+    if state is None:
+        return None
+    if grid.fills:
+        return np.asarray(state.positions[_triangles(mesh.boundary)])
+    if grid.cell_dim < 2:
+        return None
+    corners = [_triangles(cells[:, : len(CELL_SHAPES[kind].corners)]) for kind, cells in grid.cells.items()]
+    return np.asarray(state.all_positions[np.concatenate(corners)])
+
+
+def _triangles(facets: Ints) -> Ints:
+    """Quadrilaterals as two triangles, all else as it is."""
+    return facets if facets.shape[1] < 4 else np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
 
 
 def _surface_distance(model: Path, reference: Path) -> SurfaceDistance | None:
-    if reference.surface is None:
+    if reference.surface is None or model.problem.mesh.dim != 2:
         return None
     state = model.at(reference.surface.load_factor)
     if state is None:

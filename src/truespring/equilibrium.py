@@ -10,7 +10,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError, ProblemError
-from truespring.mesh import Surface, select
+from truespring.mesh import Grid, Shell, Surface, select
 from truespring.mesh.selections import AXES
 from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli, refuse_mechanism
 from truespring.potential import Loading, Potential, Refined, Stretched
@@ -19,6 +19,9 @@ from truespring.solvers import ArcLength, Cost, DisplacementControl, Equilibrium
 
 # A relative residual above this is worth a word; it can only come from loads that drown in rounding.
 _LOOSE = 1e-6
+
+# Levels this near are one: other programs print six digits.
+_SAME_LEVEL = 2e-6
 
 
 class Status(StrEnum):
@@ -105,7 +108,9 @@ class Path:
         best: where a level was not reached, the best state there (not an equilibrium).
         status, warnings: how it ended, and what should be known before it is trusted.
         seconds: wall time from the built mesh to the last equilibrium.
-        surface: what was read from a file that holds no more than a deformed surface.
+        surface, shell: what was read from a file that holds no more than a deformed surface, in the plane, in space.
+        grid: the points and cells of a path that was read, the mesh's nodes first among the points: `all_positions` of
+            its states are theirs. None where the mesh's own elements tell how a displacement goes on between nodes.
         potential: what was solved, None for a path from elsewhere.
         moduli: what the springs realise on the problem's own material, None for other models and networks.
         n_unknowns: the directions of nodes that were free, 0 where nothing was solved.
@@ -121,6 +126,8 @@ class Path:
     seconds: float = 0.0
     best: State | None = None
     surface: Surface | None = None
+    shell: Shell | None = None
+    grid: Grid | None = None
     potential: Potential | None = None
     moduli: Moduli | None = None
     n_unknowns: int = 0
@@ -134,12 +141,24 @@ class Path:
         """Load factors of the states, shape (n_states,)."""
         return np.array([state.load_factor for state in self.states])
 
+    @cached_property
+    def whole(self) -> Grid:
+        """All points, those of the mesh first, and the cells by which a displacement goes on between them."""
+        mesh = self.problem.mesh
+        if self.grid is not None:
+            return self.grid
+        if isinstance(self.potential, Refined):
+            elements = self.potential.elements
+            return Grid(self.potential.nodes, {f"{mesh.kind.vtk}{elements.shape[1]}": elements})
+        return Grid(mesh.nodes, {} if mesh.element == "line" else {mesh.kind.vtk: mesh.elements})
+
     @property
     def load_factor(self) -> float:
         """The last load level reached; of a surface that was read, its own."""
         if self.states:
             return self.states[-1].load_factor
-        return self.surface.load_factor if self.surface else 0.0
+        only = self.surface or self.shell
+        return only.load_factor if only else 0.0
 
     @property
     def complete(self) -> bool:
@@ -153,7 +172,7 @@ class Path:
 
     def at(self, load_factor: float) -> State | None:
         """Return the state at a level of what the solver was asked for, None where the path has none there."""
-        found = np.flatnonzero(np.abs(np.array([state.level for state in self.states]) - load_factor) <= 1e-9)
+        found = np.flatnonzero(np.abs(np.array([state.level for state in self.states]) - load_factor) <= _SAME_LEVEL)
         return self.states[found[0]] if found.size else None
 
     def applied_force(self, state: State) -> Floats:
@@ -163,7 +182,7 @@ class Path:
         sides pulled apart, one. Not a number where it is not known.
         """
         loading = self.problem.loading
-        if not loading.driven_by_motion:
+        if not self.problem.stated or not loading.driven_by_motion:
             return state.applied_force
         motion = loading.motion()
         largest = motion[np.linalg.norm(motion, axis=1).argmax()]

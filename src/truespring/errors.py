@@ -40,6 +40,10 @@ class ReferenceFileError(TruespringError):
     """A result of another program cannot be read."""
 
 
+class ExportError(TruespringError):
+    """A target cannot express what is to be exported."""
+
+
 def nearest(word: str, allowed: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, else nothing."""
     close = close_words(word, allowed)

@@ -178,6 +178,11 @@ class Refined(Potential, Protocol):
         ...
 
     @property
+    def elements(self) -> Ints:
+        """The nodes of each element, corners first, in VTK's order, shape (n_elements, k)."""
+        ...
+
+    @property
     def loading(self) -> Loading:
         """The problem's loading on all its nodes."""
         ...

@@ -50,6 +50,8 @@ class Problem:
 
     `material` and `section` may be absent where the model brings its own stiffness (a SpringNetwork);
     a body in three dimensions has the section Solid by itself. Where `regions` overlap the last one counts.
+    `stated` is false of a body that another program's file tells of, without what held and loaded it: it has a mesh
+    only, and cannot be solved.
     Raises ProblemError or MeshError where the parts do not fit, nothing loads the body, or the
     supports leave it, or a part of it that nothing joins to the rest, free to move as a rigid body.
     """
@@ -60,6 +62,7 @@ class Problem:
     supports: Sequence[Fixed] = field(default=())
     loads: Sequence[Load] = field(default=())
     regions: Sequence[Region] = field(default=())
+    stated: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "regions", _several(self.regions, Region, "regions"))
@@ -74,6 +77,8 @@ class Problem:
         if self.regions and self.material is None:
             raise ProblemError("regions of another material need a material for the rest")
         _ = self.material_numbers  # a region that selects nothing is refused here
+        if not self.stated:
+            return
         loading = self.loading
         acting = loading.external_force[~loading.held].any() or loading.following
         if not acting and not loading.motion().any():

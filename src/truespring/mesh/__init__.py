@@ -1,6 +1,12 @@
 """Geometry that knows no physics: nodes, elements, named sides, selections."""
 
+from truespring.mesh.cells import CELL_SHAPES as CELL_SHAPES
+from truespring.mesh.corner_mesh import corner_mesh as corner_mesh
+from truespring.mesh.distance import Gap as Gap
+from truespring.mesh.distance import gap as gap
 from truespring.mesh.files import read_mesh as read_mesh
+from truespring.mesh.grid import Grid as Grid
+from truespring.mesh.grid import Interpolation as Interpolation
 from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.measures import corner_measures as corner_measures
@@ -24,6 +30,7 @@ from truespring.mesh.shapes import SOLID_ELEMENTS as SOLID_ELEMENTS
 from truespring.mesh.shapes import box as box
 from truespring.mesh.shapes import rectangle as rectangle
 from truespring.mesh.shapes import refuse_too_large as refuse_too_large
+from truespring.mesh.surface import Shell as Shell
 from truespring.mesh.surface import Surface as Surface
 from truespring.mesh.surface import SurfaceDistance as SurfaceDistance
 from truespring.mesh.surface import surface_distance as surface_distance

@@ -106,3 +106,13 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
         ),
     }
 )
+
+#: The nodes of an element in the order of its mirror image.
+MIRRORED: MappingProxyType[str, tuple[int, ...]] = MappingProxyType(
+    {
+        "triangle": (0, 2, 1),
+        "quadrilateral": (0, 3, 2, 1),
+        "tetrahedron": (0, 2, 1, 3),
+        "hexahedron": (0, 3, 2, 1, 4, 7, 6, 5),
+    }
+)

@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError
+from truespring.mesh.distance import blocks, distance_to, gap
 
 # A place counts as inside a triangle up to this share of the surface's diameter beyond its edges:
 # above the rounding of single precision files, far below any element.
@@ -14,9 +15,6 @@ _INSIDE = 1e-6
 
 # A triangle of less height over length holds nothing: shares there would be rounding.
 _NEEDLE = 1e-6
-
-# Rows that are compared with many columns are taken in blocks of about this many numbers, to bound the memory.
-_BLOCK = 250_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +58,11 @@ class Surface:
         return np.asarray(edges[first[count == 1]])
 
     @property
+    def facets(self) -> Floats:
+        """The outline by the ends of its edges [m], shape (n_edges, 2, 2)."""
+        return np.asarray(self.points[self.outline])
+
+    @property
     def lower(self) -> Floats:
         """The smallest coordinates [m], shape (2,)."""
         return np.asarray(self.points.min(axis=0))
@@ -91,14 +94,14 @@ class Surface:
         beyond, seen = np.empty(len(places)), np.empty(len(places))
         unsure = np.arange(len(places))
         for n_near in sorted({min(few, len(centres)) for few in (16, 256, len(centres))}):
-            for some in _blocks(unsure, n_near):
+            for some in blocks(unsure, n_near):
                 distance, near = tree.query(places[some], k=np.arange(1, n_near + 1))
                 triangle[some], shares[some], beyond[some] = self._least_beyond(places[some], np.asarray(near))
                 seen[some] = np.asarray(distance)[:, -1]
             unsure = unsure[(beyond[unsure] > slack) & (seen[unsure] <= reach)]
         outside = np.flatnonzero(beyond > slack)
         apart = np.zeros(len(places))
-        apart[outside] = _to_segments(places[outside], self.points[self.outline])
+        apart[outside] = distance_to(places[outside], self.points[self.outline])
         return triangle, shares, apart
 
     @cached_property
@@ -123,6 +126,26 @@ class Surface:
         return np.asarray(chosen), np.asarray(all_shares[row, best]), np.asarray(beyond[row, best])
 
 
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """A surface in space.
+
+    Attributes:
+        points: [m], shape (n_points, 3).
+        triangles: point numbers, shape (n_triangles, 3).
+        load_factor: the load level that it belongs to.
+    """
+
+    points: Floats
+    triangles: Ints
+    load_factor: float = 1.0
+
+    @property
+    def facets(self) -> Floats:
+        """The triangles by their corners [m], shape (n_triangles, 3, 3)."""
+        return np.asarray(self.points[self.triangles])
+
+
 @dataclass(frozen=True, slots=True)
 class SurfaceDistance:
     """Distances of a body's outline and nodes to a surface [m].
@@ -141,47 +164,14 @@ class SurfaceDistance:
 
 def surface_distance(positions: Floats, boundary: Ints, surface: Surface) -> SurfaceDistance:
     """Measure nodes at `positions`, shape (n_nodes, 2), and the outline of edges `boundary` against `surface`."""
-    mine, theirs = positions[boundary], surface.points[surface.outline]
-    apart = np.concatenate([_apart(mine, theirs), _apart(theirs, mine)])
-    length = np.concatenate([_lengths(mine), _lengths(theirs)])
+    outlines = gap(positions[boundary], surface.points[surface.outline])
     nodes = _nearest(surface.points, positions, 1)[0]
     return SurfaceDistance(
-        outline_rms=float(np.sqrt(np.average(apart**2 @ _SIMPSON, weights=length))),
-        outline_max=float(apart.max()),
+        outline_rms=outlines.rms,
+        outline_max=outlines.max,
         nodes_rms=float(np.sqrt((nodes**2).mean())),
         nodes_max=float(nodes.max()),
     )
-
-
-# Shares of the composite Simpson rule at nine evenly spaced points: exact where the distance is linear along a segment.
-_SIMPSON = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) / 24
-
-
-def _apart(segments: Floats, others: Floats) -> Floats:
-    """Distance of nine evenly spaced points of each segment to the nearest of the others [m], shape (n, 9)."""
-    share = np.linspace(0, 1, len(_SIMPSON))[None, :, None]
-    along = segments[:, :1] * (1 - share) + segments[:, 1:] * share
-    return _to_segments(along.reshape(-1, 2), others).reshape(-1, len(_SIMPSON))
-
-
-def _to_segments(points: Floats, segments: Floats) -> Floats:
-    """Distance of each point to the nearest segment [m], shape (n_points,).
-
-    Looks at the segments with the nearest middles only; a segment further than these is at least its
-    middle's distance less half its length away, which tells for which points that was not enough.
-    """
-    middles = segments.mean(axis=1)
-    reach = _lengths(segments).max() / 2
-    nearest = np.empty(len(points))
-    unsure = np.arange(len(points))
-    for n_near in (8, 64):
-        if n_near < len(segments):
-            distance, near = _nearest(middles, points[unsure], n_near)
-            nearest[unsure] = _to_each(points[unsure], segments[near]).min(axis=1)
-            unsure = unsure[distance[:, -1] - reach < nearest[unsure]]
-    for some in _blocks(unsure, len(segments)):
-        nearest[some] = _to_each(points[some], segments[None]).min(axis=1)
-    return nearest
 
 
 def _nearest(points: Floats, places: Floats, n_near: int) -> tuple[Floats, Ints]:
@@ -190,25 +180,6 @@ def _nearest(points: Floats, places: Floats, n_near: int) -> tuple[Floats, Ints]
 
     distance, number = KDTree(points).query(places, k=np.arange(1, n_near + 1))
     return np.asarray(distance, dtype=np.float64), np.asarray(number, dtype=np.int64)
-
-
-def _to_each(points: Floats, segments: Floats) -> Floats:
-    """Distance of each point to each segment of its row [m]; segments of shape (n_points or 1, k, 2, 2)."""
-    start = segments[:, :, 0]
-    along = segments[:, :, 1] - start
-    offset = points[:, None] - start
-    squared = np.maximum((along**2).sum(axis=2), np.finfo(float).tiny)  # a segment may be a point
-    share = np.clip((offset * along).sum(axis=2) / squared, 0, 1)
-    return np.asarray(np.linalg.norm(offset - share[:, :, None] * along, axis=2))
-
-
-def _blocks(rows: Ints, n_columns: int) -> list[Ints]:
-    size = max(1, _BLOCK // n_columns)
-    return [rows[first : first + size] for first in range(0, len(rows), size)]
-
-
-def _lengths(segments: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1))
 
 
 def _cross(first: Floats, second: Floats) -> Floats:

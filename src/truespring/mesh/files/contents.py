@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.kinds import ELEMENT_KINDS
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
 from truespring.mesh.mesh import Mesh
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
@@ -26,14 +26,6 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
     "triangle strip": (2, 0),
     "prism": (3, 0),
     "polyhedron": (3, 0),
-}
-
-# The nodes of an element in the order of its mirror image.
-_MIRRORED = {
-    "triangle": (0, 2, 1),
-    "quadrilateral": (0, 3, 2, 1),
-    "tetrahedron": (0, 2, 1, 3),
-    "hexahedron": (0, 3, 2, 1, 4, 7, 6, 5),
 }
 
 _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
@@ -127,7 +119,7 @@ class Contents:
         try:
             return Mesh(
                 positions,
-                elements[:, _MIRRORED[kind]] if is_inverted else elements,
+                elements[:, MIRRORED[kind]] if is_inverted else elements,
                 kind,
                 node_groups=_not_empty(node_groups),
                 element_groups=_not_empty(element_groups),
@@ -265,7 +257,7 @@ def _body(cells: Sequence[Cells]) -> list[Cells]:
     if dim < 2:
         raise MeshError(f"{f'there are only {listed(counts)}' if counts else 'there are no elements'}: {_SUPPORTED}")
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
-    unread = {kind: count for kind, count in body.items() if kind not in _MIRRORED}
+    unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
         raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}")
     if len(body) > 1:

@@ -1,0 +1,174 @@
+"""The cells of other programs' meshes, of first and second order: their shape functions, nodes in VTK's order."""
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.mesh.kinds import ELEMENT_KINDS
+
+Groups = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CellShape:
+    """A kind of cell in its own coordinates.
+
+    Attributes:
+        base: the kind of its corners alone.
+        corners: places of the corners, shape (n_corners, dim).
+        between: the corners midway between which each further node stands.
+        powers: exponents of the functions that span the shape functions, shape (n_nodes, dim + 1): of the own
+            coordinates, and of 1 / (1 - the third), which a pyramid has.
+        facets: what bounds it, by its corners, seen from outside anticlockwise; of a plane cell its edges.
+    """
+
+    base: str
+    corners: Floats
+    between: Groups
+    powers: Floats
+    facets: Groups
+
+    @property
+    def dim(self) -> int:
+        """The dimensions that it fills."""
+        return int(self.corners.shape[1])
+
+    @cached_property
+    def places(self) -> Floats:
+        """The nodes in own coordinates, shape (n_nodes, dim)."""
+        middles = [self.corners[list(few)].mean(axis=0) for few in self.between]
+        return np.concatenate([self.corners, np.reshape(middles, (-1, self.dim))])
+
+    @cached_property
+    def _coefficients(self) -> Floats:
+        """What makes the shape functions of the functions that span them: each is 1 at its node, 0 at all others."""
+        return np.asarray(np.linalg.inv(_product(self.places, self.powers)))
+
+    def shapes(self, at: Floats) -> Floats:
+        """Return the shape functions at own coordinates of shape (n, dim), shape (n, n_nodes)."""
+        return np.asarray(_product(at, self.powers) @ self._coefficients)
+
+    def slopes(self, at: Floats) -> Floats:
+        """Return their derivatives by the own coordinates, shape (n, n_nodes, dim)."""
+        found = np.empty((len(at), len(self.powers), self.dim))
+        for axis in range(self.dim):
+            lowered, raised = self.powers.copy(), self.powers.copy()
+            lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
+            slope = self.powers[:, axis] * _product(at, lowered)
+            if axis == 2 and self.powers[:, -1].any():
+                raised[:, -1] += 1
+                slope += self.powers[:, -1] * _product(at, raised)
+            found[:, :, axis] = slope @ self._coefficients
+        return found
+
+    def clipped(self, at: Floats) -> Floats:
+        """Return own coordinates moved into the cell, shape (n, dim): unchanged inside."""
+        inside = np.clip(at, -1.0 if self.base == "pyramid" else 0.0, 1.0)
+        if self.base in ("triangle", "tetra", "wedge"):
+            flat = inside[:, : 3 if self.base == "tetra" else 2]
+            flat /= np.maximum(flat.sum(axis=1, keepdims=True), 1.0)
+        elif self.base == "pyramid":
+            inside[:, 2] = inside[:, 2].clip(0.0)
+            inside[:, :2] = np.clip(inside[:, :2], inside[:, 2:] - 1, 1 - inside[:, 2:])
+        return inside
+
+
+def _product(at: Floats, powers: Floats) -> Floats:
+    """The products of powers of own coordinates, shape (n, n_powers)."""
+    found = np.ones((len(at), len(powers)))
+    for axis in range(at.shape[1]):
+        found *= at[:, axis, None] ** powers[:, axis]
+    if powers[:, -1].any():  # a pyramid: at its tip the other factors vanish faster
+        found *= np.maximum(1.0 - at[:, 2, None], _TIP) ** -powers[:, -1]
+    return found
+
+
+_TIP = 1e-9
+
+
+def _powers(exponents: Iterable[tuple[int, ...]]) -> Floats:
+    """Exponents without a factor 1 / (1 - third)."""
+    return np.array([(*few, 0) for few in exponents], dtype=float)
+
+
+def _cubic(dim: int, most: int) -> list[tuple[int, ...]]:
+    return list(itertools.product(range(most + 1), repeat=dim))
+
+
+def _serendipity(dim: int) -> list[tuple[int, ...]]:
+    """One square in each product at most (Arnold and Awanou, 2011: superlinear degree two)."""
+    return [few for few in _cubic(dim, 2) if few.count(2) <= 1]
+
+
+def _simplex(dim: int, degree: int) -> list[tuple[int, ...]]:
+    return [few for few in _cubic(dim, degree) if sum(few) <= degree]
+
+
+def _prism(flat: int, whole: bool) -> list[tuple[int, ...]]:
+    """Of a triangle times a line; not `whole`, without the products of two squares."""
+    plane = _simplex(2, flat)
+    return [(*few, z) for few in plane for z in range(flat + 1) if whole or flat == 1 or z < 2 or sum(few) < 2]
+
+
+# Of first order the plane times xy / (1 - z); of second also that times x and y: on its triangles both are polynomials.
+_PYRAMID = [(0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1, 1, 0, 1)]
+_PYRAMID_13 = [*((*few, 0) for few in _simplex(3, 2)), (1, 1, 0, 1), (2, 1, 0, 1), (1, 2, 0, 1)]
+
+_SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
+_TRIANGLE = ((0, 0), (1, 0), (0, 1))
+_CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line": ((0,), (1,)),
+    "triangle": _TRIANGLE,
+    "quad": _SQUARE,
+    "tetra": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "hexahedron": tuple((*corner, z) for z in (0, 1) for corner in _SQUARE),
+    "wedge": tuple((*corner, z) for z in (0, 1) for corner in _TRIANGLE),
+    "pyramid": ((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, 0, 1)),
+}
+_WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+_PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
+_EDGES: dict[str, Groups] = {kind.vtk: kind.edges for kind in ELEMENT_KINDS.values()}
+_EDGES |= {"wedge": _WEDGE_EDGES, "pyramid": _PYRAMID_EDGES}
+_FACETS: dict[str, Groups] = {kind.vtk: kind.facets for kind in ELEMENT_KINDS.values()}
+_FACETS |= {
+    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+}
+_HEXAHEDRON_FACES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
+
+
+def _shape(base: str, powers: Floats, between: Groups = ()) -> CellShape:
+    return CellShape(base, np.array(_CORNERS[base], dtype=float), between, powers, _FACETS[base])
+
+
+#: By meshio's name of the cell.
+CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
+    {
+        "line": _shape("line", _powers(_cubic(1, 1))),
+        "line3": _shape("line", _powers(_cubic(1, 2)), _EDGES["line"]),
+        "triangle": _shape("triangle", _powers(_simplex(2, 1))),
+        "triangle6": _shape("triangle", _powers(_simplex(2, 2)), _EDGES["triangle"]),
+        "quad": _shape("quad", _powers(_cubic(2, 1))),
+        "quad8": _shape("quad", _powers(_serendipity(2)), _EDGES["quad"]),
+        "quad9": _shape("quad", _powers(_cubic(2, 2)), (*_EDGES["quad"], (0, 1, 2, 3))),
+        "tetra": _shape("tetra", _powers(_simplex(3, 1))),
+        "tetra10": _shape("tetra", _powers(_simplex(3, 2)), _EDGES["tetra"]),
+        "hexahedron": _shape("hexahedron", _powers(_cubic(3, 1))),
+        "hexahedron20": _shape("hexahedron", _powers(_serendipity(3)), _EDGES["hexahedron"]),
+        "hexahedron27": _shape(
+            "hexahedron",
+            _powers(_cubic(3, 2)),
+            (*_EDGES["hexahedron"], *_HEXAHEDRON_FACES, tuple(range(8))),
+        ),
+        "wedge": _shape("wedge", _powers(_prism(1, True))),
+        "wedge15": _shape("wedge", _powers(_prism(2, False)), _WEDGE_EDGES),
+        "wedge18": _shape("wedge", _powers(_prism(2, True)), (*_WEDGE_EDGES, (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))),
+        "pyramid": _shape("pyramid", np.array(_PYRAMID, dtype=float)),
+        "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _PYRAMID_EDGES),
+    }
+)
