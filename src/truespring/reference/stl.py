@@ -10,11 +10,11 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.equilibrium import Path, State, Status
-from truespring.errors import MeshError, ReferenceFileError, TruespringError
-from truespring.mesh import Mesh, Surface
+from truespring.errors import MeshError, ReferenceFileError
+from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
-from truespring.units import to_si
+from truespring.reference.placing import Placing, unproven
 
 # All shares of a body's diameter.
 _SAME_POINT = 1e-6  # vertices this near are one point: text files carry six digits or more
@@ -36,6 +36,8 @@ def read_stl(
     load_factor: float = 1.0,
     undeformed: pathlib.Path | None = None,
     unit: str = "m",
+    axes: tuple[str, ...] = tuple(AXES),
+    shift: tuple[float, ...] = (0.0, 0.0, 0.0),
 ) -> Path:
     """Read the deformed body of `problem` from an STL file, ASCII or binary.
 
@@ -48,6 +50,7 @@ def read_stl(
         undeformed: the body at rest, the same triangles in the same order; it tells which vertex went
             where, and so the displacement at the problem's nodes: linear between the vertices.
         unit: the unit of length of both files, such as "mm".
+        axes, shift: the files' axes along ours, and what is added to their places then [m]; see Placing.
 
     Returns a path of kind "stl" with a surface, and with one state where `undeformed` is given.
     Raises ReferenceFileError where a file cannot be read, is no such body, or does not fit the problem.
@@ -56,21 +59,19 @@ def read_stl(
     mesh = problem.mesh
     if mesh.dim != 2 or mesh.kind.dim != 2:
         raise ReferenceFileError(f"{file}: an STL file stands beside a plane body of elements, not beside this mesh")
-    if not 0 < load_factor <= 1:
-        raise ReferenceFileError(f"{file}: load_factor = {load_factor:g} is not above 0 and at most 1")
-    scale = _scale(unit, file)
-    deformed = _read(file, scale)
-    warnings = [
-        f"{file.name} was read, not solved: its convergence and stability are those of the program that wrote it; "
-        "stability not proven"
-    ]
+    try:
+        placing = Placing(unit, axes, shift, load_factor)
+    except ReferenceFileError as error:
+        raise ReferenceFileError(f"{file}: {error}") from None
+    deformed = read_facets(file, placing)
+    warnings = [unproven(file.name)]
     if undeformed is None:
         surface = _surface(deformed[_face(deformed, file)][:, :, :2], load_factor, file)
         states: tuple[State, ...] = ()
         warnings += _unit_warnings(mesh, surface, unit)
     else:
         undeformed = pathlib.Path(undeformed)
-        rest, surface = _matched(_read(undeformed, scale), deformed, load_factor, undeformed, file)
+        rest, surface = _matched(read_facets(undeformed, placing), deformed, load_factor, undeformed, file)
         state = _state(problem, rest, surface, undeformed, unit)
         states = (state,)
         warnings += _state_warnings(problem, rest, state, undeformed)
@@ -86,24 +87,36 @@ def read_stl(
     )
 
 
+def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> Path:
+    """Read a deformed surface in space from an STL file, ASCII or binary, beside a body or alone.
+
+    Returns a path of kind "stl" with a shell and no states; of the problem `beside`, else of a mesh of its edges.
+    Raises ReferenceFileError where the file cannot be read.
+    """
+    facets = read_facets(file, placing)
+    first, numbers = merged(facets.reshape(-1, 3))
+    points, triangles = facets.reshape(-1, 3)[first], numbers.reshape(-1, 3)
+    a, b, c = triangles.T
+    triangles = triangles[(a != b) & (b != c) & (c != a)]
+    problem = Problem(corner_mesh(Grid(points, {"triangle": triangles}))[0], stated=False) if beside is None else beside
+    factor = 1.0 if placing.load_factor is None else placing.load_factor
+    return Path(
+        problem=problem,
+        label=file.name,
+        kind="stl",
+        states=(),
+        status=Status.CONVERGED,
+        warnings=(unproven(file.name),),
+        shell=Shell(points, triangles, factor),
+    )
+
+
 # --- the file -------------------------------------------------------------------------------------
 
 
-def _scale(unit: str, file: pathlib.Path) -> float:
-    try:
-        scale = to_si(f"1 {unit}", "length")
-    except TruespringError:
-        scale = 0.0
-    if scale <= 0:
-        raise ReferenceFileError(
-            f"{file}: unit = '{unit}' is no unit of length; allowed are m, cm, mm, inch and others"
-        )
-    return scale
-
-
-def _read(file: pathlib.Path, scale: float) -> Floats:
+def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
     """Return the vertices of every facet in the file's order [m], shape (n_facets, 3, 3)."""
-    facets = _parse(_bytes(file), file) * scale
+    facets = placing.places(_parse(_bytes(file), file).reshape(-1, 3)).reshape(-1, 3, 3)
     bad = np.flatnonzero(~np.isfinite(facets).all(axis=(1, 2)))
     if bad.size:
         raise ReferenceFileError(
@@ -228,7 +241,7 @@ def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: pathlib.Pa
 
 def _surface(facets: Floats, load_factor: float, file: pathlib.Path) -> Surface:
     """Join the facets, shape (n_facets, 3, 2), at their common vertices."""
-    first, numbers = _merged(facets.reshape(-1, 2))
+    first, numbers = merged(facets.reshape(-1, 2))
     return _triangulated(facets.reshape(-1, 2)[first], numbers.reshape(-1, 3), load_factor, file)
 
 
@@ -245,7 +258,7 @@ def _matched(
         raise ReferenceFileError(f"{file} and {rest_file} hold the same shape: export one with, one without the load")
     face = _face(rest, rest_file)
     before, after = rest[face, :, :2].reshape(-1, 2), deformed[face, :, :2].reshape(-1, 2)
-    first, numbers = _merged(before)
+    first, numbers = merged(before)
     spread = np.linalg.norm(after - after[first][numbers], axis=1)
     worst = int(spread.argmax())
     if spread[worst] > 10 * _SAME_POINT * np.linalg.norm(np.ptp(after, axis=0)):
@@ -261,7 +274,7 @@ def _matched(
     )
 
 
-def _merged(places: Floats) -> tuple[Ints, Ints]:
+def merged(places: Floats) -> tuple[Ints, Ints]:
     """Number the distinct places, nearly equal ones once; return a row of each, and the number of each row."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -8,16 +8,17 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
-from truespring.equilibrium import Path
+from truespring.equilibrium import Path, State
 from truespring.mesh import Mesh
+from truespring.report.bar import BAR, Bar, bar_of, draw_error_bar
 from truespring.report.frame import draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_lines
-from truespring.report.quantity import Scale, natural_scale, percent, quantity, round_factor, times
+from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
-from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_pin, find_arrows
+from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
+from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_outside, draw_pin, find_arrows
 from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
 
@@ -67,15 +68,16 @@ _WIDEST = 3.0
 
 
 def _body_figure(
-    title: str, lower: Floats, upper: Floats, legend: Sequence[Entry], remark: str = ""
+    title: str, lower: Floats, upper: Floats, legend: Sequence[Entry], remark: str = "", bar: Bar | None = None
 ) -> tuple[Area, Scale]:
-    """A sheet whose one area shows the box from `lower` to `upper` [m] at equal scales, words on top."""
+    """A sheet whose one area shows the box from `lower` to `upper` [m] at equal scales, words and a bar on top."""
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
     columns, words = legend_columns(legend, 4.7)
     rows = len(columns[0])
     words = max(words, text_width(title, 9, bold=True), text_width(remark, 8))
-    left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + ROW * rows + ROW * bool(remark)
+    words = max(words, text_width(bar.label, 8)) if bar else words
+    left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + ROW * rows + ROW * bool(remark) + BAR * bool(bar)
     width = min(5.4 - left - right, 4.4 * extent[0] / extent[1])
     height = width * extent[1] / extent[0]
     # A narrow body leaves room for the legend: the box grows sideways, the scales stay equal.
@@ -88,7 +90,10 @@ def _body_figure(
     draw_frame(area, f"x [{scale.unit}]", f"y [{scale.unit}]")
     draw_words(sheet, left, sheet.height - 0.17, title, 9, bold=True)
     draw_words(sheet, left, sheet.height - 0.37, remark, color=LOAD)
-    draw_legend(sheet, columns, left, sheet.height - top + 0.14 + ROW * rows)
+    below = sheet.height - top + 0.14 + ROW * rows + BAR * bool(bar)
+    draw_legend(sheet, columns, left, below)
+    if bar:
+        draw_error_bar(sheet, bar, left, below - ROW * rows - 0.08)
     return area, scale
 
 
@@ -102,7 +107,7 @@ def _lines(
 
 def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | None:
     """The model in blue over a reference in black, at the last load level that both have."""
-    model, reference = comparison.model, comparison.reference
+    model, reference = (_drawn_on(comparison, side) for side in (0, 1))
     rest = model.problem.mesh.nodes
     factor = magnification(result) if reference.states else 1.0  # of a surface alone no displacement is known
     inside = None
@@ -116,7 +121,7 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         theirs = reference.at(level)
         if theirs is None or not level:
             return None
-        points, lines = rest + factor * theirs.displacement, path_lines(reference)
+        points, lines = reference.problem.mesh.nodes + factor * theirs.displacement, path_lines(reference)
     mine = model.at(level)
     if mine is None:
         return None
@@ -140,8 +145,86 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         _lines(area, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
     _lines(area, points / scale.size, lines, INK, 1.3, 3, "reference")
     _lines(area, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
+    watched = comparison.model.at(level)
+    if watched is not None:
+        draw_dot(area, _magnified(comparison.model, watched, factor)[comparison.probe] / scale.size)
+    return area.sheet
+
+
+def _drawn_on(comparison: Comparison, side: int) -> Path:
+    """The model (0) or the reference (1) as it is drawn: on its own mesh, where that lies in the plane."""
+    known = comparison.known_on[side]
+    carried = (comparison.model, comparison.reference)[side]
+    return known if known.problem.mesh.dim == 2 and not comparison.node_by_node else carried
+
+
+def _magnified(path: Path, state: State, factor: float) -> Floats:
+    return np.asarray(path.problem.mesh.nodes + factor * state.displacement)
+
+
+def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet | None:
+    """The model coloured by its distance from a reference, whose outline is black; nodes outside of it crossed.
+
+    Elements have the mean colour of their corners; where there are none, nodes are dots. None where the two are the
+    same but for rounding.
+    """
+    level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
+    mine, theirs = comparison.model.at(level), comparison.reference.at(level)
+    if mine is None or theirs is None or not level:
+        return None
+    inside = ~comparison.outside
+    apart = np.where(inside, np.linalg.norm(mine.displacement - theirs.displacement, axis=1), 0.0)
+    farthest = float(apart.max())
+    size = float(np.linalg.norm(theirs.displacement[inside], axis=1).max())
+    if not np.isfinite(farthest) or farthest <= ROUNDING * size:
+        return None
+    factor = magnification(result)
+    reference = _drawn_on(comparison, 1)
+    own = reference.at(level)
+    positions = _magnified(comparison.model, mine, factor)
+    others = positions if own is None else _magnified(reference, own, factor)
+    bar = bar_of(farthest, size)
+    lower, upper, (leaves,) = picture_box(positions, [others])
+    margin = 0.04 * float((upper - lower).max())
+    remarks = [f"displacements {times(factor)}"] if factor != 1 else []
+    remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
+    legend = [Entry(f"outline of {full_name(result, name)}", INK), Entry("probe", RED, "o", "")]
+    legend += [Entry("outside", LOAD, "x", "")] if comparison.n_outside else []
+    title = f"{level_name(result, level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
+    area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks), bar)
+    _colored(area, comparison.model.problem.mesh, positions / scale.size, apart / farthest)
+    outline = reference.problem.mesh.boundary if reference.problem.mesh.element != "line" else path_lines(reference)
+    _lines(area, others / scale.size, outline, INK, 1.0, 4, "reference")
+    if comparison.n_outside:
+        draw_outside(area, positions[comparison.outside] / scale.size)
     draw_dot(area, positions[comparison.probe] / scale.size)
     return area.sheet
+
+
+# Colours that a distance is told in: as many as a bar of them lets an eye tell apart, and more.
+_SHADES = 48
+
+
+def _colored(area: Area, mesh: Mesh, places: Floats, shares: Floats) -> None:
+    """Elements, or the nodes of lines as dots, in the colours of distances, in units of the area."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    if mesh.element == "line":
+        around = np.linspace(0, 2 * np.pi, 13)[:-1]
+        dot = 0.035 * area.inch * np.stack([np.cos(around), np.sin(around)], axis=1)
+        shapes, values = places[:, None] + dot, shares
+    else:
+        shapes, values = places[mesh.elements], shares[mesh.elements].mean(axis=1)
+    closed = np.concatenate([shapes, shapes[:, :1]], axis=1)
+    codes = np.full(closed.shape[1], Outline.LINETO, dtype=np.uint8)
+    codes[0], codes[-1] = Outline.MOVETO, Outline.CLOSEPOLY
+    shade = np.rint((_SHADES - 1) * values).astype(np.int64)
+    for one in np.unique(shade):
+        (color,) = error_colors(np.array([one / (_SHADES - 1)]))
+        alike = closed[shade == one]
+        outline = Outline(alike.reshape(-1, 2), np.tile(codes, len(alike)))
+        area.add(PathPatch(outline, fc=color, ec=color, lw=0.3, zorder=3, gid="distance"))
 
 
 def over_title(result: Result, level: float, comparison: Comparison) -> str:

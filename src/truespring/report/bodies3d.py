@@ -10,18 +10,19 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
+from truespring.report.bar import Bar, bar_of
 from truespring.report.bodies import magnification, over_title, path_lines, picture_box, spring_lines
-from truespring.report.frame3d import Bar, Picture
+from truespring.report.frame3d import Picture
 from truespring.report.legend import Entry
 from truespring.report.lines import draw_lines
-from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, times
+from truespring.report.quantity import ROUNDING, Scale, times
 from truespring.report.render import Layer, rgb
 from truespring.report.result import Result
 from truespring.report.sheet import Area
-from truespring.report.style import BLUE, FAINT, INK, RED, error_colors, full_name
+from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
 from truespring.report.supports3d import clamped_nodes, draw_supports
 from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
-from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, find_arrows
+from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, draw_outside, find_arrows
 from truespring.report.verdict import display_name, level_name
 
 # Surfaces: of the body as asked for, of a reference, where it is held; their light comes from above, left of the eye.
@@ -90,8 +91,8 @@ def _pair(result: Result, comparison: Comparison) -> _Pair | None:
         rest=seen(rest),
         mine=seen(rest + factor * mine.displacement),
         theirs=seen(rest + factor * theirs.displacement),
-        distance=np.linalg.norm(mine.displacement - theirs.displacement, axis=1),
-        largest=float(np.linalg.norm(theirs.displacement, axis=1).max()),
+        distance=np.where(comparison.outside, 0.0, np.linalg.norm(mine.displacement - theirs.displacement, axis=1)),
+        largest=float(np.linalg.norm(theirs.displacement[~comparison.outside], axis=1).max()),
     )
 
 
@@ -135,13 +136,8 @@ def distance_picture(result: Result, name: str, comparison: Comparison) -> Pictu
     surface = _solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
     black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
     reference = display_name(result, name)
-    if pair.largest:
-        bar = Bar("distance [% of the reference's largest displacement]", 100 * farthest / pair.largest)
-        most = f"{percent(farthest / pair.largest)}, {quantity(farthest, 'm', 2)}"
-    else:
-        scale = natural_scale(farthest, "m")
-        bar, most = Bar(f"distance [{scale.unit}]", farthest / scale.size), quantity(farthest, "m", 2)
-    title = f"{level_name(result, pair.level).capitalize()}: at most {most} from {reference}"
+    bar = bar_of(farthest, pair.largest)
+    title = f"{level_name(result, pair.level).capitalize()}: at most {bar.most} from {reference}"
     legend = (
         Entry(f"outline of {full_name(result, name)}", INK),
         Entry("at rest", FAINT, linestyle=_DASHES),
@@ -173,8 +169,12 @@ def _pair_picture(
         draw_lines(
             area, pair.rest[at_rest][:, :, :2] / scale.size, FAINT, 0.8, 1, "rest", linestyle=_DASHES, clip_on=False
         )
+        if comparison.n_outside:
+            draw_outside(area, pair.mine[comparison.outside, :2] / scale.size)
         draw_dot(area, pair.mine[comparison.probe, :2] / scale.size)
 
+    if comparison.n_outside:
+        legend = (*legend, Entry("outside", LOAD, "x", ""))
     return Picture(
         title, " · ".join(remarks), legend, lower - margin, upper + margin, np.concatenate(spots), layers, marks, bar
     )

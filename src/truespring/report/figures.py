@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from weakref import WeakKeyDictionary
 
-from truespring.report.bodies import over_figure, undeformed_figure
+from truespring.report.bodies import distance_figure, over_figure, undeformed_figure
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
 from truespring.report.curves import moved_supports
 from truespring.report.frame3d import figure_of, shot
@@ -99,9 +99,11 @@ def _draw(result: Result) -> Iterator[_Named]:
 def _plane_bodies(result: Result) -> Iterator[_Named]:
     yield "undeformed", undeformed_figure(result), ""
     for name, comparison in result.comparisons.items():
-        drawn = over_figure(result, name, comparison)
-        if drawn is not None:
-            yield over_name(result, name), drawn, ""
+        pictures = {over_name: over_figure} | ({distance_name: distance_figure} if result.in_detail else {})
+        for called, draw in pictures.items():
+            drawn = draw(result, name, comparison)
+            if drawn is not None:
+                yield called(result, name), drawn, ""
 
 
 def _bodies_in_space(result: Result) -> Callable[[], Iterator[_Named]]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.report.frame import draw_bar, round_numbers, written
+from truespring.report.bar import BAR, Bar, draw_error_bar
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, natural_scale, quantity
 from truespring.report.render import Image, Layer, Shot
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import LOAD, POINT, error_colors
+from truespring.report.style import LOAD, POINT
 from truespring.report.surfaces import VIEW
 from truespring.report.words import draw_words, text_width
 
@@ -23,14 +23,6 @@ _TRIAD = "#3d4248"
 
 #: Draws marks into an area in units of a scale.
 Marks = Callable[[Area, Scale], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """A bar of colours from 0 to `largest`, in the unit that `label` names."""
-
-    label: str
-    largest: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,8 +50,8 @@ class Picture:
     bar: Bar | None = None
 
 
-# Inches around the image, of the colour bar with its words, and of the triad beyond its arms.
-_SIDE, _BOTTOM, _TOP, _BAR, _WORDS = 0.12, 0.06, 0.32, 0.44, 0.17
+# Inches around the image, and of the triad beyond its arms.
+_SIDE, _BOTTOM, _TOP, _WORDS = 0.12, 0.06, 0.32, 0.17
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,7 +80,7 @@ def _layout(picture: Picture) -> _Layout:
     columns, words = legend_columns(picture.legend, 5.0)
     words = max(words, text_width(picture.title, 9, bold=True), text_width(picture.remark, 8))
     words = max(words, text_width(picture.bar.label, 8)) if picture.bar else words
-    top = _TOP + ROW * len(columns[0]) + ROW * bool(picture.remark) + _BAR * bool(picture.bar)
+    top = _TOP + ROW * len(columns[0]) + ROW * bool(picture.remark) + BAR * bool(picture.bar)
     extent = picture.upper - picture.lower
     inch = float(max(extent[0] / 5.4, extent[1] / 4.4))  # [m] on paper
     arm = _round_length(0.15 * float(extent.max()))
@@ -143,7 +135,7 @@ def figure_of(picture: Picture, image: Image) -> Sheet:
     below = sheet.height - 0.30 - ROW * bool(picture.remark)
     draw_legend(sheet, at.columns, _SIDE, below)
     if picture.bar:
-        _draw_bar(sheet, picture.bar, below - ROW * len(at.columns[0]) - 0.08)
+        draw_error_bar(sheet, picture.bar, _SIDE, below - ROW * len(at.columns[0]) - 0.08)
     return sheet
 
 
@@ -158,11 +150,3 @@ def _draw_triad(area: Area, at: _Layout, scale: Scale) -> None:
     lowest = float(min(origin[1], *tips[:, 1]))
     told = f"each {quantity(at.arm, 'm', 1)}"
     draw_words(area.sheet, origin[0], lowest - 11 * POINT, told, 7.5, _TRIAD, align=0.5)
-
-
-def _draw_bar(sheet: Sheet, bar: Bar, top: float) -> None:
-    """Draw a bar of colours with its label above, whose upper edge is at `top` [inch]."""
-    draw_words(sheet, _SIDE, top - 0.07, bar.label)
-    largest = bar.largest or 1.0
-    values = round_numbers(0.0, largest, 5)
-    draw_bar(sheet, _SIDE, top - 0.17, 2.6, error_colors(np.linspace(0, 1, 256)), values / largest, written(values))

@@ -3,7 +3,7 @@
 import base64
 import platform
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from truespring.comparison import Comparison
 from truespring.equilibrium import Path, Status
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.mesh import Box, select_elements
@@ -22,6 +23,7 @@ from truespring.report.figures import Drawing, distance_name, over_name, render_
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.verdict import (
+    carrying_sentence,
     cause_sentence,
     closest_sentence,
     deep,
@@ -103,15 +105,16 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "id": f"study-{place}",
         "title": result.title,
         "verdict": verdict_sentences(result),
-        "more": [
-            text for say in (closest_sentence, cause_sentence, force_sentence, mesh_sentence) if (text := say(result))
-        ],
+        "more": [text for say in _SENTENCES if (text := say(result))],
         "converged": result.converged,
         "closest": display_name(result, nearest) if nearest else None,
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
         "mesh_notes": result.problem.mesh.notes,
         "drawing_notes": sorted({drawing.note for drawing in drawings.values()} - {""}),
         "in_space": in_space,
+        "coloured": in_space or result.in_detail,
+        "stated": result.problem.stated,
+        "solved": any(path.potential is not None for path in result.paths.values()),
         "too_large": in_space and moving is None and any(len(path.states) > 1 for path in result.paths.values()),
         "facts": _facts(result),
         "short": _in_short(result),
@@ -135,6 +138,9 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "moduli_note": _section_note(result.problem),
         "source": result.source,
     }
+
+
+_SENTENCES = (carrying_sentence, closest_sentence, cause_sentence, force_sentence, mesh_sentence)
 
 
 def _picture(drawing: Drawing) -> dict[str, str]:
@@ -198,6 +204,8 @@ def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
 
 
 def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
+    if not problem.stated:
+        return [("loads and supports", "not told by the file")]
     facts = []
     total = problem.loading.force(problem.mesh.nodes).sum(axis=0)
     if not problem.loading.driven_by_motion:
@@ -221,6 +229,7 @@ def _in_short(result: Result) -> str:
     n_regions = len(problem.regions)
     parts += [f"{n_regions} region{'s' * (n_regions != 1)} of another material"] if n_regions else []
     parts += [f"{name} {words[name]}" for name in ("total force", "prescribed motion") if name in words]
+    parts += ["loads and supports not told"] if not problem.stated else []
     return " · ".join([*parts, f"{len(problem.mesh.elements)} elements"])
 
 
@@ -238,12 +247,25 @@ def _comparison_row(result: Result, name: str) -> dict[str, Any]:
         "label": one.reference.label,
         "errors": [_share(error) for error, _ in zip(errors, _measures(result), strict=False)],
         "reach": reach(result, one) if one.load_factors.size else "–",
-        "outline": None
-        if one.surface is None
-        else f"outlines {quantity(one.surface.outline_rms, 'm', 2)} apart, {quantity(one.surface.outline_max, 'm', 2)} "
-        f"at most; nodes {quantity(one.surface.nodes_rms, 'm', 2)} from the nearest of the file",
+        "apart": "; ".join(_apart(one, result.in_detail)),
         "closest": name == nearest_reference(result),
     }
+
+
+def _apart(one: Comparison, in_detail: bool) -> Iterator[str]:
+    """Distances in metres, and of energies, beside the relative errors of a comparison."""
+    if in_detail and one.load_factors.size:
+        rms, most = (float(several[-1]) for several in (one.rms_distances, one.max_distances))
+        yield f"nodes {quantity(rms, 'm', 2)} apart (root mean square), {quantity(most, 'm', 2)} at most"
+    if one.surface is not None:
+        outlines = quantity(one.surface.outline_rms, "m", 2), quantity(one.surface.outline_max, "m", 2)
+        yield "outlines {} apart, {} at most".format(*outlines)
+        yield f"nodes {quantity(one.surface.nodes_rms, 'm', 2)} from the nearest of the file"
+    elif in_detail and one.hausdorff is not None:
+        surfaces = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
+        yield "surfaces {} apart, {} at most (Hausdorff)".format(*surfaces)
+    if in_detail and one.energy_error is not None:
+        yield f"stored energy {percent(one.energy_error)} off"
 
 
 def _share(error: float | None) -> str:

@@ -69,7 +69,10 @@ def curves_figure(result: Result) -> Sheet:
 
 
 def _is_balanced(result: Result) -> bool:
-    """Whether the loads have no total: their sum is rounding beside them."""
+    """Whether the loads have no total, as their sum is rounding beside them, or it is not known of a path."""
+    forces = [path.applied_force(path.states[-1]) for path in result.paths.values() if path.states]
+    if not result.problem.stated or not np.isfinite(forces).all():
+        return True
     if result.problem.loading.driven_by_motion:
         return False
     force = result.problem.loading.force(result.problem.mesh.nodes)

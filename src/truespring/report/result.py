@@ -25,8 +25,10 @@ class Result:
         model: name of the path that is compared with the others; None where nothing is compared.
         comparisons: by name of the reference.
         tolerance: the rms error up to which two paths agree.
-        fitness: whether the springs of a path are fit for the material, by its name.
         source: text of the study file; comments at its head are shown with its results.
+        fitness: whether the springs of a path are fit for the material, by its name.
+        in_detail: whether distances of surfaces, in metres, and energies are told too, and a plane body is coloured by
+            its distance, as where two results are compared.
     """
 
     title: str
@@ -39,6 +41,7 @@ class Result:
     tolerance: float
     source: str
     fitness: Mapping[str, Fitness] = field(default_factory=dict)
+    in_detail: bool = False
 
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State
 from truespring.mesh import Surface
 from truespring.potential import Visible
@@ -84,6 +85,29 @@ def write_stl(path: Path, file: FilePath) -> None:
     else:
         return
     drawn.write(file, file_format="stl", binary=True)
+
+
+def write_difference(comparison: Comparison, file: FilePath) -> None:
+    """Write the nodes at which two paths are compared as VTU: both displacements, their distance, what lies outside.
+
+    At the last level that both have; nothing where there is none.
+    """
+    import meshio
+
+    level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
+    mine, theirs = comparison.model.at(level), comparison.reference.at(level)
+    if mine is None or theirs is None or not level:
+        return
+    mesh = comparison.model.problem.mesh
+    apart = mine.displacement - theirs.displacement
+    fields = {
+        "displacement": _in_space(mine.displacement),
+        "reference_displacement": _in_space(theirs.displacement),
+        "distance": np.linalg.norm(apart, axis=1),
+        "outside": comparison.outside.astype(np.uint8),
+    }
+    written = meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data=fields)
+    written.write(file, file_format="vtu")
 
 
 def _in_space(vectors: Floats) -> Floats:

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+from truespring.arrays import Floats
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path
 from truespring.models import FemPotential, Moduli
@@ -16,6 +17,7 @@ def summary(result: Result) -> dict[str, Any]:
     return {
         "title": result.title,
         "truespring": version("truespring"),
+        "model": result.model,
         "models": {name: _model(path, result.probe) for name, path in result.paths.items()},
         "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
         "comparison": {name: _comparison(one) for name, one in result.comparisons.items()},
@@ -97,6 +99,47 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
         values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
         values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
     return values
+
+
+def difference(result: Result) -> dict[str, Any]:
+    """Return how far two results are apart at the last load level that both have, as values that JSON can hold.
+
+    Relative errors as in the summary of a study; distances in metres; what is not known is None.
+    """
+    (one,) = result.comparisons.values()
+    model, reference = result.paths  # in this order, whichever of both is drawn over the other
+    surfaces = one.hausdorff
+    met = bool(one.load_factors.size)
+
+    def last(values: Floats) -> float | None:
+        return _known(float(values[-1])) if met else None
+
+    return {
+        "model": model,
+        "reference": reference,
+        "load_factor": last(one.load_factors),
+        "rms_error": last(one.rms_errors),
+        "max_error": last(one.max_errors),
+        "probe_error": last(one.probe_errors),
+        "energy_error": one.energy_error,
+        "rms_distance": last(one.rms_distances),
+        "max_distance": last(one.max_distances),
+        "hausdorff": None if surfaces is None else surfaces.max,
+        "surface_rms": None if surfaces is None else surfaces.rms,
+        "n_nodes": len(one.outside),
+        "n_outside": one.n_outside,
+        "node_by_node": one.node_by_node,
+        "probe": result.problem.mesh.nodes[result.probe].tolist(),
+        "agrees_up_to_load_factor": one.agrees_up_to_load_factor,
+        "tolerance": one.tolerance,
+        "levels": [
+            {"load_factor": level, "rms_error": _known(error), "rms_distance": distance}
+            for level, error, distance in zip(
+                one.load_factors.tolist(), one.rms_errors.tolist(), one.rms_distances.tolist(), strict=True
+            )
+        ],
+        "warnings": [f"{who}: {warning}" for who, path in result.paths.items() for warning in path.warnings],
+    }
 
 
 def _known(value: float) -> float | None:

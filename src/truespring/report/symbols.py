@@ -31,6 +31,11 @@ def draw_dot(area: Area, point: Floats) -> None:
     _draw_marks(area, point, "probe", marker="o", color=RED, ms=5.5, mec="white", mew=0.6, zorder=10, clip_on=False)
 
 
+def draw_outside(area: Area, points: Floats) -> None:
+    """Draw crosses at nodes that lie outside of the other body, in units of the area."""
+    _draw_marks(area, points, "outside", marker="x", color=LOAD, ms=4.5, mew=1.2, zorder=9, clip_on=False)
+
+
 def _draw_marks(area: Area, points: Floats, name: str, **style: Any) -> None:
     from matplotlib.lines import Line2D
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
+from truespring.report.summary import difference
 from truespring.report.verdict import verdict
 from truespring.settling import Settling
 
@@ -88,6 +89,35 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     for name, path in result.paths.items():
         for warning in path.warnings:
             yield f"warning: {name}: {warning}"
+
+
+def difference_tables(result: Result) -> "Iterator[Table | str]":
+    """Yield how far two results are apart at the last load level that both have, and what should be known of them."""
+    (one,) = result.comparisons.values()
+    values = difference(result)
+    table = _table(result.title, "", "")
+    for key, what in _DIFFERENCES.items():
+        if (value := values[key]) is not None:
+            table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")
+    table.add_row("compared", "node by node" if one.node_by_node else "at nodes of one, carried from the other")
+    table.add_row("nodes", f"{len(one.outside):,}, {one.n_outside:,} outside")
+    yield table
+    yield verdict(result)
+    for warning in values["warnings"]:
+        yield f"warning: {warning}"
+
+
+_DIFFERENCES = {
+    "load_factor": "at load factor",
+    "rms_error": "root-mean-square error",
+    "max_error": "largest error",
+    "probe_error": "error at the probe",
+    "energy_error": "error of the stored energy",
+    "rms_distance": "root-mean-square distance [m]",
+    "max_distance": "largest distance [m]",
+    "surface_rms": "surfaces apart, root mean square [m]",
+    "hausdorff": "surfaces apart, at most (Hausdorff) [m]",
+}
 
 
 def settling_table(title: str, several: Iterable[Settling]) -> "Table":

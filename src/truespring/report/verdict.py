@@ -137,6 +137,24 @@ def mesh_sentence(result: Result) -> str | None:
     )
 
 
+def carrying_sentence(result: Result) -> str | None:
+    """Return at which nodes results were compared where two were; None of a study, whose models share their nodes."""
+    if not result.in_detail or result.model is None:
+        return None
+    ((name, one),) = result.comparisons.items()
+    mesh = one.model.problem.mesh
+    model, reference = display_name(result, result.model), display_name(result, name)
+    if not one.model.states or not one.reference.states:
+        alone = reference if not one.reference.states else model
+        return f"{alone} tells a deformed surface only: what can be compared are surfaces."
+    if one.node_by_node:
+        return f"Both have the same {mesh.n_nodes:,} nodes and are compared node by node."
+    at_reference = one.reference.problem is one.known_on[1].problem
+    carried, to = (model, reference) if at_reference else (reference, model)
+    left = f"; {one.n_outside:,} of them lie outside and are left out" if one.n_outside else ""
+    return f"{carried} is carried to the {mesh.n_nodes:,} nodes of {to} by the interpolation of its own elements{left}."
+
+
 def material_name(result: Result) -> str:
     """Return what the moduli that are wanted are called: in plane strain they are not the material's own."""
     return "material in plane strain" if isinstance(result.problem.section, PlaneStrain) else "material"
@@ -253,7 +271,18 @@ class Drive:
 
 
 def drive(result: Result) -> Drive:
-    """Return the dominant direction of the total force, or of the prescribed motion where no load is given."""
+    """Return the dominant direction of the total force, or of the prescribed motion where no load is given.
+
+    Where it is not known what acts, that in which the probe moves.
+    """
+    if not result.problem.stated:
+        moved = next(
+            (path.states[-1].displacement[result.probe] for path in result.paths.values() if path.states), None
+        )
+        if moved is None or not moved.any():
+            return Drive(0, 1.0)
+        axis = int(np.abs(moved).argmax())
+        return Drive(axis, float(np.sign(moved[axis])))
     loading = result.problem.loading
     force = loading.force(result.problem.mesh.nodes)
     total = force.sum(axis=0)
@@ -409,6 +438,9 @@ def _short_of_full_load(result: Result, name: str, one: Comparison) -> str:
         if one.agrees_up_to_load_factor is None:
             return f"{who} is known at load factor {level:.4g} only, there {percent(one.rms_errors[-1])}."
         return f"with {who} the comparison ends at load factor {level:.4g}, there {percent(one.rms_errors[-1])}."
+    if one.surface is None and one.hausdorff is not None:
+        apart = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
+        return "the surfaces lie {} (root mean square) and at most {} apart.".format(*apart)
     if one.surface is None:
         return f"{who} and {_subject(result)[0]} have no load level in common."
     level = one.reference.surface.load_factor if one.reference.surface else 1.0
@@ -435,7 +467,7 @@ def _everyone(result: Result, names: Sequence[str]) -> str:
 
 
 def _driven_by_motion(result: Result) -> bool:
-    return result.problem.loading.driven_by_motion
+    return result.problem.stated and result.problem.loading.driven_by_motion
 
 
 def _by_displacement(result: Result) -> bool:
@@ -461,4 +493,6 @@ def _listed(parts: Sequence[str], last: str = " and ") -> str:
 
 
 def _capital(sentence: str) -> str:
+    if "." in sentence.split(" ")[0]:  # a file's name
+        return sentence
     return sentence[:1].upper() + sentence[1:]

@@ -38,7 +38,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
     closest = shown.index(result.closest) - 1 if result.closest in shown else 0
     values = {
         "magnified": f"displacements {times(factor)}" if factor != 1 else "",
-        "motion": not result.problem.loads,
+        "motion": result.problem.stated and not result.problem.loads,
         "unit": scale.unit,
         "box": [float(value) for value in extent / scale.size],
         "n_nodes": len(nodes),
@@ -81,6 +81,10 @@ def _levels(path: Path, budget: int) -> list[float]:
     return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
 
 
+def _force(force: float) -> str:
+    return quantity(force, "N") if np.isfinite(force) else "not known"
+
+
 def _path(
     result: Result, name: str, levels: Sequence[float], pack: Packing, factor: float, beyond: bool
 ) -> dict[str, Any]:
@@ -99,7 +103,7 @@ def _path(
         "beyond": beyond,
         "levels": [state.load_factor for state in states],
         "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
-        "force": [quantity(to.along(path.applied_force(state)), "N") for state in states],
+        "force": [_force(to.along(path.applied_force(state))) for state in states],
         "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
         "errors": [None if error is None else percent(error) for error in errors],
         "surface": None,

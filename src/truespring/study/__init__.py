@@ -1,7 +1,13 @@
 """Study files: read, checked, run."""
 
+from truespring.study.compare import compare_sources as compare_sources
+from truespring.study.compare import read_probe as read_probe
+from truespring.study.compare import write_comparisons as write_comparisons
 from truespring.study.converge import converge as converge
 from truespring.study.converge import write_settling as write_settling
+from truespring.study.export import check_targets as check_targets
+from truespring.study.export import export_study as export_study
+from truespring.study.export import springs_of as springs_of
 from truespring.study.network import read_network as read_network
 from truespring.study.read import Study as Study
 from truespring.study.read import read_study as read_study
@@ -15,3 +21,4 @@ from truespring.study.run import run as run
 from truespring.study.run import write as write
 from truespring.study.run import write_moduli as write_moduli
 from truespring.study.run import write_overview as write_overview
+from truespring.study.sources import find_sources as find_sources

@@ -1,0 +1,201 @@
+"""Two bodies that are one, told in other units, along other axes or from another origin: noticed, never mended."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.comparison import Comparison
+from truespring.equilibrium import Path
+
+# Boxes whose corners are this near, as a share of their diagonal, are of one body; those of deformed ones less so.
+_SAME_BOX = 0.02
+_SAME_DEFORMED_BOX = 0.2
+
+# By the size of a unit over that which was taken.
+_FACTORS = (1e-3, 1e3, 1e-2, 1e2, 10.0, 0.1, 1e-6, 1e6, 0.0254, 1 / 0.0254, 0.3048, 1 / 0.3048)
+
+#: Points at which displacements are compared to tell axes apart.
+_SAMPLE = 400
+
+# A displacement that is so much nearer along other axes, or in another unit, tells that these were meant.
+_POOR, _BETTER = 0.5, 0.2
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What makes a body lie where another lies.
+
+    Attributes:
+        factor: what its lengths are to be multiplied by.
+        axes: its axes along ours, such as ("x", "z", "-y").
+        shift: what is added to its places then [m].
+    """
+
+    factor: float = 1.0
+    axes: tuple[str, ...] = ("x", "y", "z")
+    shift: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A box in space; of a plane body its `lower` and `upper` along z are not numbers."""
+
+    lower: Floats
+    upper: Floats
+    filled: bool
+
+    @property
+    def diameter(self) -> float:
+        return float(np.linalg.norm(np.nan_to_num(self.upper - self.lower)))
+
+
+def find_misfit(path: Path, reference: Path) -> Misfit | None:
+    """Return what would make a body lie where the reference lies; None where it does, or where nothing would."""
+    mine, theirs, tolerance = _box(path), _box(reference), _SAME_BOX
+    if not path.states or not reference.states:  # one is known deformed only: the other is taken there too
+        level = (path if not path.states else reference).load_factor
+        mine, theirs, tolerance = _box(path, level), _box(reference, level), _SAME_DEFORMED_BOX
+    if _fits(mine, theirs, tolerance):
+        return None
+    best, least = None, np.inf
+    for candidates in _tiers(mine, theirs, tolerance):
+        for one in candidates:
+            error = _sampled_error(path, reference, one)
+            # The less is changed the likelier, but for what brings the motion much nearer.
+            if best is None or error < _BETTER * least or (error < least and _changes(one) == _changes(best)):
+                best, least = one, error
+        if least < _POOR:
+            break
+    return best
+
+
+def _changes(one: Misfit) -> int:
+    return (one.factor != 1) + (one.axes != ("x", "y", "z")) + any(one.shift)
+
+
+def displacement_misfit(comparison: Comparison) -> Misfit | None:
+    """Return other axes or another unit in which the displacement of a body that lies right would be much nearer.
+
+    Axes of the whole body, where it then still lies right, or of its displacement alone; the factor is that of the
+    displacement alone. None where the two are near, or nothing brings them nearer.
+    """
+    model, reference = comparison.known_on
+    if not comparison.load_factors.size or not comparison.rms_errors[-1] > _POOR:
+        return None
+    mine, theirs = _box(model), _box(reference)
+    plain = Misfit()
+    turned = [one for axes in _axes() if _fits(_moved(mine, one := Misfit(axes=axes)), theirs, _SAME_BOX)]
+    told = [(one, one) for one in turned]  # how places are told, and how their displacement
+    told += [(plain, one) for one in (*turned, *(Misfit(factor) for factor in _FACTORS))]
+    errors = [_sampled_error(model, reference, *pair) for pair in told]
+    best = int(np.argmin(errors))
+    return told[best][1] if errors[best] < _BETTER * _sampled_error(model, reference, plain) else None
+
+
+def _box(path: Path, level: float | None = None) -> _Box:
+    if path.states:
+        state = None if level is None else path.at(level)
+        points = path.whole.points if state is None else state.all_positions
+    else:
+        only = path.surface or path.shell
+        points = np.zeros((1, 3)) if only is None else only.points
+    unknown = np.full(3 - points.shape[1], np.nan)
+    filled = not path.states or bool(path.whole.cells)
+    return _Box(np.append(points.min(axis=0), unknown), np.append(points.max(axis=0), unknown), filled)
+
+
+def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
+    """Whether one box is the other; of points alone, whether they lie within the other and are not lost in it."""
+    room = tolerance * max(mine.diameter, theirs.diameter)
+    low, high = mine.lower - theirs.lower, mine.upper - theirs.upper
+    known = ~(np.isnan(low) | np.isnan(high))
+    plane = np.isnan(mine.lower).any() or np.isnan(theirs.lower).any()
+    if not known[: 2 if plane else 3].all():
+        return False
+    if mine.filled and theirs.filled:
+        return bool((np.abs(low[known]) <= room).all() and (np.abs(high[known]) <= room).all())
+    sign = 1 if not mine.filled else -1
+    lost = min(mine.diameter, theirs.diameter) < tolerance * max(mine.diameter, theirs.diameter)
+    return bool((sign * low[known] >= -room).all() and (sign * high[known] <= room).all()) and not lost
+
+
+def _moved(box: _Box, misfit: Misfit) -> _Box:
+    ends = np.stack([_turned(corner[None], misfit.axes)[0] for corner in (box.lower, box.upper)])
+    low, high = misfit.factor * np.fmin(*ends), misfit.factor * np.fmax(*ends)
+    return _Box(low + np.array(misfit.shift), high + np.array(misfit.shift), box.filled)
+
+
+def _turned(vectors: Floats, axes: tuple[str, ...]) -> Floats:
+    return np.stack([(-1.0 if axis[0] == "-" else 1.0) * vectors[:, "xyz".index(axis[-1])] for axis in axes], axis=1)
+
+
+def _axes() -> Iterator[tuple[str, ...]]:
+    """All other axes, right-handed ones first."""
+    order = [
+        (float(np.linalg.det(_turned(np.eye(3), axes))), axes)
+        for letters in itertools.permutations("xyz")
+        for signs in itertools.product(("", "-"), repeat=3)
+        for axes in [tuple(sign + letter for sign, letter in zip(signs, letters, strict=True))]
+    ]
+    yield from (axes for handed, axes in sorted(order, key=lambda one: -one[0]) if axes != ("x", "y", "z"))
+
+
+def _tiers(mine: _Box, theirs: _Box, tolerance: float) -> Iterator[Iterator[Misfit]]:
+    """What fits of ever more that is changed: unit, axes, origin, and two or all of them."""
+    units, axes = [Misfit(factor) for factor in _FACTORS], [Misfit(axes=one) for one in _axes()]
+    both = [Misfit(factor, one.axes) for factor in _FACTORS for one in axes]
+    yield (one for one in units if _fits(_moved(mine, one), theirs, tolerance))
+    yield (one for one in axes if _fits(_moved(mine, one), theirs, tolerance))
+    if mine.filled and theirs.filled:
+        yield _shifted([Misfit()], mine, theirs, tolerance)
+    yield (one for one in both if _fits(_moved(mine, one), theirs, tolerance))
+    if mine.filled and theirs.filled:
+        yield _shifted(units, mine, theirs, tolerance)
+        yield _shifted(axes, mine, theirs, tolerance)
+        yield _shifted(both, mine, theirs, tolerance)
+
+
+def _shifted(several: list[Misfit], mine: _Box, theirs: _Box, tolerance: float) -> Iterator[Misfit]:
+    for one in several:
+        shift = np.nan_to_num(theirs.lower - _moved(mine, one).lower)
+        moved = Misfit(one.factor, one.axes, tuple(float(f"{part:.6g}") for part in shift))
+        if _fits(_moved(mine, moved), theirs, tolerance):
+            yield moved
+
+
+def _sampled_error(path: Path, reference: Path, places: Misfit, motion: Misfit | None = None) -> float:
+    """The relative rms error of a body's displacement at some of its points, were it told otherwise; 0 if not known.
+
+    The `motion` is told otherwise as places are where nothing else is given.
+    """
+    grid, other = path.whole, reference.whole
+    state = path.states[-1] if path.states else None
+    theirs = None if state is None else reference.at(state.level)
+    if state is None or theirs is None or not other.fills:
+        return 0.0
+    some, told = _some(len(grid.points)), motion or places
+    moved = told.factor * _turned(_in_space((state.all_positions - grid.points)[some]), told.axes)
+    rest = places.factor * _turned(_in_space(grid.points[some]), places.axes) + np.array(places.shift)
+    dim = min(other.dim, grid.dim)
+    if other.dim == 3 and grid.dim == 2:
+        rest[:, 2] = (other.points[:, 2].min() + other.points[:, 2].max()) / 2
+    found = other.locate(rest[:, : other.dim])
+    inside = ~found.outside
+    if not inside.any():
+        return np.inf
+    wanted = found.carry(theirs.all_positions - other.points)[inside, :dim]
+    size = float(np.linalg.norm(wanted))
+    return float(np.linalg.norm(moved[inside, :dim] - wanted)) / size if size else np.inf
+
+
+def _some(n_points: int) -> Ints:
+    return np.unique(np.linspace(0, n_points - 1, _SAMPLE).astype(np.int64))
+
+
+def _in_space(vectors: Floats) -> Floats:
+    padded = np.zeros((len(vectors), 3))
+    padded[:, : vectors.shape[1]] = vectors
+    return padded

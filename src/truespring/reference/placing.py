@@ -1,0 +1,181 @@
+"""From a record in its file's own unit and axes to a path in metres, along our axes and from our origin."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.equilibrium import Path, State, Status
+from truespring.errors import MeshError, ReferenceFileError, TruespringError
+from truespring.mesh import Grid, Mesh, corner_mesh
+from truespring.mesh.selections import AXES
+from truespring.problem import Problem
+from truespring.reference.record import Level, Record
+from truespring.units import to_si
+
+# A body this thin lies in a plane, a share of its diameter; displacements out of it are as small beside the others.
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where a file's body lies.
+
+    Attributes:
+        unit: the file's unit of length, such as "mm".
+        axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
+        shift: what is added to its places then [m], shape (3,).
+        load_factor: of a file of one level; None takes full load.
+    """
+
+    unit: str = "m"
+    axes: tuple[str, ...] = tuple(AXES)
+    shift: tuple[float, ...] = (0.0, 0.0, 0.0)
+    load_factor: float | None = None
+
+    def __post_init__(self) -> None:
+        letters = [axis.removeprefix("-") for axis in self.axes]
+        if sorted(letters) != list(AXES):
+            raise ReferenceFileError(
+                f"axes = {','.join(self.axes)}: x, y and z are wanted in some order, each with or without a minus"
+            )
+        if self.load_factor is not None and not 0 < self.load_factor <= 1:
+            raise ReferenceFileError(f"load_factor = {self.load_factor:g} is not above 0 and at most 1")
+        _ = self.scale
+
+    @property
+    def scale(self) -> float:
+        """The file's unit of length [m]."""
+        try:
+            size = to_si(self.unit if self.unit[:1].isdigit() else f"1 {self.unit}", "length")
+        except TruespringError:
+            size = 0.0
+        if size <= 0:
+            raise ReferenceFileError(
+                f"unit = '{self.unit}' is no unit of length; allowed are m, cm, mm, inch and others"
+            )
+        return size
+
+    def turned(self, vectors: Floats) -> Floats:
+        """Return vectors of the file, shape (n, 3), along our axes, in the file's unit."""
+        return np.stack(
+            [(-1.0 if axis[0] == "-" else 1.0) * vectors[:, AXES.index(axis[-1])] for axis in self.axes], axis=1
+        )
+
+    def places(self, points: Floats) -> Floats:
+        """Return points of the file, shape (n, 3), where they lie [m]."""
+        return np.asarray(self.scale * self.turned(points) + np.array(self.shift))
+
+    def displacement(self, vectors: Floats) -> Floats:
+        """Return displacements of the file, shape (n, 3), along our axes [m]."""
+        return self.scale * self.turned(vectors)
+
+
+def placed(record: Record, placing: Placing, label: str) -> Path:
+    """Return a record as a path, its body a mesh of the corners of its cells; see mesh.corner_mesh.
+
+    Stability, convergence, loads and supports are not known of it. Raises ReferenceFileError where its cells are no
+    mesh, or its levels no load levels.
+    """
+    points = placing.places(record.points)
+    factors, notes = _load_factors(record, placing)
+    moves = [placing.displacement(level.displacement) for level in record.levels]
+    dim = _dim(record, points, moves)
+    try:
+        whole = Grid(points[:, :dim], record.cells)
+        mesh, nodes = corner_mesh(whole)
+    except MeshError as error:
+        raise ReferenceFileError(f"{record.file}: {error}") from None
+    order = _mesh_first(whole, nodes)
+    grid = _picked(whole, order)
+    states = [
+        _state(mesh, grid, move[order, :dim], level, factor)
+        for level, move, factor in zip(record.levels, moves, factors, strict=True)
+    ]
+    if len(states) > 1 and factors[0] > 0:
+        at_rest = Level(0.0, np.zeros(0), 0.0, np.zeros(3))
+        states.insert(0, _state(mesh, grid, np.zeros(grid.points.shape), at_rest, 0.0))
+    return Path(
+        problem=Problem(mesh, stated=False),
+        label=label,
+        kind=record.kind,
+        states=tuple(states),
+        status=Status.CONVERGED,
+        warnings=(*record.notes, *notes, unproven(label)),
+        grid=grid,
+    )
+
+
+def unproven(label: str) -> str:
+    """Return the warning that what was read was not solved here."""
+    return (
+        f"{label} was read, not solved: its convergence and stability are those of the program that wrote it; "
+        "stability not proven"
+    )
+
+
+def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[str]]:
+    """The load factor of each level, and what should be known of how they were found."""
+    times = [level.time for level in record.levels]
+    if len(times) == 1:
+        factor = 1.0 if placing.load_factor is None else placing.load_factor
+        return [factor], []
+    if placing.load_factor is not None:
+        raise ReferenceFileError(f"{record.file} has {len(times)} levels: load_factor is for a file of one")
+    if any(later <= earlier for earlier, later in itertools.pairwise(times)) or times[0] < 0:
+        factors = [(number + 1) / len(times) for number in range(len(times))]
+        return factors, [f"its {len(times)} levels have no ascending times and were taken as equal shares of the load"]
+    last = times[-1]
+    if math.isclose(last, 1.0, rel_tol=1e-6):
+        return [*times[:-1], 1.0], []
+    return [time / last for time in times[:-1]] + [1.0], [
+        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1"
+    ]
+
+
+def _dim(record: Record, points: Floats, moves: list[Floats]) -> int:
+    """2 where all lies and moves in a plane of constant z, and no cell fills space."""
+    if any(kind.startswith(("tetra", "hexahedron", "wedge", "pyramid")) for kind in record.cells):
+        return 3
+    flat = np.ptp(points[:, 2]) <= _FLAT * np.linalg.norm(np.ptp(points, axis=0))
+    largest = max((float(np.abs(move).max()) for move in moves), default=0.0)
+    return 2 if flat and all(np.abs(move[:, 2]).max() <= _FLAT * largest for move in moves) else 3
+
+
+def _mesh_first(grid: Grid, nodes: Ints) -> Ints:
+    """The points that a cell or the mesh has, those of the mesh first."""
+    used = np.zeros(len(grid.points), dtype=bool)
+    for cells in grid.cells.values():
+        used[cells] = True
+    used[nodes] = False
+    return np.concatenate([nodes, np.flatnonzero(used)])
+
+
+def _picked(grid: Grid, order: Ints) -> Grid:
+    number = np.full(len(grid.points), -1)
+    number[order] = np.arange(len(order))
+    return Grid(grid.points[order], {kind: number[cells] for kind, cells in grid.cells.items()})
+
+
+def _state(mesh: Mesh, grid: Grid, displacement: Floats, level: Level, load_factor: float) -> State:
+    """A state of which no more is known than how far each point has moved [m], shape (n_points, dim)."""
+    positions = mesh.nodes + displacement[: mesh.n_nodes]
+    force = np.full(mesh.dim, math.nan) if level.force is None else level.force[: mesh.dim]
+    return State(
+        load_factor=load_factor,
+        positions=positions,
+        all_positions=grid.points + displacement,
+        displacement=displacement[: mesh.n_nodes],
+        reaction=np.full(positions.shape, math.nan),
+        applied_force=force,
+        energy=math.nan if level.energy is None else level.energy,
+        iterations=0,
+        residual=math.nan,
+        negative_eigenvalues=None,
+        branched=False,
+        area_ratio=mesh.smallest_area_ratio(positions),
+        stretch=None,
+        level=load_factor,
+    )

@@ -1,0 +1,283 @@
+"""What `truespring compare` is given: studies, folders that truespring wrote, and other programs' result files."""
+
+import csv
+import json
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from truespring.equilibrium import Path, Status, solve
+from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
+from truespring.problem import Problem
+from truespring.reference import CalculiX, Placing, placed, read_record, read_shell, read_stl
+from truespring.study.read import Study, read_study
+from truespring.units import to_si
+
+#: Called with what is read or solved and the share that is done, for a progress bar.
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of a result file that it does not tell itself.
+
+    Attributes:
+        unit, axes, shift, load_factor: see Placing; None where nothing is told, which takes m, x,y,z, no shift, 1.
+        field: the name of the displacement among a VTK file's arrays.
+        undeformed: the body at rest, of STL or marker files that hold no more than where it went.
+        mesh: the deck with the nodes of a .dat file.
+    """
+
+    unit: str | None = None
+    axes: tuple[str, ...] | None = None
+    shift: tuple[float, ...] | None = None
+    load_factor: float | None = None
+    field: str | None = None
+    undeformed: FilePath | None = None
+    mesh: FilePath | None = None
+
+    @property
+    def placing(self) -> Placing:
+        """Where the file's body lies."""
+        plain = Placing()
+        return Placing(
+            unit=self.unit or plain.unit,
+            axes=self.axes or plain.axes,
+            shift=self.shift or plain.shift,
+            load_factor=self.load_factor,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One of the things that are compared, before it is read or solved.
+
+    Attributes:
+        text: as it was given.
+        file: the study, the folder or the file.
+        model: which model of a study or folder, None for its compared one.
+        told: what is told of a file.
+        study: the study, checked, where it is one.
+    """
+
+    text: str
+    file: FilePath
+    model: str | None
+    told: Told
+    study: Study | None = None
+
+    @property
+    def probe(self) -> tuple[float, ...] | None:
+        """The place [m] that a study or a folder of one watches, None where none is told."""
+        if self.study is not None and self.study.probe is not None:
+            return tuple(self.study.problem.mesh.nodes[self.study.probe].tolist())
+        if self.file.is_dir():
+            with suppress(ReferenceFileError, KeyError, TypeError):
+                return tuple(float(part) for part in _json(_folder(self) / "summary.json")["probe"]["position"])
+        return None
+
+    @property
+    def is_stl(self) -> bool:
+        """Whether it is an STL file, which is read beside the other body."""
+        return self.file.suffix.lower() == ".stl"
+
+
+def find_sources(texts: Sequence[str], options: Sequence[tuple[str, Sequence[str]]]) -> list[Source]:
+    """Return what several texts name, checked before anything is read whole or solved; see find_source and told_of.
+
+    Raises StudyError with the faults of all of them.
+    """
+    if len(texts) < 2:
+        raise StudyError(f"{', '.join(texts)}: two results or more are compared, the first is the reference")
+    found, faults = [], []
+    for text in texts:
+        try:
+            found.append(find_source(text, told_of(text, options, texts)))
+        except TruespringError as error:
+            faults += [line for line in str(error).splitlines() if line not in faults]
+    if faults:
+        raise StudyError("\n".join(faults))
+    return found
+
+
+def find_source(text: str, told: Told) -> Source:
+    """Return what FILE, FOLDER[:MODEL] or STUDY[:MODEL] names; raise StudyError for what is not there."""
+    file, model = FilePath(text), None
+    if not file.exists() and ":" in text:
+        name, _, given = text.rpartition(":")
+        if FilePath(name).exists():
+            file, model = FilePath(name), given
+    if not file.exists():
+        raise StudyError(f"{text}: there is no such file or folder")
+    study = read_study(file) if file.suffix.lower() == ".toml" else None
+    if study is None and not file.is_dir() and model is not None:
+        raise StudyError(f"{text}: a result file holds one model; leave out ':{model}'")
+    if study is not None:
+        model = _known(text, model or study.model, list(study.entries))
+    return Source(text, file, model, told, study)
+
+
+def open_source(source: Source, beside: Problem | None, progress: Progress | None) -> Path:
+    """Read or solve a source; an STL file is read beside the body of `beside`, where there is one in the plane."""
+
+    def report(share: float) -> None:
+        if progress:
+            progress(source.text, share)
+
+    told = source.told
+    if source.study is not None:
+        path = _solved(source.study, str(source.model), report)
+    elif source.file.is_dir():
+        path = _of_folder(source, report)
+    elif source.is_stl and beside is not None and beside.mesh.dim == 2 and beside.mesh.element != "line":
+        at = told.placing
+        factor = 1.0 if at.load_factor is None else at.load_factor
+        path = read_stl(beside, source.file, factor, told.undeformed, at.unit, at.axes, at.shift)
+    elif source.is_stl and told.undeformed is None:
+        path = read_shell(source.file, told.placing, beside)
+    else:
+        path = placed(_record(source.file, told, report), told.placing, source.file.name)
+    report(1.0)
+    return path
+
+
+def _record(file: FilePath, told: Told, report: Callable[[float], None]) -> Any:
+    return read_record(file, field=told.field, undeformed=told.undeformed, mesh=told.mesh, reading=report)
+
+
+def _known(text: str, model: str, names: Sequence[str]) -> str:
+    if model not in names:
+        raise StudyError(f"{text}: '{model}' is not among the models{nearest(model, names)}: {', '.join(names)}")
+    return model
+
+
+def _solved(study: Study, name: str, report: Callable[[float], None]) -> Path:
+    entry = study.entries[name]
+    if isinstance(entry, Path):
+        return entry
+    if isinstance(entry, CalculiX):
+        return entry.run(study.problem, study.solver, lambda factor, *_: report(factor))
+    return solve(study.problem, entry, study.solver, lambda factor, *_: report(factor))
+
+
+def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
+    """A path that truespring wrote: its VTU series with what summary and curves tell of it."""
+    folder = _folder(source)
+    summary = _json(folder / "summary.json")
+    models = summary["models"]
+    name = _known(source.text, source.model or str(summary.get("model") or next(iter(models))), list(models))
+    series = folder / f"{name}.pvd"
+    if not series.is_file():
+        raise ReferenceFileError(f"{series} does not exist: of '{name}' no level was written")
+    path = placed(_record(series, Told(), report), Placing(), f"{models[name]['label']} of {folder.name}")
+    status = Status(models[name]["status"])
+    states = _with_forces(path, folder / "curves.csv", name)
+    return replace(path, kind=models[name]["kind"], status=status, states=states)
+
+
+def _folder(source: Source) -> FilePath:
+    """The folder of a study, or the only one in a folder of several."""
+    if (source.file / "summary.json").is_file():
+        return source.file
+    inner = sorted(one.parent for one in source.file.glob("*/summary.json"))
+    if len(inner) != 1:
+        several = f"; it holds those of {', '.join(str(one) for one in inner)}" if inner else ""
+        raise StudyError(f"{source.text}: truespring wrote no study into this folder (no summary.json){several}")
+    return inner[0]
+
+
+def _json(file: FilePath) -> dict[str, Any]:
+    try:
+        read = json.loads(file.read_text(encoding="utf-8"))
+        if not isinstance(read["models"], dict) or not read["models"]:
+            raise ValueError("it names no models")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ReferenceFileError(f"{file} is no summary of truespring, or damaged: {error}") from None
+    return dict(read)
+
+
+def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[Any, ...]:
+    """The states of a path with the forces that curves.csv tells at their levels."""
+    try:
+        with curves.open(newline="", encoding="utf-8") as stream:
+            rows = [row for row in csv.DictReader(stream) if row.get("model") == name]
+        axes = "xyz"[: path.problem.mesh.dim]
+        forces = {float(row["load_factor"]): [float(row[f"f{axis}"] or math.nan) for axis in axes] for row in rows}
+    except (OSError, ValueError, KeyError, TypeError):
+        return path.states  # displacements can be compared without
+    known = np.array(list(forces))
+    states = []
+    for state in path.states:
+        near = np.flatnonzero(np.abs(known - state.load_factor) < 1e-6) if known.size else np.zeros(0, dtype=int)
+        force = np.array(list(forces.values())[int(near[0])]) if near.size else state.applied_force
+        states.append(replace(state, applied_force=force))
+    return tuple(states)
+
+
+def told_of(text: str, options: Sequence[tuple[str, Sequence[str]]], texts: Sequence[str]) -> Told:
+    """Return what options tell of one of the things that are compared.
+
+    Each option is a name of Told and its values: VALUE for all files, or FILE=VALUE for one, by what was given, its
+    file's name or stem. Raises StudyError for a FILE that is none of them and a VALUE that cannot be read.
+    """
+    found: dict[str, Any] = {}
+    for name, values in options:
+        for value in values:
+            file, equals, rest = value.rpartition("=")
+            if equals and not any(_names(one, file) for one in texts):
+                raise StudyError(f"--{name.replace('_', '-')} {value}: '{file}' is none of {', '.join(texts)}")
+            if not equals or _names(text, file):
+                found[name] = _value(name, rest, value)
+    return Told(**found)
+
+
+def _names(text: str, file: str) -> bool:
+    place = FilePath(text)
+    return file in (text, place.name, place.stem)
+
+
+def _value(name: str, text: str, given: str) -> Any:
+    option = f"--{name.replace('_', '-')} {given}"
+    parts = tuple(part.strip() for part in text.split(","))
+    try:
+        match name:
+            case "axes":
+                Placing(axes=parts)
+                return parts
+            case "shift":
+                place = read_place(text)
+                return (*place, *[0.0] * (3 - len(place)))
+            case "load_factor":
+                factor = float(text)
+                Placing(load_factor=factor)
+                return factor
+            case "unit":
+                Placing(unit=text)
+                return text
+            case "undeformed" | "mesh":
+                return FilePath(text)
+            case _:
+                return text
+    except (TruespringError, ValueError) as error:
+        raise StudyError(f"{option}: {error}") from None
+
+
+def read_place(text: str) -> tuple[float, ...]:
+    """Return a place or a way [m] of two or three lengths: "0.16, 0.02", or "160 mm, 20 mm"."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) not in (2, 3):
+        raise StudyError(f"'{text}' is no place: two or three lengths are wanted, such as 160 mm, 20 mm")
+    return tuple(to_si(float(part) if _is_number(part) else part, "length") for part in parts)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
