@@ -7,6 +7,7 @@ from .equilibrium import State as State
 from .equilibrium import Status as Status
 from .equilibrium import solve as solve
 from .errors import TruespringError as TruespringError
+from .exports import export as export
 from .loading import Fixed as Fixed
 from .loading import Force as Force
 from .loading import Gravity as Gravity

@@ -8,14 +8,16 @@ from importlib.metadata import version
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.equilibrium import Path, State, Status
+from truespring.equilibrium import Path, Solver, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import PlaneStrain, PlaneStress
 from truespring.mesh import Box, Near, Plane, Selection
 from truespring.mesh.selections import AXES
-from truespring.models import SpringNetwork, VolumeSprings
+from truespring.models import SpringNetwork, Springs, VolumeSprings
+from truespring.potential import Potential
 from truespring.problem import Load, Problem
+from truespring.solvers import DisplacementControl, Newton, Reporter
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,28 +48,8 @@ class Exported:
         return found if found is not None and found.load_factor == 1.0 else None
 
     def network(self, program: str, negative: bool = True) -> SpringNetwork:
-        """Return the springs, for a program that knows nothing but springs; `negative` are stiffnesses it takes.
-
-        Raises ExportError where the model is more than springs.
-        """
-        springs = self.path.potential
-        if isinstance(springs, VolumeSprings):
-            raise ExportError(
-                f"{program} has no volume term, which these springs have: take a model without volume = true, "
-                "or the target npz or json, which carries it"
-            )
-        if not isinstance(springs, SpringNetwork):
-            raise ExportError(
-                f"{program} has no coupled springs, which '{self.path.label}' are: take another rule, "
-                "or the target npz or json, which carries their coupling"
-            )
-        below = np.flatnonzero(springs.stiffness < 0)
-        if below.size and not negative:
-            raise ExportError(
-                f"{program} takes no negative stiffness: {below.size} springs have one, the first, number {below[0]}, "
-                f"{springs.stiffness[below[0]]:g} N/m; take another rule, or elements nearer to squares and cubes"
-            )
-        return springs
+        """Return the springs, for a program that knows nothing but springs; see `plain_springs`."""
+        return plain_springs(self.path.potential, program, negative)
 
     @property
     def held(self) -> Bools:
@@ -127,16 +109,16 @@ class Exported:
         for number, load in enumerate(self.problem.loads, 1):
             yield f"Load {number}: {_load(load)}."
         yield "Loads and prescribed motions stand at their full values."
-        yield from self._expected()
+        yield from self.expected
         yield from self.notes
 
     def _body(self) -> Iterator[str]:
         for number, material in enumerate(self.problem.materials):
             count = int((self.problem.material_numbers == number).sum())
+            of = f" of {_counted(count, 'element')}" if self.problem.regions else ""
             density = "density not given" if material.density is None else f"density {material.density:g} kg/m^3"
             yield (
-                f"Material of {_counted(count, 'element')}: Young's modulus {material.young:g} Pa, "
-                f"Poisson's ratio {material.poisson:g}, {density}."
+                f"Material{of}: Young's modulus {material.young:g} Pa, Poisson's ratio {material.poisson:g}, {density}."
             )
         if isinstance(self.problem.section, PlaneStress | PlaneStrain):
             yield f"Section: {self.section}, thickness {self.problem.section.thickness:g} m."
@@ -150,6 +132,11 @@ class Exported:
             case PlaneStrain():
                 return "plane strain"
         return ""
+
+    @property
+    def expected(self) -> tuple[str, ...]:
+        """What our equilibrium at full load is, and what is to be known of it, in sentences."""
+        return tuple(self._expected())
 
     def _expected(self) -> Iterator[str]:
         if self.state is None:
@@ -168,6 +155,56 @@ class Exported:
             if self.path.status is not Status.CONVERGED:
                 yield f"Another program need not find that state: the path to it is {self.path.status}."
         yield from (f"Warning of truespring: {warning}." for warning in self.path.warnings)
+
+
+def plain_springs(springs: Potential | None, program: str, negative: bool = True) -> SpringNetwork:
+    """Return springs for a program that knows nothing but springs; `negative` are stiffnesses it takes.
+
+    Raises ExportError where the model is more than springs.
+    """
+    if isinstance(springs, VolumeSprings):
+        raise ExportError(
+            f"{program} has no volume term, which these springs have: take a model without volume = true, "
+            "or the target npz or json, which carries it"
+        )
+    if not isinstance(springs, SpringNetwork):
+        raise ExportError(
+            f"{program} has no springs that answer to each other's lengths, as those of the rule biquadratic do: "
+            "take another rule, or the target npz or json, which carries their coupling"
+        )
+    below = np.flatnonzero(springs.stiffness < 0)
+    if below.size and not negative:
+        raise ExportError(
+            f"{program} takes no negative stiffness: {below.size} springs have one, the first, number {below[0]}, "
+            f"{springs.stiffness[below[0]]:g} N/m; take another rule, or elements nearer to squares and cubes"
+        )
+    return springs
+
+
+def solve_springs(
+    problem: Problem,
+    model: Springs | SpringNetwork,
+    solver: Solver | None = None,
+    title: str = "Springs",
+    probe: int | None = None,
+    report: Reporter | None = None,
+) -> Exported:
+    """Solve springs up to full load, so that a file can tell what to expect of them.
+
+    A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
+    programs put the load on. `probe` is by default the node that moves most. Raises ExportError for other models.
+    """
+    if not isinstance(model, Springs | SpringNetwork):
+        raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
+    chosen, remarks = solver or Newton(), []
+    steps = chosen.steps if isinstance(chosen, DisplacementControl) else chosen.load_steps
+    if not isinstance(chosen, Newton):
+        chosen = Newton(load_steps=steps)
+        remarks = ["The load is taken up in steps here, not followed past limit points as it was asked."]
+    path = solve(problem, model, chosen, report)
+    if probe is None:
+        probe = int(np.linalg.norm(path.states[-1].displacement, axis=1).argmax())
+    return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
 def in_space(vectors: Floats) -> Floats:

@@ -1,0 +1,275 @@
+"""A Python scene for SOFA: the springs, and their finite element twin beside them. Experimental: SOFA was not run.
+
+The form was checked against the sources of SOFA (https://github.com/sofa-framework/sofa) and SofaPython3: components,
+the names of their data, and what they compute. StiffSpringForceField has been SpringForceField since v24.06.
+"""
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats
+from truespring.exports.exported import Exported, in_space
+from truespring.models import SpringNetwork
+
+#: What the form was checked against.
+CHECKED = "SOFA v26.12 in development, commit 2a278d8 of 2026-08-06; the names are those of v25.06 and v26.06 too"
+
+# SOFA's plugins that hold the components of a scene.
+_PLUGINS = (
+    "Sofa.Component.Constraint.Projective",
+    "Sofa.Component.LinearSolver.Direct",
+    "Sofa.Component.MechanicalLoad",
+    "Sofa.Component.ODESolver.Backward",
+    "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "Sofa.Component.SolidMechanics.Spring",
+    "Sofa.Component.StateContainer",
+    "Sofa.Component.Topology.Container.Constant",
+    "Sofa.Component.Visual",
+)
+
+# Numbers in a line.
+_A_LINE = 8
+
+# The finite elements by the kind of the mesh: what SOFA calls them in a topology, and the component.
+_ELEMENTS = {
+    "triangle": ("triangles", "TriangleFEMForceField"),
+    "quadrilateral": ("triangles", "TriangleFEMForceField"),
+    "tetrahedron": ("tetrahedra", "TetrahedronFEMForceField"),
+    "hexahedron": ("hexahedra", "HexahedronFEMForceField"),
+}
+
+
+def sofa(exported: Exported) -> Mapping[str, str | bytes]:
+    """Return springs_scene.py, with createScene(root) for runSofa and a main for plain Python.
+
+    Raises ExportError for volume terms and coupled springs.
+    """
+    network = exported.network("SOFA")
+    lines = [
+        '"""' + "\n".join(_docstring(exported)),
+        '"""',
+        "",
+        "import Sofa",
+        "import Sofa.Core",
+        "import Sofa.Simulation",
+        "import SofaRuntime",
+        "",
+        *_data(exported, network),
+        _SCENE,
+    ]
+    return {"springs_scene.py": "\n".join(lines)}
+
+
+def _docstring(exported: Exported) -> Iterator[str]:
+    told = [*exported.header, *_EXPLAINED, *_of_elements(exported)]
+    for line in told:
+        safe = line.replace("\\", "/").replace('"', "'")
+        yield from textwrap.wrap(safe, 110, subsequent_indent="    ", break_long_words=False) or [""]
+
+
+_EXPLAINED = (
+    "EXPERIMENTAL: SOFA was not run on this file. Its form was checked against the sources of " + CHECKED + ".",
+    "Run it by: runSofa -l SofaPython3 springs_scene.py, or where SofaPython3 is on the path: python springs_scene.py.",
+    "Node i and spring j are counted from 0 as in the study; a plane body lies in z = 0 and is held there.",
+    "Loads and motions grow to their full values in LOAD_STEPS steps of the animation, each solved as a static state; "
+    "nodes that a support turns go straight to their places.",
+    "SOFA leaves out springs shorter than 1e-9 m.",
+)
+
+
+def _of_elements(exported: Exported) -> Iterator[str]:
+    """What the finite elements are there, which is not what they are here."""
+    element = exported.problem.mesh.element
+    if not exported.problem.materials:
+        yield "A network has no finite element twin."
+        return
+    yield (
+        f"The twin's elements are SOFA's {_ELEMENTS[element][1]}, method 'large': linear elasticity turned with each "
+        "element, which is no law of truespring's; at small strain all agree."
+    )
+    if element == "quadrilateral":
+        yield "Each quadrilateral is two triangles there, which are stiffer in bending."
+    if element == "hexahedron":
+        yield "SOFA's hexahedra are exact for bricks along the axes only."
+
+
+def _data(exported: Exported, network: SpringNetwork) -> Iterator[str]:
+    """The numbers of the scene by name."""
+    nodes = in_space(network.nodes)
+    held = np.ones(nodes.shape, dtype=bool)
+    held[:, : exported.held.shape[1]] = exported.held
+    motion = in_space(exported.motion)
+    force = np.where(held, 0.0, in_space(exported.external_force))
+    loaded = np.flatnonzero(force.any(axis=1))
+    moved = np.argwhere(motion != 0)
+    probe = [exported.probe, None if exported.state is None else _probed(exported)]
+    yield from _named("PLUGINS", list(_PLUGINS), "SOFA's plugins that hold the components")
+    yield from _named("LOAD_STEPS", exported.load_steps, "steps of the animation up to full load")
+    yield from _named("NODES", nodes, "positions at rest [m]")
+    yield from _named("SPRINGS", network.springs, "the two nodes of each spring")
+    yield from _named("STIFFNESS", network.stiffness, "of each spring [N/m]")
+    yield from _named("REST_LENGTH", network.rest_length, "of each spring [m]")
+    yield from _named("HELD", _held(held), "which of x, y, z are held, of which nodes")
+    yield from _named("LOADED", loaded, "nodes with a force")
+    yield from _named("FORCES", force[loaded], "on them at full load [N]")
+    motions = [(int(node), int(axis), float(motion[node, axis])) for node, axis in moved]
+    yield from _named("MOTIONS", motions, "node, direction and prescribed displacement at full load [m]")
+    yield from _named("PROBE", probe, "a node, and its displacement at full load [m]")
+    yield from _named("FEM", _elements(exported), "the finite element twin, None where there is none")
+
+
+def _named(name: str, value: Any, what: str) -> Iterator[str]:
+    plain = value.tolist() if isinstance(value, np.ndarray) else value
+    yield f"# {what}"
+    if not isinstance(plain, list) or len(plain) < _A_LINE:
+        yield f"{name} = {plain!r}"
+        return
+    rows = _A_LINE if isinstance(plain[0], int | float) else 1
+    yield f"{name} = ["
+    for first in range(0, len(plain), rows):
+        yield f"    {', '.join(map(repr, plain[first : first + rows]))},"
+    yield "]"
+
+
+def _probed(exported: Exported) -> list[float]:
+    assert exported.state is not None
+    return [float(part) for part in in_space(exported.state.displacement)[exported.probe]]
+
+
+def _held(held: Bools) -> list[tuple[list[int], list[int]]]:
+    """The nodes of each pattern of held directions, those without any left out."""
+    patterns, which = np.unique(held, axis=0, return_inverse=True)
+    return [
+        ([int(one) for one in pattern], np.flatnonzero(which.ravel() == number).tolist())
+        for number, pattern in enumerate(patterns)
+        if pattern.any()
+    ]
+
+
+def _elements(exported: Exported) -> dict[str, Any] | None:
+    """Component, topology and material of the finite element twin."""
+    problem = exported.problem
+    if not problem.materials:
+        return None
+    topology, component = _ELEMENTS[problem.mesh.element]
+    elements, times = problem.mesh.elements, 1
+    if problem.mesh.element == "quadrilateral":
+        elements, times = elements[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), 2
+    plane: dict[str, Any] = {}
+    if problem.section is not None and problem.mesh.dim == 2:
+        plane = {"thickness": problem.section.thickness, "planeStrain": exported.section == "plane strain"}
+
+    def by_element(values: Floats) -> list[float]:
+        """One for all where they are the same."""
+        return [float(values[0])] if (values == values[0]).all() else np.repeat(values, times).tolist()
+
+    return {
+        "component": component,
+        "topology": {topology: elements.tolist()},
+        "data": {
+            "method": "large",
+            "youngModulus": by_element(problem.of_elements(lambda material: material.young)),
+            "poissonRatio": by_element(problem.of_elements(lambda material: material.poisson)),
+            **plane,
+        },
+    }
+
+
+# What is the same in every scene. Damping is given, for SOFA's own default is not zero; so are the stopping
+# thresholds, of which one is absolute by default. Newton's steps are taken whole: where a slender body turns, the
+# residual grows before it falls, and a line search on it takes three times as many.
+_SCENE = '''
+
+class Levels(Sofa.Core.Controller):
+    """Takes forces and prescribed motions of a body to their full values, a level a step."""
+
+    def __init__(self, dofs, forces, *args, **kwargs):
+        Sofa.Core.Controller.__init__(self, *args, **kwargs)
+        self.dofs, self.forces, self.level = dofs, forces, 0
+
+    def onAnimateBeginEvent(self, event):
+        self.level = min(self.level + 1, LOAD_STEPS)
+        share = self.level / LOAD_STEPS
+        if self.forces is not None:
+            self.forces.forces.value = [[share * part for part in force] for force in FORCES]
+        if MOTIONS:
+            with self.dofs.position.writeableArray() as positions:
+                for node, axis, motion in MOTIONS:
+                    positions[node][axis] = NODES[node][axis] + share * motion
+
+
+def add_body(root, name):
+    """Add a body with everything but what resists its deformation."""
+    body = root.addChild(name)
+    body.addObject(
+        "NewtonRaphsonSolver",
+        name="newton",
+        maxNbIterationsNewton=100,
+        maxNbIterationsLineSearch=1,
+        warnWhenLineSearchFails=False,
+        relativeInitialStoppingThreshold=1e-8,
+        relativeSuccessiveStoppingThreshold=0.0,
+        absoluteResidualStoppingThreshold=0.0,
+    )
+    body.addObject("StaticSolver", newtonSolver="@newton")
+    body.addObject("SparseLDLSolver")
+    dofs = body.addObject("MechanicalObject", name="dofs", template="Vec3", position=NODES)
+    for directions, nodes in HELD:
+        if all(directions):
+            body.addObject("FixedProjectiveConstraint", indices=nodes)
+        else:
+            body.addObject("PartialFixedProjectiveConstraint", indices=nodes, fixedDirections=directions)
+    forces = None
+    if LOADED:
+        nothing = [[0.0, 0.0, 0.0]] * len(LOADED)
+        forces = body.addObject("ConstantForceField", name="load", indices=LOADED, forces=nothing)
+    body.addObject(Levels(dofs, forces, name="levels"))
+    return body
+
+
+def createScene(root):
+    root.gravity = [0.0, 0.0, 0.0]  # weights are among the forces
+    root.addObject("RequiredPlugin", pluginName=PLUGINS)
+    root.addObject("DefaultAnimationLoop")
+    root.addObject("VisualStyle", displayFlags="showBehaviorModels showForceFields showInteractionForceFields")
+    springs = add_body(root, "springs")
+    springs.addObject(
+        "SpringForceField",
+        name="springs",
+        template="Vec3",
+        object1="@dofs",
+        object2="@dofs",
+        springsIndices1=[first for first, _ in SPRINGS],
+        springsIndices2=[second for _, second in SPRINGS],
+        stiffness=STIFFNESS,
+        damping=[0.0] * len(SPRINGS),
+        lengths=REST_LENGTH,
+        elongationOnly=[False] * len(SPRINGS),
+        enabled=[True] * len(SPRINGS),
+    )
+    if FEM is not None:
+        elements = add_body(root, "fem")
+        elements.addObject("MeshTopology", name="mesh", position=NODES, **FEM["topology"])
+        elements.addObject(FEM["component"], name="elements", template="Vec3", topology="@mesh", **FEM["data"])
+    return root
+
+
+def main():
+    root = Sofa.Core.Node("root")
+    createScene(root)
+    Sofa.Simulation.initRoot(root)
+    for _ in range(LOAD_STEPS):
+        Sofa.Simulation.animate(root, root.dt.value)
+    node, expected = PROBE
+    for body in root.children:
+        place = body.dofs.position.value[node]
+        print(body.name.value, "node", node, "has moved by", [p - q for p, q in zip(place, NODES[node])], "m")
+    print("truespring expects of the springs", expected, "m")
+
+
+if __name__ == "__main__":
+    main()
+'''

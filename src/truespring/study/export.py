@@ -1,0 +1,122 @@
+"""The springs of a study, carried to other simulators."""
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from truespring.comparison import most_moved
+from truespring.equilibrium import Status
+from truespring.errors import ExportError, nearest
+from truespring.exports import Exported, check_targets, known_targets, solve_springs, target_files, write_files
+from truespring.models import SpringNetwork, Springs
+from truespring.study.read import Study
+from truespring.study.run import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """What `export_study` wrote for one target.
+
+    Attributes:
+        target: a key of TARGETS.
+        model: the name of the springs in the study.
+        exported: what was written.
+        files: where.
+    """
+
+    target: str
+    model: str
+    exported: Exported
+    files: tuple[FilePath, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the equilibrium that the files tell of was reached as it should."""
+        return self.exported.path.status is Status.CONVERGED and self.exported.state is not None
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The same as values that JSON can hold; the displacement is None where full load was not reached."""
+        exported, state = self.exported, self.exported.state
+        return {
+            "target": self.target,
+            "files": [str(file) for file in self.files],
+            "model": self.model,
+            "status": str(exported.path.status),
+            "load_factor": exported.path.load_factor,
+            "probe": {
+                "node": exported.probe,
+                "position": exported.problem.mesh.nodes[exported.probe].tolist(),
+                "displacement": None if state is None else state.displacement[exported.probe].tolist(),
+            },
+            "warnings": list(exported.path.warnings),
+            "notes": list(exported.notes),
+        }
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What a user should know of the files, in sentences: those of their heads but for what the study says."""
+        return (*self.exported.expected, *self.exported.notes)
+
+    @property
+    def fault(self) -> str:
+        """What went wrong where it did not converge."""
+        path = self.exported.path
+        return (
+            f"model '{self.model}' is {path.status}; reached load factor {path.load_factor:.6g}; "
+            "the files are written, what they do elsewhere is open"
+        )
+
+
+def springs_of(study: Study, targets: Collection[str], name: str | None = None) -> str:
+    """Return the name of the springs to export: the compared model where it is springs, else the first that is.
+
+    Raises ExportError for an unknown target, for springs that a target cannot take, and where there are none or
+    `name` is not among them; nothing is solved.
+    """
+    known = known_targets(targets)
+    springs = {one: entry for one, entry in study.entries.items() if isinstance(entry, Springs | SpringNetwork)}
+    if not springs:
+        raise ExportError(f"{study.file}: no model of springs among {', '.join(study.entries)}: add one to [models]")
+    if name is None:
+        name = study.model if study.model in springs else next(iter(springs))
+    if name not in springs:
+        what = "is no model of springs" if name in study.entries else f"is not among the models{nearest(name, springs)}"
+        raise ExportError(f"{study.file}: model '{name}' {what}; springs: {', '.join(springs)}")
+    with _named(study, name):
+        check_targets(known, study.problem, springs[name])
+    return name
+
+
+def export_study(
+    study: Study, targets: Collection[str], out: FilePath, name: str | None = None, progress: Progress | None = None
+) -> list[Carried]:
+    """Solve the springs of a study and write them for each target into out/STEM; return what was written.
+
+    Raises ExportError for what a target cannot express, and where two targets would write the same file.
+    """
+    name = springs_of(study, targets, name)
+    model = study.entries[name]
+    assert isinstance(model, Springs | SpringNetwork)  # springs_of takes no other
+
+    def report(load_factor: float, iteration: int, residual: float) -> None:
+        if progress:
+            progress(study.stem, name, load_factor)
+
+    exported = solve_springs(study.problem, model, study.solver, study.title, study.probe, report)
+    if study.probe is None:
+        exported = replace(exported, probe=most_moved(exported.path))
+    with _named(study, name):
+        found = target_files(exported, known_targets(targets))
+    return [Carried(target, name, exported, write_files(files, out / study.stem)) for target, files in found.items()]
+
+
+@contextmanager
+def _named(study: Study, name: str) -> Iterator[None]:
+    """Name the study and the model in front of what a target cannot express."""
+    try:
+        yield
+    except ExportError as error:
+        raise ExportError(f"{study.file}: model '{name}': {error}") from None
