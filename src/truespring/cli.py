@@ -87,6 +87,16 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     verb.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relative, default: 0.01")
     verb.add_argument("--meshes", type=_positive, default=5, metavar="N", help="at most so many, default: 5")
+    verb = add("export", _export, "write the springs of a study for another simulator, and what to expect there")
+    verb.add_argument(
+        "--to",
+        action="append",
+        required=True,
+        metavar="TARGET",
+        help="calculix, abaqus, mujoco, sofa, npz or json; may be given again",
+    )
+    verb.add_argument("--model", metavar="NAME", help="default: the compared model, or the first springs")
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
@@ -221,6 +231,32 @@ def _converge(options: argparse.Namespace) -> int:
         values = {stem: [asdict(one) for one in told] for stem, told in found.items()}
         _print_json(values if len(values) > 1 else values[studies[0].stem])
     return CONVERGED if all(one.settled for told in found.values() for one in told) else NOT_CONVERGED
+
+
+def _export(options: argparse.Namespace) -> int:
+    from truespring.study import export_study, read_studies, springs_of
+
+    studies = read_studies(options.study)
+    for study in studies:  # what is wrong is said before any is solved
+        springs_of(study, options.to, options.model)
+    _make_folders(options.out, studies)
+    console = _console(options)
+    values: dict[str, Any] = {}
+    converged = True
+    for study in studies:
+        with _progress(options) as progress, _writing(options.out):
+            carried = export_study(study, options.to, options.out, options.model, progress)
+        for one in carried:
+            console.print(f"{study.stem}: {one.target}: {', '.join(map(str, one.files))}", soft_wrap=True)
+        console.print("\n".join(carried[0].told), soft_wrap=True)
+        if not carried[0].converged:
+            converged = False
+            print(f"truespring: {study.stem}: {carried[0].fault}", file=sys.stderr)
+        found = {one.target: one.values for one in carried}
+        values[study.stem] = found if len(found) > 1 else carried[0].values
+    if options.json:
+        _print_json(values if len(values) > 1 else values[studies[0].stem])
+    return CONVERGED if converged else NOT_CONVERGED
 
 
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:

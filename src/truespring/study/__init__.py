@@ -8,6 +8,8 @@ from truespring.study.converge import write_settling as write_settling
 from truespring.study.export import check_targets as check_targets
 from truespring.study.export import export_study as export_study
 from truespring.study.export import springs_of as springs_of
+from truespring.study.export import export_study as export_study
+from truespring.study.export import springs_of as springs_of
 from truespring.study.network import read_network as read_network
 from truespring.study.read import Study as Study
 from truespring.study.read import read_study as read_study
