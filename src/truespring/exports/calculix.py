@@ -1,0 +1,124 @@
+"""CalculiX: its decks of a problem, as finite elements and as a network of SPRINGA elements.
+
+CalculiX is a finite element program of its own (Dhondt and Wittig, https://www.calculix.de). Its *ELASTIC is St.
+Venant-Kirchhoff's law under NLGEOM.
+"""
+
+from collections.abc import Sequence
+
+from truespring.errors import ExportError
+from truespring.exports.decks import (
+    Dialect,
+    Step,
+    check_fem,
+    comments,
+    deck,
+    described,
+    fem_element,
+    fem_twin,
+    levels_of,
+    real,
+    spring_twin,
+)
+from truespring.exports.exported import Exported
+from truespring.models import SpringNetwork
+from truespring.problem import Problem
+
+#: The laws that CalculiX has in common with Fem.
+LAWS = ("linear", "saint-venant-kirchhoff")
+
+#: Of forces in decks and results [N]: ccx takes any residual below 1e-6 for zero, whatever the unit.
+FORCE_UNIT = 1e-6
+
+# By default it stops at a residual of 0.5 % of the mean force, from the ninth iteration on 2 %, and a correction of
+# 1 % of the displacement; these are less than it prints.
+_CONTROLS = ["*CONTROLS, PARAMETERS=FIELD", "1.E-7, 1.E-7, , , 1.E-7"]
+_LAST_ONLY = "FREQUENCY=1000000"  # of a step: the last increment is printed always
+
+
+def fem_deck(
+    problem: Problem, levels: Sequence[float], law: str, element: str = "linear", header: Sequence[str] = ()
+) -> str:
+    """Write a problem as finite elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4, or "quadratic" C3D10.
+
+    Args:
+        problem: what is asked; its regions are sets of elements of their own material.
+        levels: load factors in (0, 1], ascending: a step each.
+        law: "linear", or "saint-venant-kirchhoff", which is NLGEOM.
+        element: "linear", or "quadratic" for tetrahedra.
+        header: comment lines.
+
+    Each step prints to the .dat file the displacement of all nodes [m], the forces on held ones [uN] and the strain
+    energy [uJ], right where the step took one increment; the .frd file has displacement, force, stress and strain.
+    Raises ExportError for what CalculiX cannot express.
+    """
+    if law not in LAWS:
+        raise ExportError(f"law = '{law}': CalculiX has {' and '.join(LAWS)} in common with truespring")
+    twin = fem_twin(problem, law, FORCE_UNIT, element)
+    return deck(_DIALECT, twin, levels, nonlinear=law != "linear", continuum=True, header=header)
+
+
+def spring_deck(problem: Problem, network: SpringNetwork, levels: Sequence[float], header: Sequence[str] = ()) -> str:
+    """Write a network as SPRINGA elements; arguments and output as of `fem_deck`, without energy.
+
+    Raises ExportError where springs are not at rest in the reference positions, or a load follows a face.
+    """
+    twin = spring_twin(problem, network, FORCE_UNIT)
+    return deck(_DIALECT, twin, levels, nonlinear=True, continuum=False, header=header)
+
+
+def calculix(exported: Exported) -> dict[str, str]:
+    """Return `springs.inp`, and `fem.inp` where the problem has a continuum that CalculiX can express."""
+    network, levels, files = exported.network("CalculiX"), levels_of(exported), {}
+    notes = [
+        "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
+    ]
+    try:
+        check_fem(exported.problem, "saint-venant-kirchhoff")
+        what = f"CalculiX {fem_element(exported.problem)} elements, NLGEOM"
+        header = [*described(exported, what, springs=False), *_explained("fem"), *_FEM]
+        files["fem.inp"] = fem_deck(exported.problem, levels, "saint-venant-kirchhoff", header=header)
+    except ExportError as error:
+        notes.append(f"There is no fem.inp beside this file: {error}.")
+    header = [*described(exported, "CalculiX SPRINGA elements", springs=True), *_explained("springs"), *notes]
+    return {"springs.inp": spring_deck(exported.problem, network, levels, header), **files}
+
+
+def _explained(name: str) -> tuple[str, ...]:
+    return (
+        f"Run it by: ccx {name}",
+        "Units: metres, and micronewtons (uN) for forces, for ccx takes any residual below 1e-6 for zero, whatever the "
+        "unit: stiffness is in uN/m, Young's modulus and pressure in uN/m^2, density in 1e-6 kg/m^3, energy in uJ.",
+        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, and gives its loads and "
+        f"motions in full. {name}.dat gets the displacement of all nodes at the end of each, {name}.frd fields.",
+    )
+
+
+_FEM = (
+    "*ELASTIC under NLGEOM is St. Venant-Kirchhoff's law. Gravity and pressure are CalculiX's own *DLOAD; pressure "
+    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks with free faces: plane "
+    "stress but for what thickness over size tells.",
+)
+
+
+def _start(step: Step, nonlinear: bool) -> list[str]:
+    if not nonlinear:
+        return ["*STEP", "*STATIC"]
+    first = real(step.first_increment)
+    return ["*STEP, NLGEOM, INC=1000000", *_CONTROLS, "*STATIC", f"{first}, 1., 1.E-5, {first}"]
+
+
+def _output(continuum: bool) -> list[str]:
+    return [
+        f"*NODE PRINT, NSET=NALL, {_LAST_ONLY}",
+        "U",
+        f"*NODE PRINT, NSET=HELD, {_LAST_ONLY}",
+        "RF",
+        *([f"*EL PRINT, ELSET=BODY, TOTALS=ONLY, {_LAST_ONLY}", "ELSE"] if continuum else []),
+        f"*NODE FILE, OUTPUT=2D, {_LAST_ONLY}",  # results of plane elements at the nodes that were given
+        "U, RF",
+        *([f"*EL FILE, OUTPUT=2D, {_LAST_ONLY}", "S, E"] if continuum else []),
+    ]
+
+
+_DIALECT = Dialect(FORCE_UNIT, comments, _start, _output)

@@ -1,0 +1,316 @@
+"""Decks of keywords: what those for CalculiX and for Abaqus have in common, which read the same ones.
+
+Nodes and elements are counted from 1 there: node i of ours is node i + 1.
+Source: the manual of CalculiX CrunchiX, https://www.dhondt.de, and the keywords reference of Abaqus.
+"""
+
+import itertools
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.errors import ExportError
+from truespring.exports.exported import Exported
+from truespring.loading import Gravity, Moment, Pressure, nodal_force
+from truespring.material import PlaneStrain
+from truespring.mesh import facets_within, select
+from truespring.models import Fem, SpringNetwork
+from truespring.models.quadratic import QuadraticPotential
+from truespring.potential import Loading, Potential
+from truespring.problem import Problem
+
+# The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
+_LARGEST_INCREMENT = 0.25
+# How far lengths at rest may be from the distances of the nodes, a share of them: rounding.
+_AT_REST = 1e-12
+# Numbers in a line.
+_A_LINE = 16
+
+# Corners of the faces, in both programs' order, from 0.
+_FACES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
+_SOLIDS = {"tetrahedron": "C3D4", "hexahedron": "C3D8"}
+_PLANES = {"triangle": "3", "quadrilateral": "4"}
+
+
+class Step(NamedTuple):
+    """A load level: its number from 1, its load factor, and its first increment as a share of it."""
+
+    number: int
+    load_factor: float
+    first_increment: float
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What a program wants otherwise than the others.
+
+    Attributes:
+        force_unit: of all forces and what is made of them [N].
+        opening: lines before the nodes, made of those of the header.
+        start: lines that start a step, for one with or without geometric nonlinearity.
+        output: lines that ask for results, for a continuum or for springs.
+    """
+
+    force_unit: float
+    opening: Callable[[Sequence[str]], list[str]]
+    start: Callable[[Step, bool], list[str]]
+    output: Callable[[bool], list[str]]
+
+
+class OwnLoad(NamedTuple):
+    """A load that the program spreads itself: on an element or a set, of a type, at full load, and what else it is."""
+
+    on: str
+    type: str
+    size: float
+    further: str = ""
+
+
+class Twin(NamedTuple):
+    """A body as the program knows it: the lines of its model, what acts on its nodes, and what the program spreads."""
+
+    nodes: Floats
+    model: list[str]
+    loading: Loading
+    own: list[OwnLoad]
+
+
+def real(value: float) -> str:
+    """Write a number in at most 19 characters: CalculiX reads twenty and silently drops the rest.
+
+    It has a decimal point always: without one a stiffness would be read as a direction.
+    """
+    text = f"{value:.12e}"
+    return text if len(text) < 20 else f"{value:.11e}"
+
+
+def joined(values: Iterable[object]) -> str:
+    """Write values in a line."""
+    return ", ".join(map(str, values))
+
+
+def deck(
+    dialect: Dialect, twin: Twin, levels: Sequence[float], nonlinear: bool, continuum: bool, header: Sequence[str]
+) -> str:
+    """Write a deck of one step a load level, each with loads and motions in full."""
+    levels = list(levels)
+    if not levels or levels[0] <= 0 or levels[-1] > 1 or any(b <= a for a, b in itertools.pairwise(levels)):
+        raise ExportError(f"levels = {levels}: load factors in ascending order are wanted, above 0 and at most 1")
+    lines = [
+        *dialect.opening(header),
+        "*NODE, NSET=NALL",
+        *(f"{number}, {joined(map(real, node))}" for number, node in enumerate(twin.nodes.tolist(), 1)),
+        *twin.model,
+        *number_set("NSET", "HELD", np.flatnonzero(twin.loading.held.any(axis=1))),
+    ]
+    for number, (last, level) in enumerate(itertools.pairwise([0.0, *levels]), 1):
+        step = Step(number, level, min(1.0, _LARGEST_INCREMENT / (level - last)))
+        lines += [
+            f"** Step {number}: load factor {level:.9g}",
+            *dialect.start(step, nonlinear),
+            *_acting(twin, level, dialect.force_unit),
+            *(dialect.output(continuum) if number == 1 else []),  # goes on in the steps that follow
+            "*END STEP",
+        ]
+    return "\n".join([*lines, ""])
+
+
+def _acting(twin: Twin, level: float, force_unit: float) -> Iterator[str]:
+    """Supports and loads at a level: amounts in full, which replace those of the step before."""
+    motion, force = twin.loading.motion(level), level * twin.loading.external_force / force_unit
+    yield "*BOUNDARY"
+    for node, axis in np.argwhere(twin.loading.held).tolist():
+        yield f"{node + 1}, {axis + 1}, {axis + 1}, {real(motion[node, axis])}"
+    if force.any():
+        yield "*CLOAD"
+        for node, axis in np.argwhere(force).tolist():
+            yield f"{node + 1}, {axis + 1}, {real(force[node, axis])}"
+    if twin.own:
+        yield "*DLOAD"
+        yield from (f"{one.on}, {one.type}, {real(level * one.size)}{one.further}" for one in twin.own)
+
+
+def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
+    """Write a set of nodes (NSET) or elements (ELSET), given by our numbers."""
+    yield f"*{kind}, {kind}={name}"
+    for first in range(0, len(numbers), _A_LINE):
+        yield joined(numbers[first : first + _A_LINE] + 1)
+
+
+# --- the continuum -------------------------------------------------------------------------------
+
+
+def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "linear") -> Twin:
+    """Return the body as finite elements of first order, or of the second ("quadratic") where it is of tetrahedra.
+
+    Pressure and gravity are the program's own, other loads come as forces on nodes, and so does all that acts on
+    quadratic elements. Raises ExportError for what cannot be said.
+    """
+    check_fem(problem, law)
+    kind, nodes, elements = fem_element(problem), problem.mesh.nodes, problem.mesh.elements
+    own = list(_own_loads(problem, force_unit))
+    loading = replace(problem.loading, external_force=_spread_by_us(problem), following=())
+    if element == "quadratic":
+        finer = Fem("linear", element).potential(problem)
+        if problem.mesh.element != "tetrahedron" or not isinstance(finer, QuadraticPotential):
+            raise ExportError(f"quadratic elements are written of tetrahedra, not of a mesh of {problem.mesh.element}s")
+        kind, nodes, elements, loading, own = "C3D10", finer.nodes, finer.elements, finer.loading, []
+    lines = [
+        f"*ELEMENT, TYPE={kind}, ELSET=BODY",
+        *(f"{number}, {joined(one)}" for number, one in enumerate((elements + 1).tolist(), 1)),
+    ]
+    for number in range(len(problem.materials)):
+        lines += _material(problem, number, force_unit)
+    return Twin(nodes, lines, loading, own)
+
+
+def check_fem(problem: Problem, law: str) -> None:
+    """Raise ExportError where a problem has no continuum, or a load that none can have."""
+    if problem.material is None or problem.section is None:
+        raise ExportError("a plain network of springs has no continuum: give its mesh elements and a material")
+    if law != "linear" and any(isinstance(load, Moment) for load in problem.loads):
+        raise ExportError(
+            "a moment that turns with a face has no keyword: prescribe the rotation of the face instead (a support "
+            "with rotation), or take the linear law, where it is forces on nodes"
+        )
+
+
+def fem_element(problem: Problem) -> str:
+    """Return the type of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4."""
+    plane = "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
+    element = problem.mesh.element
+    return _SOLIDS[element] if element in _SOLIDS else plane + _PLANES[element]
+
+
+def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:
+    """The material of a number and the elements that have it."""
+    material, several = problem.materials[number], len(problem.materials) > 1
+    name = f"PART{number + 1}" if several else "BODY"
+    if several:
+        yield from number_set("ELSET", name, np.flatnonzero(problem.material_numbers == number))
+    yield f"*MATERIAL, NAME=M{number + 1}"
+    yield "*ELASTIC"
+    yield f"{real(material.young / force_unit)}, {real(material.poisson)}"
+    if material.density is not None:
+        yield "*DENSITY"
+        yield real(material.density / force_unit)
+    yield f"*SOLID SECTION, ELSET={name}, MATERIAL=M{number + 1}"
+    if problem.mesh.dim == 2 and problem.section is not None:
+        yield real(problem.section.thickness)
+
+
+def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
+    """Pressure on faces, which follows them where the deck is nonlinear, and gravity."""
+    mesh = problem.mesh
+    for load in problem.loads:
+        if isinstance(load, Gravity):
+            size = float(np.linalg.norm(load.acceleration))
+            direction = [*(np.array(load.acceleration) / (size or 1.0)), 0.0][:3]
+            yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
+        elif isinstance(load, Pressure):
+            pressed = np.sort(facets_within(mesh, select(mesh, load.on)), axis=1)
+            for face, local in enumerate(_FACES[mesh.element], 1):
+                theirs = np.sort(mesh.elements[:, local], axis=1)
+                for number in np.flatnonzero(_rows_in(theirs, pressed)).tolist():
+                    yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+
+
+def _rows_in(rows: Ints, others: Ints) -> Bools:
+    """Which rows of numbers are among the others."""
+    both = np.unique(np.concatenate([others, rows]), axis=0, return_inverse=True)[1].ravel()
+    return np.isin(both[len(others) :], both[: len(others)])
+
+
+def _spread_by_us(problem: Problem) -> Floats:
+    """Forces on nodes [N]: the dead loads without gravity and, in a linear theory, moments as they are at rest."""
+    loading, shape = problem.loading, problem.mesh.nodes.shape
+    weight = nodal_force((load.spread(problem.body) for load in problem.loads if isinstance(load, Gravity)), shape)
+    dead = replace(loading, external_force=loading.external_force - weight)
+    moments = [load.following(problem.body, loading.held) for load in problem.loads if isinstance(load, Moment)]
+    return replace(dead, following=tuple(moments)).force(problem.mesh.nodes)
+
+
+# --- springs -------------------------------------------------------------------------------------
+
+
+def spring_twin(problem: Problem, network: SpringNetwork, force_unit: float) -> Twin:
+    """Return every spring as a SPRINGA element, one set of elements for each stiffness as it is written.
+
+    Raises ExportError for what cannot be said.
+    """
+    check_springs(problem, network)
+    members: dict[str, list[int]] = {}
+    for number, stiffness in enumerate((network.stiffness / force_unit).tolist()):
+        members.setdefault(real(stiffness), []).append(number)
+    lines: list[str] = []
+    for group, (stiffness, numbers) in enumerate(members.items(), 1):
+        lines.append(f"*ELEMENT, TYPE=SPRINGA, ELSET=S{group}")
+        lines += (f"{number + 1}, {joined((network.springs[number] + 1).tolist())}" for number in numbers)
+        lines += [f"*SPRING, ELSET=S{group}", "", stiffness]  # the empty line stands for directions
+    if network.nodes.shape[1] == 2:  # these springs are in space: the plane is held in z
+        lines += ["*BOUNDARY", "NALL, 3, 3"]
+    return Twin(network.nodes, lines, problem.loading, [])
+
+
+def check_springs(problem: Problem, potential: Potential) -> None:
+    """Raise ExportError where SPRINGA cannot say what a spring model is."""
+    if not isinstance(potential, SpringNetwork):
+        raise ExportError(
+            "SPRINGA elements are springs and nothing else: these springs have a volume term, or answer to each "
+            "other's lengths (rule biquadratic); take a rule without, and volume = false"
+        )
+    distance = np.linalg.norm(np.diff(potential.nodes[potential.springs], axis=1)[:, 0], axis=1)
+    tensed = np.abs(distance - potential.rest_length) > _AT_REST * distance
+    if tensed.any():
+        first = int(tensed.argmax())
+        raise ExportError(
+            f"a SPRINGA element has the length at rest that its nodes are apart: {int(tensed.sum())} springs have "
+            f"another, the first, number {first}, {potential.rest_length[first]:g} m instead of {distance[first]:g} m"
+        )
+    for load in problem.loads:
+        if isinstance(load, Pressure | Moment):
+            what, instead = (
+                ("pressure", "a traction, which is dead,")
+                if isinstance(load, Pressure)
+                else ("moment", "the rotation of a support")
+            )
+            raise ExportError(
+                f"a {what} follows a face, and springs have none: take {instead} or the continuum's deck instead"
+            )
+
+
+# --- headers -------------------------------------------------------------------------------------
+
+# Sentences that hold for files of springs in SI units at full load, of which a deck says its own.
+_OTHERWISE = ("Units are SI", "Loads and prescribed motions stand")
+_OF_SPRINGS = ("Expect", "Another program need not", "Warning of truespring")
+
+
+def described(exported: Exported, what: str, springs: bool) -> list[str]:
+    """Return what every target says of the problem, without what a deck says otherwise, and what the deck is."""
+    left_out = _OTHERWISE if springs else _OTHERWISE + _OF_SPRINGS
+    title, written, *lines = (line for line in exported.header if not line.startswith(left_out))
+    if springs:
+        return [title, f"{what}: {written}", *lines]
+    by_program = [line.replace(", as forces on nodes", "") for line in lines]
+    return [title, f"{what}, written by truespring {version('truespring')}.", *by_program]
+
+
+def comments(header: Sequence[str]) -> list[str]:
+    """Write sentences as comment lines, short enough for every program."""
+    return [f"** {part}" for line in header for part in textwrap.wrap(line, 112, subsequent_indent="   ")]
+
+
+def levels_of(exported: Exported) -> list[float]:
+    """Return the load levels that the study asks for."""
+    return [(number + 1) / exported.load_steps for number in range(exported.load_steps)]
