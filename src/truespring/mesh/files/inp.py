@@ -22,6 +22,7 @@ _SOLID = {
     **{6: "wedge", 15: "wedge", 5: "pyramid", 13: "pyramid"},
 }
 _LINE = {2: "line", 3: "line"}
+_SPRING = "SPRINGA"  # of two nodes, the one type of CalculiX whose name does not tell how many
 _FAMILIES = {"C3D": _SOLID, "CPS": _PLANE, "CPE": _PLANE, "S": _PLANE, "M3D": _PLANE, "T2D": _LINE, "T3D": _LINE}
 
 # What makes or moves nodes and elements in a way that is not followed here.
@@ -193,13 +194,14 @@ class _Deck:
     def _add_elements(self, card: _Card) -> None:
         type_ = card.parameters.get("TYPE", "").upper()
         found = re.fullmatch(rf"({'|'.join(_FAMILIES)})(\d+)(?:[A-Z].*)?", type_)
-        kind = _FAMILIES[found[1]].get(int(found[2])) if found else None
-        if found is None or kind is None:
+        n_nodes = 2 if type_ == _SPRING else int(found[2]) if found else 0
+        kind = "line" if type_ == _SPRING else _FAMILIES[found[1]].get(n_nodes) if found else None
+        if kind is None:
             raise card.error(
                 f"TYPE={type_} ({len(card.rows)} lines) is not read; C3D4, C3D8, C3D10, C3D20, CPS3, CPS4, CPE3, "
-                "CPE4, S3, S4 and their variants are"
+                "CPE4, S3, S4, T3D2, SPRINGA and their variants are"
             )
-        width = 1 + int(found[2])
+        width = 1 + n_nodes
         rows: list[list[bytes]] = []
         lines: list[int] = []
         for row, line in zip(self._rows(card), card.lines, strict=True):

@@ -1,0 +1,272 @@
+"""Results of CalculiX, .frd: text of short and long rows, and binary; every block DISP of every increment.
+
+Sources: "Result Format" in the manual of CalculiX GraphiX, https://www.dhondt.de, and files of CalculiX 2.20. Read
+here, not by a library: what was tried holds all fields of the file in memory, and takes what is damaged for zeros.
+"""
+
+from array import array
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import ReferenceFileError
+from truespring.reference.checks import checked, refuse_repeated, refuse_unreadable, rows_of, without_modes
+from truespring.reference.record import Level, Reading, Record
+from truespring.reference.scan import CHUNK, Scan, scanning
+
+# By the file's number of an element's type: meshio's name and the places of its nodes in VTK's order.
+# The middles of upright edges stand before those of the upper face here, behind them in VTK; a beam's between its ends.
+_TYPES: dict[int, tuple[str, tuple[int, ...]]] = {
+    1: ("hexahedron", tuple(range(8))),
+    2: ("wedge", tuple(range(6))),
+    3: ("tetra", tuple(range(4))),
+    4: ("hexahedron20", (*range(12), *range(16, 20), *range(12, 16))),
+    5: ("wedge15", (*range(9), *range(12, 15), *range(9, 12))),
+    6: ("tetra10", tuple(range(10))),
+    7: ("triangle", tuple(range(3))),
+    8: ("triangle6", tuple(range(6))),
+    9: ("quad", tuple(range(4))),
+    10: ("quad8", tuple(range(8))),
+    11: ("line", (0, 1)),
+    12: ("line3", (0, 1, 2)),
+}
+
+# Formats of a block: text with numbers of nodes in 5 or in 10 columns, binary with numbers of 4 or of 8 bytes.
+_SHORT, _LONG, _SINGLE, _DOUBLE = 0, 1, 2, 3
+_ID_WIDTH = {_SHORT: 5, _LONG: 10}
+_REAL = {_SINGLE: "<f4", _DOUBLE: "<f8"}
+_REAL_WIDTH = 12
+_INT = np.dtype("<i4")
+
+# Kinds of analysis whose displacements are mode shapes.
+_MODES = ("2", "4")
+
+
+def read_frd(file: Path, reading: Reading | None = None) -> Record:
+    """Read a .frd file of CalculiX.
+
+    Every block DISP becomes a level; other blocks are passed over. Numbers have six digits in a text file. Memory is
+    that of what is kept and some MB.
+
+    Args:
+        file: the result.
+        reading: is called with the share that is read.
+
+    Returns a record of kind "frd", names being the numbers of nodes. Raises ReferenceFileError with the line (in a
+    binary file the byte) where the file is damaged, cut off within a block, or holds no displacement.
+    """
+    refuse_unreadable(file)
+    with scanning(file, reading) as scan:
+        return checked(_Result(scan).read())
+
+
+class _Result:
+    """Gathers nodes, elements and displacements."""
+
+    def __init__(self, scan: Scan) -> None:
+        self._scan = scan
+        self._nodes: tuple[Ints, Floats] | None = None
+        self._elements: dict[int, array[int]] = {}
+        self._levels: list[Level] = []
+        self._is_mode: list[bool] = []
+        self._head = b""  # of the result that follows
+        self._is_open = False  # a head was read, its result was not
+        self._is_whole = False
+
+    def read(self) -> Record:
+        """Return what the file holds."""
+        scan = self._scan
+        line = scan.line()
+        if not line.startswith((b"    1C", b"    1U", b"    2C")):
+            scan.refuse(f"this is no .frd file of CalculiX: it begins with {scan.shown(line)}, not with '1C'")
+        while line and not self._is_whole:
+            self._take(line)
+            line = b"" if self._is_whole else scan.line()
+        if self._is_open:
+            scan.refuse("the file is cut off in the head of a result")
+        scan.done()
+        return self._gathered()
+
+    def _take(self, line: bytes) -> None:
+        """Take the record that begins with a line, with its block."""
+        scan = self._scan
+        self._is_open = line.startswith((b"    1P", b"  100C"))
+        match line[:6]:
+            case b"    2C":
+                self._read_nodes(line)
+            case b"    3C":
+                self._read_elements(line)
+            case b"  100C":
+                self._head = line
+            case key if key[:3] == b" -4":
+                self._read_result(line)
+            case key if key[:5] == b" 9999":
+                self._is_whole = True
+            case key if key[:5] != b"    1":
+                cut = "" if line.endswith(b"\n") else ": the file is cut off"
+                scan.refuse(f"{scan.shown(line)} is no record of a .frd file{cut}")
+
+    def _read_nodes(self, line: bytes) -> None:
+        scan = self._scan
+        if self._nodes is not None:
+            scan.refuse("a second block of nodes is not read: write one mesh only")
+        count, form = self._announced(line)
+        rows = list(self._rows(count, form, 3))
+        numbers, points = (np.concatenate(column) for column in zip(*rows, strict=True))
+        refuse_repeated(numbers, "2C", scan.file)
+        self._nodes = numbers, points
+
+    def _announced(self, line: bytes) -> tuple[int, int]:
+        """Return how many rows follow, and in which format."""
+        try:
+            count, form = [*map(int, line[6:].split()), _LONG][:2]
+        except ValueError:
+            self._scan.refuse(f"{self._scan.shown(line)} does not say how many rows follow")
+        self._refuse_form(form)
+        if count < 1:
+            self._scan.refuse(f"{self._scan.shown(line)} announces {count} rows")
+        return count, form
+
+    def _refuse_form(self, form: int) -> None:
+        if form not in (_SHORT, _LONG, _SINGLE, _DOUBLE):
+            self._scan.refuse(f"format {form} is not read; 0, 1 (text), 2 and 3 (binary) are")
+
+    def _rows(self, count: int, form: int, width: int) -> Iterator[tuple[Ints, Floats]]:
+        """Yield numbers of nodes and their values, shapes (n,) and (n, width), and pass the end of the block."""
+        scan = self._scan
+        for left in range(count, 0, -CHUNK):
+            n = min(left, CHUNK)
+            if form in _REAL:
+                found = scan.values(np.dtype([("node", _INT), ("values", _REAL[form], (width,))]), n)
+                yield found["node"].astype(np.int64), found["values"].astype(np.float64)
+                continue
+            lines = scan.lines(n)
+            self._refuse_others(lines, n, count - left, count)
+            nodes, values = scan.columns(lines, 3, (1, _ID_WIDTH[form], "int"), (width, _REAL_WIDTH, "float"))
+            yield nodes[:, 0], values
+        if form not in _REAL:
+            self._refuse_more(count)
+
+    def _refuse_others(self, lines: list[bytes], wanted: int, before: int, count: int) -> None:
+        """Refuse where a line begins otherwise than a row, or the file ends."""
+        scan = self._scan
+        for place, line in enumerate(lines):
+            if not line.startswith(b" -1"):
+                where = scan.line_number - len(lines) + 1 + place
+                scan.refuse(f"{count} rows are announced, behind {before + place} stands {scan.shown(line)}", where)
+        if len(lines) < wanted:
+            scan.refuse(f"the file is cut off: {count} rows are announced, {before + len(lines)} are there")
+
+    def _refuse_more(self, count: int) -> None:
+        line = self._scan.line()
+        if not line.startswith(b" -3"):
+            why = f"stands {self._scan.shown(line)}" if line else "the file is cut off"
+            self._scan.refuse(f"{count} rows are announced, behind them {why}: -3 is wanted")
+
+    def _read_elements(self, line: bytes) -> None:
+        count, form = self._announced(line)
+        for _ in range(count):
+            code, nodes = self._element(form) if form in _ID_WIDTH else self._binary_element()
+            self._elements.setdefault(code, array("q")).extend(nodes)
+        if form in _ID_WIDTH:
+            self._refuse_more(count)
+
+    def _element(self, form: int) -> tuple[int, list[int]]:
+        """Return the type of the next element and its nodes, which stand in one or two lines below."""
+        scan, width = self._scan, _ID_WIDTH[form]
+        head = scan.line()
+        try:
+            code = int(head[3 + width : 8 + width])
+        except ValueError:
+            code = -1
+        if not head.startswith(b" -1") or code < 0:
+            scan.refuse(f"{scan.shown(head)} is no element" if head else "the file is cut off within the elements")
+        wanted = width * self._n_nodes(code)
+        text = b""
+        while len(text) < wanted:
+            line = scan.line()
+            if not line.startswith(b" -2") or not line.endswith(b"\n") or not line[3:].strip():
+                scan.refuse(f"{scan.shown(line)} is no row of an element's nodes, or the file is cut off")
+            text += line[3:].rstrip()
+        try:
+            nodes = [int(text[place : place + width]) for place in range(0, len(text), width)]
+        except ValueError:
+            scan.refuse(f"{scan.shown(text)}: numbers of nodes in columns of {width} are wanted")
+        if len(text) != wanted:
+            scan.refuse(f"{len(nodes)} nodes, an element of type {code} has {wanted // width}")
+        return code, nodes
+
+    def _binary_element(self) -> tuple[int, list[int]]:
+        code = int(self._scan.values(_INT, 4)[1])  # its number, type, group and material
+        return code, self._scan.values(_INT, self._n_nodes(code)).tolist()
+
+    def _n_nodes(self, code: int) -> int:
+        if code not in _TYPES:
+            self._scan.refuse(f"element type {code} is not read; {', '.join(map(str, _TYPES))} are")
+        return len(_TYPES[code][1])
+
+    def _read_result(self, line: bytes) -> None:
+        """Take a block of displacements; pass over one of another quantity."""
+        scan, head = self._scan, self._head
+        name = line[5:13].strip()
+        try:
+            n_components = int(line[13:18])
+            count, time, form = int(head[24:36]), float(head[12:24]), int(head[73:75] or _LONG)
+        except ValueError:
+            scan.refuse(f"the head of {scan.shown(name)} cannot be read: {scan.shown(head)}, {scan.shown(line)}")
+        self._refuse_form(form)
+        components = scan.lines(n_components)
+        if len(components) < n_components or not all(one.startswith(b" -5") for one in components):
+            scan.refuse(f"{n_components} rows '-5' are wanted below {scan.shown(line)}, or the file is cut off")
+        width = sum(one[33:38].strip() in (b"", b"0") for one in components)  # others are not written
+        if name == b"DISP":
+            self._read_displacement(count, form, width, time, head)
+        elif form in _REAL:
+            for _ in self._rows(count, form, width):
+                pass
+        else:
+            scan.skip(b" -3")
+
+    def _read_displacement(self, count: int, form: int, width: int, time: float, head: bytes) -> None:
+        scan = self._scan
+        if width != 3:
+            scan.refuse(f"DISP has {width} components, three are wanted")
+        if self._nodes is None:
+            scan.refuse("DISP stands before the nodes")
+        numbers, points = self._nodes
+        displacement = np.full(points.shape, np.nan)
+        is_known = np.zeros(len(points), dtype=bool)
+        done = 0
+        for nodes, values in self._rows(count, form, 3):
+            expected = np.arange(done, done + len(nodes))
+            if not np.array_equal(nodes, numbers[done : done + len(nodes)]):
+                expected = rows_of(numbers, nodes, f"DISP at time {time:g}", scan.file)
+            if is_known[expected].any() or len(np.unique(expected)) < len(expected):
+                refuse_repeated(np.concatenate([nodes, numbers[is_known]]), f"DISP at time {time:g}", scan.file)
+            is_known[expected], displacement[expected] = True, values
+            done += len(nodes)
+        self._levels.append(Level(time, displacement))
+        self._is_mode.append(head[56:58].strip().decode("ascii", errors="replace") in _MODES)
+
+    def _gathered(self) -> Record:
+        file = self._scan.file
+        if self._nodes is None:
+            raise ReferenceFileError(f"{file} holds no nodes: is the file cut off?")
+        if not self._levels:
+            cut = "" if self._is_whole else ", and no end mark 9999: was the run stopped, or the file cut off"
+            raise ReferenceFileError(f"{file} holds no displacement{cut}: ask for it by *NODE FILE and a line U")
+        levels, notes = without_modes(self._levels, self._is_mode)
+        if not self._is_whole:
+            notes += (
+                "there is no end mark 9999: the run was stopped, and its last increment may be a best guess, no "
+                "equilibrium; or the file was cut off there",
+            )
+        numbers, points = self._nodes
+        cells = {}
+        for code in sorted(self._elements):
+            name, order = _TYPES[code]
+            nodes = np.frombuffer(self._elements[code], np.int64).reshape(-1, len(order))
+            cells[name] = rows_of(numbers, nodes[:, order], f"a {name}", file)
+        return Record(file, "frd", points, cells, levels, tuple(map(str, numbers.tolist())), notes)

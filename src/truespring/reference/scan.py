@@ -1,0 +1,158 @@
+"""Large result files, read once from top to bottom: their lines in columns of fixed width, and where one is wrong."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.errors import ReferenceFileError
+from truespring.reference.record import Reading
+
+# Lines that are held at a time: what bounds the memory that reading takes beside what is kept.
+CHUNK = 1 << 12
+
+# A line that is longer is none: it is cut there, and then refused.
+_LONGEST = 1000
+
+_BLANK = np.isin(np.arange(256), list(b" \r\n"))
+
+
+class Scan:
+    """A file that is being read; `line_number` is that of the line that was read last."""
+
+    def __init__(self, file: Path, stream: BinaryIO, reading: Reading | None) -> None:
+        self.file = file
+        self.line_number = 0
+        self._stream, self._reading = stream, reading
+        self._size = file.stat().st_size
+        self._is_binary = False
+
+    def refuse(self, why: str, line_number: int | None = None) -> NoReturn:
+        """Raise ReferenceFileError with the place, the line read last unless another is given."""
+        where = f"byte {self._stream.tell()}" if self._is_binary else f"line {line_number or self.line_number}"
+        raise ReferenceFileError(f"{self.file}: {where}: {why}")
+
+    def line(self) -> bytes:
+        """Return the next line with its end, empty at the end of the file."""
+        line = self._stream.readline(_LONGEST)
+        self.line_number += 1
+        if self.line_number % CHUNK == 0:
+            self._tell()
+        return line
+
+    def lines(self, count: int) -> list[bytes]:
+        """Return the next lines with their ends, fewer at the end of the file."""
+        lines = list(islice(iter(lambda: self._stream.readline(_LONGEST), b""), count))
+        self.line_number += len(lines)
+        self._tell()
+        return lines
+
+    def skip(self, mark: bytes) -> None:
+        """Pass over all lines up to and with the next one that begins with `mark`; refuse where there is none."""
+        while line := self.line():
+            if line.startswith(mark):
+                return
+        self.refuse(f"the file is cut off: '{mark.decode().strip()}' is wanted at the end of a block")
+
+    def values(self, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
+        """Return the next binary values, shape (count,)."""
+        self._is_binary = True
+        data = self._stream.read(dtype.itemsize * count)
+        self._tell()
+        if len(data) < dtype.itemsize * count:
+            self.refuse(f"the file is cut off: {dtype.itemsize * count} bytes are wanted, {len(data)} are there")
+        return np.frombuffer(data, dtype)
+
+    def done(self) -> None:
+        """Say that all is read that is wanted."""
+        if self._reading:
+            self._reading(1.0)
+
+    def _tell(self) -> None:
+        if self._reading:
+            self._reading(min(self._stream.tell() / max(self._size, 1), 1.0))
+
+    def columns(self, lines: list[bytes], begins: int, *blocks: tuple[int, int, str]) -> list[NDArray[Any]]:
+        """Return the numbers of lines that were read last.
+
+        Columns may be glued ("-1.00000E+00-2.00000E+00"): they are told apart by their width alone.
+
+        Args:
+            lines: of one length.
+            begins: where the first column begins.
+            blocks: number of columns, width of each, and "int" or "float".
+
+        Returns an array of shape (n_lines, columns) of each block; refuses where a line is wrong.
+        """
+        first = self.line_number - len(lines) + 1
+        self._refuse_ragged(lines, first)
+        table = np.frombuffer(b"".join(lines), np.uint8).reshape(len(lines), -1)
+        end = begins + sum(count * width for count, width, _ in blocks)
+        wrong = ~_BLANK[table[:, end:]].all(axis=1) | (table == 0).any(axis=1)
+        if table.shape[1] < end or wrong.any():
+            place = int(wrong.argmax())
+            self.refuse(f"{self.shown(lines[place])} is no row of this block", first + place)
+        found = []
+        for count, width, kind in blocks:
+            fields = np.ascontiguousarray(table[:, begins : begins + count * width]).view(f"S{width}")
+            begins += count * width
+            found.append(self._converted(fields, kind, first))
+        return found
+
+    def _refuse_ragged(self, lines: list[bytes], first: int) -> None:
+        for place, line in enumerate(lines):
+            if len(line) != len(lines[0]):
+                why = f"{self.shown(line)} is shorter or longer than the row before"
+                self.refuse(why + ("" if line.endswith(b"\n") else ": the file is cut off"), first + place)
+
+    def _converted(self, fields: NDArray[Any], kind: str, first: int) -> NDArray[Any]:
+        try:
+            return fields.astype(np.int64 if kind == "int" else np.float64)
+        except (ValueError, OverflowError):
+            pass
+        numbers = np.empty(fields.shape)  # slower, but it knows where; and Fortran drops the E of a long exponent
+        for (row, column), field in np.ndenumerate(fields):
+            number = _number(field, kind)
+            if number is None:
+                self.refuse(f"{self.shown(field)} is no number", first + row)
+            numbers[row, column] = number
+        return numbers
+
+    @staticmethod
+    def shown(text: bytes) -> str:
+        """Return a piece of the file as it fits into a message."""
+        read = text.decode("ascii", errors="replace").strip()
+        shown = "".join(letter if letter.isprintable() else "?" for letter in read)
+        return f"'{shown}'" if len(shown) <= 60 else f"'{shown[:60]}...'"
+
+
+def _number(field: bytes, kind: str) -> float | None:
+    text = field.decode("latin-1").strip()
+    try:
+        return int(text) if kind == "int" else float(text)
+    except ValueError:
+        head, sign, exponent = text[:1], *_exponent(text[1:])
+    try:
+        return None if kind == "int" else float(f"{head}{sign}E{exponent}")
+    except ValueError:
+        return None
+
+
+def _exponent(text: str) -> tuple[str, str]:
+    """Split "1.234567-100" into its mantissa and its exponent."""
+    place = max(text.rfind("-"), text.rfind("+"))
+    return (text[:place], text[place:]) if place > 0 else (text, "")
+
+
+@contextmanager
+def scanning(file: Path, reading: Reading | None) -> Iterator[Scan]:
+    """Open a file that `refuse_unreadable` has let pass."""
+    try:
+        with file.open("rb") as stream:
+            yield Scan(file, stream, reading)
+    except OSError as error:
+        raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
