@@ -17,6 +17,9 @@ _SAME_DEFORMED_BOX = 0.2
 # By the size of a unit over that which was taken.
 _FACTORS = (1e-3, 1e3, 1e-2, 1e2, 10.0, 0.1, 1e-6, 1e6, 0.0254, 1 / 0.0254, 0.3048, 1 / 0.3048)
 
+# So much of a cloud of points may lie beside the body, along each axis: some may be measured off it.
+_SHARED = 0.5
+
 #: Points at which displacements are compared to tell axes apart.
 _SAMPLE = 400
 
@@ -108,7 +111,7 @@ def _box(path: Path, level: float | None = None) -> _Box:
 
 
 def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
-    """Whether one box is the other; of points alone, whether they lie within the other and are not lost in it."""
+    """Whether one box is the other; of points alone, whether most lie within the other and are not lost in it."""
     room = tolerance * max(mine.diameter, theirs.diameter)
     low, high = mine.lower - theirs.lower, mine.upper - theirs.upper
     known = ~(np.isnan(low) | np.isnan(high))
@@ -117,9 +120,10 @@ def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
         return False
     if mine.filled and theirs.filled:
         return bool((np.abs(low[known]) <= room).all() and (np.abs(high[known]) <= room).all())
-    sign = 1 if not mine.filled else -1
-    lost = min(mine.diameter, theirs.diameter) < tolerance * max(mine.diameter, theirs.diameter)
-    return bool((sign * low[known] >= -room).all() and (sign * high[known] <= room).all()) and not lost
+    cloud, body = (theirs, mine) if mine.filled else (mine, theirs)
+    shared = np.minimum(cloud.upper, body.upper) - np.maximum(cloud.lower, body.lower) + 2 * room
+    lost = cloud.diameter < tolerance * body.diameter
+    return bool((shared[known] >= _SHARED * (cloud.upper - cloud.lower)[known]).all()) and not lost
 
 
 def _moved(box: _Box, misfit: Misfit) -> _Box:

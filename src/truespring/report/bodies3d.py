@@ -44,6 +44,8 @@ def undeformed_picture(result: Result) -> Picture:
         layers.append(_solid(points, facets, _tinted(result, facets, arrows), edges_of(facets), INK, 1.0))
     if springs is not None:
         layers.append(_wires(points, facets, springs, 0.6))
+    elif not len(facets):
+        layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
     title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
     title += f", {len(springs)} springs" if springs is not None else ""
     legend = [Entry("elements", INK)] if len(facets) else []

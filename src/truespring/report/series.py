@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State
-from truespring.mesh import Surface
+from truespring.mesh import Mesh, Surface
 from truespring.potential import Visible
 from truespring.report.surfaces import facets_of, triangles_of
 
@@ -43,6 +43,13 @@ def write_series(path: Path, folder: FilePath, name: str) -> None:
         )
     collection = "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries])
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
+
+
+def write_mesh(mesh: Mesh, file: FilePath) -> None:
+    """Write the body at rest by its elements as VTU [m]."""
+    import meshio
+
+    meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)]).write(file, file_format="vtu")
 
 
 def _state_mesh(path: Path, state: State) -> "meshio.Mesh":

@@ -63,9 +63,10 @@ def _opened(sources: Sequence[Source], progress: Progress | None) -> list[Path]:
 
 def _refuse_misfit(source: Source, model: Path, first: Source, reference: Path) -> None:
     """Raise ReferenceFileError where a body would lie where the reference lies if it were told otherwise."""
-    pairs = ((source, model, first, reference), (first, reference, source, model))
-    for mended, path, other, beside in pairs:  # a study or a folder of ours is in metres: the file is to be mended
-        found = find_misfit(path, beside) if mended.study is None and not mended.file.is_dir() else None
+    pairs = [(source, model, first, reference), (first, reference, source, model)]
+    told = [pair for pair in pairs if pair[0].told.placed]  # who tells of one does not need to hear of the other
+    for mended, path, other, beside in told or pairs:
+        found = find_misfit(path, beside) if mended.is_file else None  # what is ours is in metres
         if found is not None and not _meant(mended.told, found):
             file = mended.file.name
             raise ReferenceFileError(

@@ -13,8 +13,9 @@ import numpy as np
 
 from truespring.equilibrium import Path, Status, solve
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
+from truespring.mesh import read_mesh
 from truespring.problem import Problem
-from truespring.reference import CalculiX, Placing, placed, read_record, read_shell, read_stl
+from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
 from truespring.study.read import Study, read_study
 from truespring.units import to_si
 
@@ -52,6 +53,11 @@ class Told:
             load_factor=self.load_factor,
         )
 
+    @property
+    def placed(self) -> bool:
+        """Whether it is told where the body lies."""
+        return self.unit is not None or self.axes is not None or self.shift is not None
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -78,8 +84,13 @@ class Source:
             return tuple(self.study.problem.mesh.nodes[self.study.probe].tolist())
         if self.file.is_dir():
             with suppress(ReferenceFileError, KeyError, TypeError):
-                return tuple(float(part) for part in _json(_folder(self) / "summary.json")["probe"]["position"])
+                return tuple(float(part) for part in _json(self.file / "summary.json")["probe"]["position"])
         return None
+
+    @property
+    def is_file(self) -> bool:
+        """Whether another program may have written it: a study and a folder are in metres, along our axes."""
+        return self.study is None and not self.file.is_dir()
 
     @property
     def is_stl(self) -> bool:
@@ -115,10 +126,15 @@ def find_source(text: str, told: Told) -> Source:
     if not file.exists():
         raise StudyError(f"{text}: there is no such file or folder")
     study = read_study(file) if file.suffix.lower() == ".toml" else None
-    if study is None and not file.is_dir() and model is not None:
-        raise StudyError(f"{text}: a result file holds one model; leave out ':{model}'")
     if study is not None:
         model = _known(text, model or study.model, list(study.entries))
+    elif file.is_dir():
+        file = _folder(text, file)
+        summary = _json(file / "summary.json")
+        names = list(summary["models"])
+        model = _known(text, model or summary.get("model") or names[0], names)
+    elif model is not None:
+        raise StudyError(f"{text}: a result file holds one model; leave out ':{model}'")
     return Source(text, file, model, told, study)
 
 
@@ -160,34 +176,35 @@ def _solved(study: Study, name: str, report: Callable[[float], None]) -> Path:
     entry = study.entries[name]
     if isinstance(entry, Path):
         return entry
-    if isinstance(entry, CalculiX):
+    if isinstance(entry, Program):
         return entry.run(study.problem, study.solver, lambda factor, *_: report(factor))
     return solve(study.problem, entry, study.solver, lambda factor, *_: report(factor))
 
 
 def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
     """A path that truespring wrote: its VTU series with what summary and curves tell of it."""
-    folder = _folder(source)
-    summary = _json(folder / "summary.json")
-    models = summary["models"]
-    name = _known(source.text, source.model or str(summary.get("model") or next(iter(models))), list(models))
-    series = folder / f"{name}.pvd"
+    folder, name = source.file, str(source.model)
+    told = _json(folder / "summary.json")["models"][name]
+    series, elements = folder / f"{name}.pvd", folder / "mesh.vtu"
     if not series.is_file():
         raise ReferenceFileError(f"{series} does not exist: of '{name}' no level was written")
-    path = placed(_record(series, Told(), report), Placing(), f"{models[name]['label']} of {folder.name}")
-    status = Status(models[name]["status"])
+    record = _record(series, Told(), report)
+    if elements.is_file():  # a series of springs holds lines; the body has elements
+        mesh = read_mesh(elements)
+        record = replace(record, cells={mesh.kind.vtk: mesh.elements}) if mesh.n_nodes == len(record.points) else record
+    path = placed(record, Placing(), f"{told['label']} of {folder.name}")
     states = _with_forces(path, folder / "curves.csv", name)
-    return replace(path, kind=models[name]["kind"], status=status, states=states)
+    return replace(path, kind=told["kind"], status=Status(told["status"]), states=states)
 
 
-def _folder(source: Source) -> FilePath:
+def _folder(text: str, file: FilePath) -> FilePath:
     """The folder of a study, or the only one in a folder of several."""
-    if (source.file / "summary.json").is_file():
-        return source.file
-    inner = sorted(one.parent for one in source.file.glob("*/summary.json"))
+    if (file / "summary.json").is_file():
+        return file
+    inner = sorted(one.parent for one in file.glob("*/summary.json"))
     if len(inner) != 1:
         several = f"; it holds those of {', '.join(str(one) for one in inner)}" if inner else ""
-        raise StudyError(f"{source.text}: truespring wrote no study into this folder (no summary.json){several}")
+        raise StudyError(f"{text}: truespring wrote no study into this folder (no summary.json){several}")
     return inner[0]
 
 
