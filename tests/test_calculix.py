@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from tests.calculix import continuum_deck, displacement, needs_ccx, spring_deck
+from tests.calculix import displacement, needs_ccx
 from truespring.arrays import Floats
+from truespring.exports.calculix import LAWS, fem_deck, spring_deck
 from truespring.study import read_study
 
 pytestmark = needs_ccx
@@ -17,7 +18,7 @@ LENGTH, HEIGHT = 0.16, 0.04
 THIN, LONG = ts.PlaneStress(HEIGHT / 4), ts.PlaneStrain(HEIGHT / 4)
 # Load over thickness [N/m]: the nonlinear bodies move by about half their length, or a sixth of it.
 LOADS = {"bending": (0.0, -4.3), "stretching": (80.0, 0.0)}
-LAWS = {"linear": None, "saint-venant-kirchhoff": 5}  # with the load increments of CalculiX
+LEVELS, TEN_LEVELS = np.linspace(0.2, 1, 5).tolist(), np.linspace(0.1, 1, 10).tolist()
 
 # CalculiX prints seven digits: half a unit of the last one is at most 5e-7 of a component.
 PRINTED = 1e-6
@@ -80,13 +81,13 @@ def with_moved_nodes(problem: ts.Problem) -> ts.Problem:
 @pytest.mark.parametrize("elements, poisson", [((16, 4), 1 / 3), ((12, 5), 0.45), ((8, 2), 0.0)])
 def test_plane_strain(load: str, law: str, elements: tuple[int, int], poisson: float, tmp_path: Path) -> None:
     problem = cantilever(load, elements, LONG, poisson)
-    assert gap(displacement(continuum_deck(problem, LAWS[law]), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
+    assert gap(displacement(fem_deck(problem, LEVELS, law), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
 
 
 @laws
 def test_plane_strain_with_elements_that_are_no_rectangles(law: str, tmp_path: Path) -> None:
     problem = with_moved_nodes(cantilever("bending", section=LONG))
-    assert gap(displacement(continuum_deck(problem, LAWS[law]), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
+    assert gap(displacement(fem_deck(problem, LEVELS, law), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
 
 
 @loads
@@ -105,7 +106,7 @@ def test_plane_stress_as_plane_strain_of_another_material(
     exchanged = ts.Material(young * (1 + 2 * poisson) / (1 + poisson) ** 2, poisson / (1 + poisson))
     twin = replace(problem, material=exchanged, section=LONG)
     ours = solved(problem, ts.Fem(law))
-    assert gap(displacement(continuum_deck(twin, LAWS[law]), tmp_path), ours) < PRINTED
+    assert gap(displacement(fem_deck(twin, LEVELS, law), tmp_path), ours) < PRINTED
     if law != "linear":
         assert np.linalg.norm(ours, axis=1).max() > {"bending": 0.5, "stretching": 0.15}[load] * LENGTH
 
@@ -122,7 +123,7 @@ def test_plane_stress(
     load: str, slenderness: float, tolerance: float, law: str, elements: tuple[int, int], tmp_path: Path
 ) -> None:
     problem = cantilever(load, elements, ts.PlaneStress(HEIGHT / slenderness))
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert tip_gap(problem, theirs, solved(problem, ts.Fem(law))) < tolerance
 
 
@@ -131,7 +132,7 @@ def test_plane_stress_closes_with_thickness_and_element_size(law: str, tmp_path:
     gaps = []
     for rows in (2, 4, 8):
         problem = cantilever("bending", (4 * rows, rows), ts.PlaneStress(HEIGHT / (2 * rows)))
-        theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+        theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
         gaps.append(tip_gap(problem, theirs, solved(problem, ts.Fem(law))))
     orders = np.log2(np.divide(gaps[:-1], gaps[1:]))
     assert (orders > 1.6).all(), (gaps, orders)
@@ -142,7 +143,7 @@ def test_plane_stress_closes_with_thickness_and_element_size(law: str, tmp_path:
 def test_plane_stress_without_poisson_ratio(load: str, law: str, tmp_path: Path) -> None:
     """Thickness does not change: the layer of bricks is the plane element exactly."""
     problem = cantilever(load, poisson=0.0)
-    assert gap(displacement(continuum_deck(problem, LAWS[law]), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
+    assert gap(displacement(fem_deck(problem, LEVELS, law), tmp_path), solved(problem, ts.Fem(law))) < PRINTED
 
 
 # --- bodies in space ---------------------------------------------------------------------------
@@ -185,7 +186,7 @@ def test_bodies_in_space(element: str, load: str, law: str, tmp_path: Path) -> N
     problem = prism(load, element)
     ours = solved(problem, ts.Fem(law, "linear"))
     assert np.linalg.norm(ours, axis=1).max() > 0.09 * BOX[0]
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert rms_gap(theirs, ours) < PRINTED
     assert gap(theirs, ours) < 2 * PRINTED
 
@@ -194,7 +195,7 @@ def test_bodies_in_space(element: str, load: str, law: str, tmp_path: Path) -> N
 @pytest.mark.parametrize("poisson", [0.0, 0.49])
 def test_bodies_that_lock_do_so_alike(poisson: float, law: str, tmp_path: Path) -> None:
     problem = prism("bending", "hexahedron", poisson=poisson)
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < PRINTED
     if poisson > 0.4:
         assert rms_gap(theirs, solved(problem, ts.Fem(law, "mean-dilatation"))) > 0.1
@@ -209,7 +210,7 @@ def test_distorted_bodies_in_space(element: str, law: str, tmp_path: Path) -> No
     moved = mesh.nodes.copy()
     moved[inner] += np.random.default_rng(4).uniform(-0.25, 0.25, (inner.sum(), 3)) * 0.02 / 3
     problem = replace(plain, mesh=ts.Mesh(moved, mesh.elements, mesh.element))
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < PRINTED
 
 
@@ -221,7 +222,7 @@ def test_quadratic_tetrahedra(load: str, law: str, tmp_path: Path) -> None:
     path = ts.solve(problem, ts.Fem(law, "quadratic"), ts.Newton(load_steps=4))
     assert path.status is ts.Status.CONVERGED and path.potential is not None
     ours = path.states[-1].all_positions - path.potential.nodes
-    theirs = displacement(continuum_deck(problem, LAWS[law], "quadratic"), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law, "quadratic"), tmp_path)
     assert len(ours) > 3 * problem.mesh.n_nodes
     assert rms_gap(theirs, ours) < PRINTED
 
@@ -250,7 +251,7 @@ def test_springs(name: str, load: str, tmp_path: Path) -> None:
     problem = pulled(cantilever("bending", elements)) if load == "pulled" else cantilever(load, elements)
     ours = solved(problem, model)
     assert np.linalg.norm(ours, axis=1).max() > (0.15 if load == "stretching" else 0.45) * LENGTH
-    assert gap(displacement(spring_deck(problem, model.potential(problem), 10), tmp_path), ours) < PRINTED
+    assert gap(displacement(spring_deck(problem, model.potential(problem), TEN_LEVELS), tmp_path), ours) < PRINTED
 
 
 SPRINGS_IN_SPACE = {
@@ -270,7 +271,7 @@ def test_springs_in_space(name: str, load: str, tmp_path: Path) -> None:
     assert isinstance(network, ts.SpringNetwork)
     ours = solved(problem, model)
     assert np.linalg.norm(ours, axis=1).max() > 0.09 * BOX[0]
-    theirs = displacement(spring_deck(problem, network, 10), tmp_path)
+    theirs = displacement(spring_deck(problem, network, TEN_LEVELS), tmp_path)
     assert rms_gap(theirs, ours) < PRINTED
 
 
@@ -283,12 +284,12 @@ def test_one_spring_a_thousandth_stiffer_is_noticed(tmp_path: Path) -> None:
     stiffness = network.stiffness.copy()
     stiffness[0] *= 1.001
     stiffer = ts.SpringNetwork(network.nodes, network.springs, stiffness)
-    assert gap(displacement(spring_deck(problem, stiffer, 5), tmp_path), solved(problem, model)) > 10 * PRINTED
+    assert gap(displacement(spring_deck(problem, stiffer, LEVELS), tmp_path), solved(problem, model)) > 10 * PRINTED
 
 
 def test_a_wrong_deck_is_noticed(tmp_path: Path) -> None:
     problem = cantilever("bending")
-    deck = continuum_deck(problem, None).replace("MATERIAL=M", "MATERIAL=OTHER")
+    deck = fem_deck(problem, [1.0], "linear").replace("MATERIAL=M1", "MATERIAL=OTHER")
     with pytest.raises(AssertionError, match="ERROR"):
         displacement(deck, tmp_path)
 
@@ -327,7 +328,7 @@ def test_loads_have_their_twins(name: str, law: str, tmp_path: Path) -> None:
     """The body moves by a share of its size that rotations of the surface matter for."""
     problem = LOADED[name]()
     ours = solved(problem, ts.Fem(law))
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert np.linalg.norm(ours, axis=1).max() > 0.05 * problem.mesh.diameter
     assert gap(theirs, ours) < 1e-3
 
@@ -346,5 +347,5 @@ def test_the_organ_has_its_twin(law: str, share: float, tmp_path: Path) -> None:
         loads=(ts.Gravity((0.0, -9.81 * share, 0.0)),),
     )
     ours = solved(problem, ts.Fem(law, "linear"))
-    theirs = displacement(continuum_deck(problem, LAWS[law]), tmp_path)
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert gap(theirs, ours) < 1e-3

@@ -81,7 +81,7 @@ class Comparison:
             not self.model.problem.loading.driven_by_motion
             or mine is None
             or theirs is None
-            or self.reference.potential is None
+            or not self.reference.has_reactions
         ):
             return None
         wanted = self.reference.applied_force(theirs)

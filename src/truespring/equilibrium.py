@@ -166,6 +166,16 @@ class Path:
         return bool(self.states and self.states[-1].level == 1.0) or (not self.states and self.load_factor == 1.0)
 
     @property
+    def solved(self) -> bool:
+        """Whether it was solved, here or by another program: not where it was read from a file."""
+        return self.potential is not None or self.n_unknowns > 0
+
+    @property
+    def has_reactions(self) -> bool:
+        """Whether the forces of the supports are known at every state."""
+        return bool(self.states) and all(bool(np.isfinite(state.reaction).all()) for state in self.states)
+
+    @property
     def newton_iterations(self) -> int:
         """All Newton iterations spent."""
         return sum(state.iterations for state in self.states) + (self.best.iterations if self.best else 0)

@@ -74,7 +74,7 @@ def write_reactions(result: Result, file: FilePath) -> None:
         ]
         table.writerow(["model", "load_factor", "support", *columns])
         for name, path in result.paths.items():
-            for state in path.states if path.potential is not None else ():
+            for state in path.states if path.has_reactions else ():
                 for support in moved_supports(path.problem):
                     moved = state.displacement[path.problem.held[support].nodes].mean(axis=0)
                     values = (*moved, *np.concatenate(reaction_of(path, state, support)))

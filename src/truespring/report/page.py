@@ -274,7 +274,7 @@ def _share(error: float | None) -> str:
 
 def _model_row(name: str, path: Path) -> dict[str, Any]:
     """What a path cost and how sound it is; a dash where it was read, not solved."""
-    solved = path.potential is not None
+    solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
     areas = [state.area_ratio for state in path.states]
     stretch = "–"
@@ -285,7 +285,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "label": path.label,
         "status": str(path.status),
         "sound": path.status is Status.CONVERGED,
-        "advice": path.status.advice if solved else "read from a file, not solved here",
+        "advice": _advice(path),
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "effort": _effort(path),
@@ -295,6 +295,14 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "stretch": stretch,
         "stability": _stability(path) if solved else "–",
     }
+
+
+def _advice(path: Path) -> str:
+    if not path.solved:
+        return "read from a file, not solved here"
+    if path.potential is None and path.status is Status.CONVERGED:
+        return "another program found balance at every load level; it does not tell whether that is stable"
+    return path.status.advice
 
 
 def _effort(path: Path) -> str | None:

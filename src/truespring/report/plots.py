@@ -90,7 +90,7 @@ def reactions_figure(result: Result) -> Sheet:
     styles = path_styles(result)
     forces, moves = {}, {}
     for name, path in result.paths.items():
-        if path.states and path.potential is not None:
+        if path.has_reactions:
             both = [reaction_of(path, state, number) for state in path.states]
             if turned:  # about its own middle: its moment against the angle
                 axis = held[number].turn.axis if len(both[0][1]) == 3 else np.ones(1)  # type: ignore[union-attr]

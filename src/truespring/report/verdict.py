@@ -99,14 +99,14 @@ def force_sentence(result: Result) -> str | None:
         return None
     model = result.paths[result.model]
     level = model.load_factor
-    if model.potential is None or not level:
+    if not model.has_reactions or not level:
         return None
     to = drive(result)
     own = quantity(to.along(model.applied_force(model.states[-1])), "N")
     parts = [f"The force it takes at {level_name(result, level)}, along {to.name}: {_subject(result)[0]} {own}"]
     for name, one in result.comparisons.items():
         state = one.reference.at(level)
-        if state is None or one.reference.potential is None:
+        if state is None or not one.reference.has_reactions:
             continue
         force = quantity(to.along(one.reference.applied_force(state)), "N")
         apart = "" if one.force_error is None else f" ({percent(one.force_error)} off)"

@@ -10,13 +10,12 @@ import numpy as np
 
 from truespring.comparison import most_moved
 from truespring.equilibrium import Path as Equilibria
-from truespring.equilibrium import solve
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
-from truespring.models import Model, SpringNetwork
 from truespring.settling import Settling, beside, settle
-from truespring.study.read import Study, read_study
+from truespring.study.read import Entry, Study, read_study
+from truespring.study.run import follow
 
 
 def converge(
@@ -53,12 +52,12 @@ def converge(
 
 
 def _solved(
-    study: Study, models: Mapping[str, Model | SpringNetwork], report: Callable[[Study, str], None] | None
+    study: Study, models: Mapping[str, Entry], report: Callable[[Study, str], None] | None
 ) -> Iterator[tuple[str, Equilibria]]:
     for name, model in models.items():
         if report:
             report(study, name)
-        path = solve(study.problem, model, study.solver)
+        path = follow(study, model)
         if not path.complete:
             at = f"stopped at load factor {path.load_factor:.4g} on {study.problem.mesh.n_nodes:,} nodes"
             raise StudyError(f"{study.file}: models.{name}: {at}: {path.status.advice}")

@@ -29,11 +29,14 @@ from truespring.mesh import (
 )
 from truespring.models import Fem, Model, SpringNetwork, Springs, UserStiffness, moduli, refuse_mechanism
 from truespring.problem import Load, Problem, Region
-from truespring.reference import read_stl
+from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
 from truespring.study import schema
 from truespring.study.network import read_network
 from truespring.units import to_si
+
+#: What an entry of [models] is: a model that is solved, a program that solves it, or a path that was read.
+Entry = Model | SpringNetwork | Program | Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,7 @@ class Study:
     Attributes:
         title, file, source: the study's own title, its file as it was named, its text.
         problem, solver: what is asked and how it is solved.
-        entries: by name, a model to be solved, or a path that was read from another program's file.
+        entries: by name, a model to be solved here or by another program, or a path that was read from a file.
         model: the name of the entry that is compared with the others, None where there is nothing to compare.
         references: the names that it is compared with.
         probe: number of the node that is watched; None takes the one that moves most.
@@ -55,7 +58,7 @@ class Study:
     source: str
     problem: Problem
     solver: Solver
-    entries: Mapping[str, Model | SpringNetwork | Path]
+    entries: Mapping[str, Entry]
     model: str
     references: tuple[str, ...]
     probe: int | None
@@ -113,7 +116,8 @@ class _Builder:
     def study(self) -> Study:
         table = self.table
         problem = self.problem()
-        entries = {name: self.entry(problem, name, entry) for name, entry in table.models.items()}
+        solver = self.solver(problem)
+        entries = {name: self.entry(problem, solver, name, entry) for name, entry in table.models.items()}
         model, references = self.compared(entries)
         with self.at("compare", "probe"):
             probe = _probe_node(problem.mesh, table.compare.probe)
@@ -122,7 +126,7 @@ class _Builder:
             file=self.file,
             source=self.source,
             problem=problem,
-            solver=self.solver(problem),
+            solver=solver,
             entries=entries,
             model=model,
             references=references,
@@ -247,7 +251,7 @@ class _Builder:
                 raise StudyError(f"is required and missing; kind: {', '.join(_SECTIONS)}, and a thickness")
             return _SECTIONS[table.kind](table.thickness)
 
-    def entry(self, problem: Problem, name: str, table: Any) -> Model | SpringNetwork | Path:
+    def entry(self, problem: Problem, solver: Solver, name: str, table: Any) -> Entry:
         with self.at("models", name):
             match table:
                 case schema.StlTable():
@@ -260,17 +264,35 @@ class _Builder:
                         raise StudyError('kind = "network" is for a mesh of nodes and springs')
                     refuse_mechanism(self.network, problem.loading.held)
                     return self.network
+                case schema.CalculixTable():
+                    springs = None if table.springs is None else self.springs_of(name, table.springs)
+                    program = CalculiX(springs=springs) if table.law is None else CalculiX(table.law, springs)
+                    program.check(problem, solver)
+                    return program
                 case schema.FemTable():
                     model: Model = Fem(table.law, table.element)
                 case _:
-                    own = table.stiffness and UserStiffness(**table.stiffness.model_dump())
-                    model = Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
+                    model = _springs(table)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
                 moduli(problem.homogeneous[0], model)
             return model
 
-    def compared(self, entries: Mapping[str, Model | SpringNetwork | Path]) -> tuple[str, tuple[str, ...]]:
+    def springs_of(self, name: str, other: str) -> Springs | SpringNetwork:
+        """Return the springs of another model of the study, which `name` is to be a twin of."""
+        tables = self.table.models
+        kinds = (schema.SpringsTable, schema.NetworkTable)
+        known = [one for one, table in tables.items() if isinstance(table, kinds)]
+        with self.at("models", name, "springs"):
+            match tables.get(other):
+                case schema.SpringsTable() as table:
+                    return _springs(table)
+                case schema.NetworkTable() if self.network is not None:
+                    return self.network
+            told = f"there are {', '.join(known)}" if known else "there are none"
+            raise StudyError(f"'{other}' is no model of springs of this study{nearest(other, known)}: {told}")
+
+    def compared(self, entries: Mapping[str, Entry]) -> tuple[str, tuple[str, ...]]:
         """Return the model that is compared, by default the first springs, and its references, by default the rest."""
         compare = self.table.compare
         springs = [name for name, entry in entries.items() if isinstance(entry, Springs)]
@@ -299,6 +321,11 @@ def _unit(text: str) -> float:
 def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
     if values is not None and len(values) != mesh.dim:
         raise StudyError(f"{values} has {len(values)} values, the body has {mesh.dim} directions")
+
+
+def _springs(table: schema.SpringsTable) -> Springs:
+    own = UserStiffness(**table.stiffness.model_dump()) if table.stiffness else None
+    return Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
 
 
 def _material(table: schema.MaterialTable) -> Material:
@@ -360,7 +387,7 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or {_OTHER_MESHES}"
         case "union_tag_invalid" | "union_tag_not_found":
             given = value.get("kind") if isinstance(value, dict) else value
-            kinds = ("springs", "fem", "network", "stl")
+            kinds = ("springs", "fem", "network", "calculix", "stl")
             return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
         case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
             return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
@@ -391,6 +418,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
         "springs": schema.SpringsTable,
         "fem": schema.FemTable,
         "network": schema.NetworkTable,
+        "calculix": schema.CalculixTable,
         "stl": schema.StlTable,
     }
     if not loc:

@@ -30,11 +30,13 @@ from truespring.models import (
     moduli,
 )
 from truespring.problem import Problem
+from truespring.reference import Program
 from truespring.report.curves import moved_supports, write_curves, write_reactions
 from truespring.report.result import Result
-from truespring.report.series import write_series, write_stl
+from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
-from truespring.study.read import Study, read_study
+from truespring.solvers import Reporter
+from truespring.study.read import Entry, Study, read_study
 
 #: Called with study, model and the load factor reached, for a progress bar.
 Progress = Callable[[str, str, float], None]
@@ -63,16 +65,13 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
     """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached."""
     paths: dict[str, Path] = {}
     for name, entry in study.entries.items():
-        if isinstance(entry, Path):
-            paths[name] = entry
-            continue
 
         def report(load_factor: float, iteration: int, residual: float, name: str = name) -> None:
             if progress:
                 progress(study.stem, name, load_factor)
 
-        paths[name] = solve(study.problem, entry, study.solver, report)
-        if progress:
+        paths[name] = follow(study, entry, report)
+        if progress and not isinstance(entry, Path):
             progress(study.stem, name, 1.0)
     model = paths[study.model]
     probe = most_moved(model) if study.probe is None else study.probe
@@ -95,6 +94,15 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
         if comparing
         else {},
     )
+
+
+def follow(study: Study, entry: Entry, report: Reporter | None = None) -> Path:
+    """Return the path of an entry of a study: solved here, solved by another program, or as it was read."""
+    if isinstance(entry, Path):
+        return entry
+    if isinstance(entry, Program):
+        return entry.run(study.problem, study.solver, report)
+    return solve(study.problem, entry, study.solver, report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +214,8 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
         write_reactions(result, folder / "reactions.csv")
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    if result.problem.mesh.element != "line":
+        write_mesh(result.problem.mesh, folder / "mesh.vtu")
     for name, path in result.paths.items():
         write_series(path, folder, name)
         write_stl(path, folder / f"deformed_{name}.stl")
@@ -290,6 +300,8 @@ def _section(problem: Problem) -> dict[str, Any] | None:
 def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
     if isinstance(entry, SpringNetwork):
         return {"kind": "network", "label": "springs", "n_springs": len(entry.springs), "warnings": []}
+    if isinstance(entry, Program):
+        return {"kind": entry.kind, "label": entry.label_on(study.problem), "warnings": []}
     if not isinstance(entry, Springs):
         known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
         law = {"law": entry.law, "element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}

@@ -313,6 +313,20 @@ class NetworkTable(Table):
     kind: Literal["network"]
 
 
+class CalculixTable(Table):
+    """The problem in CalculiX, as finite elements of a law, or as the springs of another model of the study."""
+
+    kind: Literal["calculix"]
+    law: Literal["linear", "saint-venant-kirchhoff"] | None = None
+    springs: str | None = None
+
+    @model_validator(mode="after")
+    def _one_body(self) -> "CalculixTable":
+        if self.law is not None and self.springs is not None:
+            raise ValueError("law and springs are given: a law is for a continuum, springs name a model; give one")
+        return self
+
+
 class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
@@ -332,7 +346,7 @@ class CompareTable(Table):
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
 
 
-ModelTable = Annotated[SpringsTable | FemTable | NetworkTable | StlTable, Discriminator("kind")]
+ModelTable = Annotated[SpringsTable | FemTable | NetworkTable | CalculixTable | StlTable, Discriminator("kind")]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 

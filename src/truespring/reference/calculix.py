@@ -1,0 +1,231 @@
+"""CalculiX as a model: the problem's deck is written, solved by ccx, and its results are read as a path."""
+
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.equilibrium import Path, Solver, State, Status
+from truespring.errors import ModelError, ReferenceFileError
+from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
+from truespring.exports.decks import check_fem, check_springs, fem_element
+from truespring.models import SpringNetwork, Springs
+from truespring.potential import Potential, Stretched
+from truespring.problem import Problem
+from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
+from truespring.reference.dat import read_dat
+from truespring.reference.record import Level
+from truespring.reference.scan import scanning
+from truespring.solvers import Newton, Reporter
+
+
+@runtime_checkable
+class Program(Protocol):
+    """A model that another program solves: what yields a path though it has no potential here."""
+
+    @property
+    def kind(self) -> str:
+        """The word of the study file."""
+        ...
+
+    def label_on(self, problem: Problem) -> str:
+        """Return how curves and tables call the model of this problem."""
+        ...
+
+    def check(self, problem: Problem, solver: Solver) -> None:
+        """Raise TruespringError, before anything is solved, where it cannot be run."""
+        ...
+
+    def run(self, problem: Problem, solver: Solver, report: Reporter | None = None) -> Path:
+        """Follow the equilibria at the load levels that the solver asks for."""
+        ...
+
+
+@dataclass(frozen=True)
+class CalculiX:
+    """The problem in CalculiX: finite elements of first order, or the SPRINGA twin of a spring model.
+
+    Attributes:
+        law: "linear", or "saint-venant-kirchhoff", which is NLGEOM; not asked for where there are springs.
+        springs: a model or network of springs instead of a continuum.
+    """
+
+    law: str = "saint-venant-kirchhoff"
+    springs: Springs | SpringNetwork | None = None
+
+    kind = "calculix"
+
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise ModelError(f"law = '{self.law}': CalculiX has {' and '.join(LAWS)} in common with truespring")
+
+    def label_on(self, problem: Problem) -> str:
+        """Return the label, with the type of the elements."""
+        if self.springs is not None:
+            return "CalculiX SPRINGA NLGEOM"
+        return f"CalculiX {fem_element(problem)} {'linear' if self._linear else 'NLGEOM'}"
+
+    @property
+    def _linear(self) -> bool:
+        return self.springs is None and self.law == "linear"
+
+    def check(self, problem: Problem, solver: Solver) -> None:
+        """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""
+        if not isinstance(solver, Newton):
+            raise ModelError('CalculiX follows the load only: take control = "load", or leave this model out')
+        find_ccx()
+        if self.springs is None:
+            check_fem(problem, self.law)
+        else:
+            check_springs(problem, _potential(self.springs, problem))
+
+    def deck(self, problem: Problem, levels: Sequence[float]) -> str:
+        """Return the deck of a step for each load factor; see exports.calculix."""
+        if self.springs is None:
+            return fem_deck(problem, levels, self.law)
+        network = _potential(self.springs, problem)
+        check_springs(problem, network)
+        assert isinstance(network, SpringNetwork)  # else refused
+        return spring_deck(problem, network, levels)
+
+    def run(self, problem: Problem, solver: Solver, report: Reporter | None = None) -> Path:
+        """Run ccx in a folder of its own and return the states that it reached, those at rest first.
+
+        A run that does not converge is not an exception: the path ends at the last level reached. Raises ModelError
+        and ExportError as `check` does, ReferenceFileError where ccx refuses the deck or its result is damaged.
+        """
+        self.check(problem, solver)
+        assert isinstance(solver, Newton)
+        levels = [(number + 1) / solver.load_steps for number in range(solver.load_steps)]
+
+        def reached(step: int, share: float) -> None:
+            if report:
+                before = levels[step - 2] if step > 1 else 0.0
+                report(before + share * (levels[step - 1] - before), 0, math.nan)
+
+        with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
+            file = FilePath(folder) / "model.inp"
+            file.write_text(self.deck(problem, levels), encoding="utf-8")
+            finished = run_ccx(file, reached=reached)
+            found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
+        if not found and not finished.efforts:
+            raise ReferenceFileError(f"CalculiX took no step: {_said(finished)}")
+        states = [self._state(problem, 0.0, Level(0.0, np.zeros((problem.mesh.n_nodes, 3)), 0.0), None, finished)]
+        for load_factor, (level, force) in zip(levels, found, strict=False):
+            states.append(self._state(problem, load_factor, level, force, finished))
+        return self._path(problem, states, levels, finished)
+
+    def _path(self, problem: Problem, states: list[State], levels: list[float], finished: Finished) -> Path:
+        status, warnings = Status.CONVERGED, []
+        if any(state.area_ratio <= 0 for state in states) and not self._linear:
+            status = Status.INVERTED
+            first = next(state for state in states if state.area_ratio <= 0)
+            warnings.append(
+                f"inverted from load factor {first.load_factor:.6g} on (smallest ratio "
+                f"{min(state.area_ratio for state in states):.3g}): {status.advice}"
+            )
+        if len(states) <= len(levels) or finished.code:
+            status = Status.NOT_CONVERGED
+            missed = levels[min(len(states), len(levels)) - 1]
+            warnings.insert(
+                0,
+                f"load factor {missed:.6g} was not reached; last good load factor: {states[-1].load_factor:.6g}; "
+                f"CalculiX says: {_said(finished)}; {status.advice}. `truespring export` writes the deck to look into",
+            )
+        unknown = [state.load_factor for state in states if math.isnan(state.energy)]
+        if unknown:
+            warnings.append(
+                f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints that of the last "
+                "increment only, and took several to a level"
+            )
+        warnings.append("stability not proven: CalculiX does not tell it")
+        return Path(
+            problem=problem,
+            label=self.label_on(problem),
+            kind=self.kind,
+            states=tuple(states),
+            status=status,
+            warnings=tuple(warnings),
+            seconds=finished.seconds,
+            n_unknowns=int((~problem.loading.held).sum()),
+        )
+
+    def _state(
+        self, problem: Problem, load_factor: float, level: Level, internal: Floats | None, finished: Finished
+    ) -> State:
+        """A state of what was read: displacement, energy, and the force in each node [N]."""
+        mesh, loading = problem.mesh, problem.loading
+        displacement = level.displacement[:, : mesh.dim]
+        positions = mesh.nodes + displacement
+        external = loading.force(mesh.nodes if self._linear else positions, load_factor)
+        effort = finished.efforts.get(round(level.time))
+        reaction = np.zeros(positions.shape)
+        if internal is not None:
+            reaction = np.where(loading.held, internal[:, : mesh.dim] - external, 0.0)
+        return State(
+            load_factor=load_factor,
+            positions=positions,
+            all_positions=positions,
+            displacement=displacement,
+            reaction=reaction,
+            applied_force=external.sum(axis=0),
+            energy=self._energy(problem, positions, level, effort),
+            iterations=0 if effort is None else effort.iterations,
+            residual=math.nan,
+            negative_eigenvalues=None,
+            branched=False,
+            area_ratio=mesh.smallest_area_ratio(positions),
+            stretch=None if self.springs is None else _stretch(_potential(self.springs, problem), positions),
+            level=load_factor,
+        )
+
+    def _energy(self, problem: Problem, positions: Floats, level: Level, effort: Effort | None) -> float:
+        """Stored energy [J]: of springs it is known from their lengths; ccx prints that of the last increment."""
+        if self.springs is not None:
+            return _potential(self.springs, problem).energy(positions)
+        whole = effort is None or effort.increments == 1
+        return level.energy if whole and level.energy is not None else math.nan
+
+
+def _potential(springs: Springs | SpringNetwork, problem: Problem) -> Potential:
+    return springs if isinstance(springs, SpringNetwork) else springs.potential(problem)
+
+
+def _stretch(potential: Potential, positions: Floats) -> tuple[float, float] | None:
+    if not isinstance(potential, Stretched):
+        return None
+    stretch = potential.stretch(positions)
+    return float(stretch.min()), float(stretch.max())
+
+
+def _said(finished: Finished) -> str:
+    return f"'{finished.errors[-1]}'" if finished.errors else f"nothing (exit code {finished.code})"
+
+
+def _results(file: FilePath, n_nodes: int) -> list[tuple[Level, Floats]]:
+    """The levels of a .dat file and the forces in all nodes at each [N], zero where they are not printed."""
+    if not file.is_file() or not file.stat().st_size:  # no step was done
+        return []
+    levels = [
+        replace(one, energy=None if one.energy is None else FORCE_UNIT * one.energy) for one in read_dat(file).levels
+    ]
+    return list(zip(levels, _forces(file, n_nodes), strict=True))
+
+
+def _forces(file: FilePath, n_nodes: int) -> Iterator[Floats]:
+    """The tables of forces, which include loads; see *NODE PRINT, RF in CalculiX's manual [N], shape (n_nodes, 3)."""
+    with scanning(file, None) as scan:
+        while line := scan.line():
+            if line.startswith(b" forces (fx,fy,fz) for set HELD"):
+                scan.line()
+                lines = list(iter(lambda: scan.line().rstrip(b"\n"), b""))
+                nodes, values = scan.columns(lines, 0, (1, 10, "int"), (3, 14, "float"))
+                force = np.zeros((n_nodes, 3))
+                force[nodes[:, 0] - 1] = FORCE_UNIT * values
+                yield force
+        scan.done()
