@@ -16,8 +16,9 @@ from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import ROUNDING, Scale, natural_scale, percent, quantity, round_factor, times
 from truespring.report.result import Result
+from truespring.report.shades import draw_shaded, draw_shaded_dots
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
+from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
 from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_outside, draw_pin, find_arrows
 from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
@@ -192,39 +193,17 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     legend += [Entry("outside", LOAD, "x", "")] if comparison.n_outside else []
     title = f"{level_name(result, level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
     area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks), bar)
-    _colored(area, comparison.model.problem.mesh, positions / scale.size, apart / farthest)
+    mesh = comparison.model.problem.mesh
+    if mesh.element == "line":
+        draw_shaded_dots(area, positions / scale.size, apart / farthest)
+    else:
+        draw_shaded(area, positions[mesh.elements] / scale.size, apart[mesh.elements].mean(axis=1) / farthest)
     outline = reference.problem.mesh.boundary if reference.problem.mesh.element != "line" else path_lines(reference)
     _lines(area, others / scale.size, outline, INK, 1.0, 4, "reference")
     if comparison.n_outside:
         draw_outside(area, positions[comparison.outside] / scale.size)
     draw_dot(area, positions[comparison.probe] / scale.size)
     return area.sheet
-
-
-# Colours that a distance is told in: as many as a bar of them lets an eye tell apart, and more.
-_SHADES = 48
-
-
-def _colored(area: Area, mesh: Mesh, places: Floats, shares: Floats) -> None:
-    """Elements, or the nodes of lines as dots, in the colours of distances, in units of the area."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
-    if mesh.element == "line":
-        around = np.linspace(0, 2 * np.pi, 13)[:-1]
-        dot = 0.035 * area.inch * np.stack([np.cos(around), np.sin(around)], axis=1)
-        shapes, values = places[:, None] + dot, shares
-    else:
-        shapes, values = places[mesh.elements], shares[mesh.elements].mean(axis=1)
-    closed = np.concatenate([shapes, shapes[:, :1]], axis=1)
-    codes = np.full(closed.shape[1], Outline.LINETO, dtype=np.uint8)
-    codes[0], codes[-1] = Outline.MOVETO, Outline.CLOSEPOLY
-    shade = np.rint((_SHADES - 1) * values).astype(np.int64)
-    for one in np.unique(shade):
-        (color,) = error_colors(np.array([one / (_SHADES - 1)]))
-        alike = closed[shade == one]
-        outline = Outline(alike.reshape(-1, 2), np.tile(codes, len(alike)))
-        area.add(PathPatch(outline, fc=color, ec=color, lw=0.3, zorder=3, gid="distance"))
 
 
 def over_title(result: Result, level: float, comparison: Comparison) -> str:
@@ -235,6 +214,11 @@ def over_title(result: Result, level: float, comparison: Comparison) -> str:
     if comparison.surface is not None:
         return f"{at}: outlines {quantity(comparison.surface.outline_rms, 'm', 2)} apart (root mean square)"
     return at
+
+
+def as_asked(result: Result) -> str:
+    """Return how the picture of a body before it moves is called."""
+    return "As asked" if result.problem.stated else "At rest"
 
 
 def undeformed_figure(result: Result) -> Sheet:
@@ -249,7 +233,7 @@ def undeformed_figure(result: Result) -> Sheet:
     legend = [Entry("elements", INK)] if mesh.element != "line" else []
     legend += [Entry("springs", BLUE)] if springs else []
     legend += [Entry("probe", RED, "o", "")]
-    title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
+    title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
     title += f", {len(path_lines(model))} springs" if springs else ""
     area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":

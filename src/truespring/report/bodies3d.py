@@ -4,20 +4,21 @@ What hides what is an image (render.py); words, marks, arrows and scales are dra
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.report.bar import Bar, bar_of
-from truespring.report.bodies import magnification, over_title, path_lines, picture_box, spring_lines
+from truespring.report.bodies import as_asked, magnification, over_title, path_lines, picture_box, spring_lines
 from truespring.report.frame3d import Picture
 from truespring.report.legend import Entry
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import ROUNDING, Scale, times
 from truespring.report.render import Layer, rgb
 from truespring.report.result import Result
+from truespring.report.shades import draw_shaded_dots
 from truespring.report.sheet import Area
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
 from truespring.report.supports3d import clamped_nodes, draw_supports
@@ -46,7 +47,7 @@ def undeformed_picture(result: Result) -> Picture:
         layers.append(_wires(points, facets, springs, 0.6))
     elif not len(facets):
         layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
-    title = f"As asked: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
+    title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
     title += f", {len(springs)} springs" if springs is not None else ""
     legend = [Entry("elements", INK)] if len(facets) else []
     legend += [Entry("springs", BLUE)] if springs is not None else []
@@ -124,16 +125,19 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
 def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
     """The model's surface coloured by the distance of its nodes from the reference, whose outline is black.
 
-    None where the two are the same but for rounding.
+    Nodes without a surface, as markers are, become dots before the body that they were compared with. None where the
+    two are the same but for rounding.
     """
     pair = _pair(result, comparison)
     mesh = comparison.model.problem.mesh
     facets = facets_of(mesh)
-    if pair is None or not len(facets) or not np.isfinite(pair.distance).all():
+    if pair is None or not np.isfinite(pair.distance).all():
         return None
     farthest = float(pair.distance.max())
     if farthest <= ROUNDING * pair.largest:
         return None
+    if not len(facets):
+        return _dots_picture(result, name, comparison, pair) if result.in_detail else None
     colors = error_colors(pair.distance / (farthest or 1.0))[facets]
     surface = _solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
     black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
@@ -146,6 +150,34 @@ def distance_picture(result: Result, name: str, comparison: Comparison) -> Pictu
         Entry("probe", RED, "o", ""),
     )
     return _pair_picture(result, name, comparison, pair, title, legend, (surface, black), bar)
+
+
+def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair) -> Picture:
+    """Nodes as dots in the colours of their distance, before the bodies that have a surface."""
+    farthest = float(pair.distance.max())
+    bar = bar_of(farthest, pair.largest)
+    title = f"{level_name(result, pair.level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
+    layers, corners = [], [pair.rest, pair.mine]
+    for path in comparison.known_on:
+        facets, state = facets_of(path.problem.mesh), path.at(pair.level)
+        if len(facets) and state is not None:
+            points = seen(path.problem.mesh.nodes + pair.factor * state.displacement)
+            corners.append(points)
+            layers.append(_solid(points, facets, _one_color(facets, _BODY), edges_of(facets), INK, 0.35))
+    if not layers:
+        layers.append(_wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
+    legend = (Entry("at rest", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
+    picture = _pair_picture(result, name, comparison, pair, title, legend, tuple(layers), bar)
+    ends = np.concatenate(corners)[:, :2]
+    margin = 0.03 * float(np.ptp(ends, axis=0).max())
+    lower, upper = ends.min(axis=0) - margin, ends.max(axis=0) + margin
+
+    def marks(area: Area, scale: Scale) -> None:
+        picture.marks(area, scale)
+        inside = ~comparison.outside
+        draw_shaded_dots(area, pair.mine[inside, :2] / scale.size, pair.distance[inside] / farthest)
+
+    return replace(picture, lower=lower, upper=upper, taken=ends, marks=marks)
 
 
 def _pair_picture(

@@ -59,10 +59,12 @@ def render_page(results: Sequence[Result], command: str) -> str:
     """Return the page as HTML: it loads nothing from anywhere."""
     folder = files("truespring.report")
     studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
+    what, several = ("comparison", "comparisons") if results[0].in_detail else ("study", "studies")
     turning = any(study["viewer"] and study["in_space"] for study in studies)
     scripts = [*(["scene.min.js"] if turning else []), "viewer.js"]
     return _template().render(
-        title=results[0].title if len(results) == 1 else f"{len(results)} studies",
+        title=results[0].title if len(results) == 1 else f"{len(results)} {several}",
+        what=what,
         studies=studies,
         versions=_versions(),
         command=command,

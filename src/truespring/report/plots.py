@@ -70,9 +70,11 @@ def curves_figure(result: Result) -> Sheet:
 
 def _is_balanced(result: Result) -> bool:
     """Whether the loads have no total, as their sum is rounding beside them, or it is not known of a path."""
-    forces = [path.applied_force(path.states[-1]) for path in result.paths.values() if path.states]
-    if not result.problem.stated or not np.isfinite(forces).all():
+    forces = np.array([path.applied_force(path.states[-1]) for path in result.paths.values() if path.states])
+    if not np.isfinite(forces).all() or (not result.problem.stated and not forces.any()):
         return True
+    if not result.problem.stated:
+        return False
     if result.problem.loading.driven_by_motion:
         return False
     force = result.problem.loading.force(result.problem.mesh.nodes)
