@@ -16,8 +16,10 @@ ALLOWED = {
     "study": {
         "report",
         "comparison",
+        "misfit",
         "settling",
         "reference",
+        "exports",
         "equilibrium",
         "models",
         "solvers",
@@ -25,6 +27,7 @@ ALLOWED = {
         "loading",
         "mesh",
         "material",
+        "table",
         "units",
     },
     "report": {
@@ -38,8 +41,23 @@ ALLOWED = {
         "mesh",
         "material",
     },
-    "comparison": {"equilibrium", "mesh"},
-    "reference": {"equilibrium", "problem", "mesh", "units"},
+    "comparison": {"carrying", "equilibrium", "problem", "mesh"},
+    "carrying": {"equilibrium", "problem", "mesh"},
+    "misfit": {"comparison", "equilibrium", "mesh"},
+    "reference": {
+        "exports",
+        "equilibrium",
+        "models",
+        "solvers",
+        "potential",
+        "problem",
+        "loading",
+        "mesh",
+        "material",
+        "table",
+        "units",
+    },
+    "exports": {"equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
     "equilibrium": {"models", "solvers", "potential", "problem", "mesh", "material"},
     "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
     "solvers": {"linear", "potential"},
@@ -50,6 +68,7 @@ ALLOWED = {
     "mesh": set(),
     "settling": set(),
     "material": set(),
+    "table": {"units"},
     "units": set(),
     "kernels": set(),
     "errors": set(),
@@ -57,7 +76,20 @@ ALLOWED = {
     "memory": set(),
 }
 OPEN_TO_ALL = {"arrays", "errors", "memory", "kernels"}
-HEAVY = {"matplotlib", "pyvista", "vtk", "numba", "pyamg", "pint", "trimesh", "meshio", "rich", "jinja2"}
+HEAVY = {
+    "matplotlib",
+    "pyvista",
+    "vtk",
+    "numba",
+    "pyamg",
+    "pint",
+    "trimesh",
+    "meshio",
+    "rich",
+    "jinja2",
+    "mujoco",
+    "ansys",
+}
 
 
 def rooms() -> dict[str, list[Path]]:

@@ -87,6 +87,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     verb.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relative, default: 0.01")
     verb.add_argument("--meshes", type=_positive, default=5, metavar="N", help="at most so many, default: 5")
+    verb = add("compare", _compare, "compare results, whoever computed them: the first is the reference", studies=False)
+    _add_sources(verb)
     verb = add("export", _export, "write the springs of a study for another simulator, and what to expect there")
     verb.add_argument(
         "--to",
@@ -101,6 +103,36 @@ def _parser() -> argparse.ArgumentParser:
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
+
+
+def _add_sources(verb: argparse.ArgumentParser) -> None:
+    """What `compare` takes, and what is told of a file that it does not tell itself."""
+    verb.add_argument(
+        "source",
+        nargs="+",
+        help="a study or a folder that truespring wrote, with :MODEL for another than the compared one; or a result: "
+        ".frd, .dat, .rst, .vtu, .pvd, .stl, .csv of markers",
+    )
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    verb.add_argument(
+        "--probe", metavar="POINT", help='such as right-middle or "160 mm, 20 mm"; default: what moves most'
+    )
+    verb.add_argument(
+        "--tolerance", type=float, metavar="E", help="the rms error up to which they agree, default: 0.05"
+    )
+    for name, what in _TOLD.items():
+        verb.add_argument(f"--{name.replace('_', '-')}", action="append", default=[], metavar="[FILE=]VALUE", help=what)
+
+
+_TOLD = {
+    "unit": "the unit of length of a file, or of all; default: m",
+    "axes": "a file's axes along ours: x,z,-y has its z along our y, and our z against its y",
+    "shift": "what is added to a file's places: 0,0,5 mm",
+    "load_factor": "the load level of a file of one level; default: 1",
+    "field": "the name of the displacement in a VTK file",
+    "undeformed": "the body at rest, of STL or marker files that hold the deformed one only",
+    "mesh": "the deck with the nodes of a .dat file; default: the .inp of its name",
+}
 
 
 def _positive(text: str) -> int:
@@ -231,6 +263,34 @@ def _converge(options: argparse.Namespace) -> int:
         values = {stem: [asdict(one) for one in told] for stem, told in found.items()}
         _print_json(values if len(values) > 1 else values[studies[0].stem])
     return CONVERGED if all(one.settled for told in found.values() for one in told) else NOT_CONVERGED
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from truespring.report.summary import difference
+    from truespring.report.tables import difference_tables
+    from truespring.study import compare_sources, find_sources, read_probe, write_comparisons
+
+    told = [(name, getattr(options, name)) for name in _TOLD]
+    sources = find_sources(options.source, told)
+    probe = read_probe(options.probe)
+    if options.tolerance is not None and not 0 < options.tolerance < 1:
+        raise TruespringError(f"--tolerance {options.tolerance:g}: a relative error between 0 and 1 is wanted")
+    with _writing(options.out):
+        options.out.mkdir(parents=True, exist_ok=True)
+    with _progress(options) as progress:
+        advance = None if progress is None else lambda text, share: progress("reading", text, share)
+        results = list(compare_sources(sources, probe, options.tolerance, advance))
+    with _writing(options.out):
+        report = write_comparisons(results, options.out, options.source, told)
+    console = _console(options)
+    for result in results:
+        for part in difference_tables(result):
+            console.print(part)
+    console.print(f"report: {report}", soft_wrap=True)
+    if options.json:
+        values = [difference(result) for result in results]
+        _print_json({one["model"]: one for one in values} if len(values) > 1 else values[0])
+    return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
 
 
 def _export(options: argparse.Namespace) -> int:

@@ -86,7 +86,9 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_targets(names: Collection[str], problem: Problem, model: Springs | SpringNetwork) -> None:
-    """Raise ExportError for springs that a target cannot take; nothing is solved."""
+    """Raise ExportError for a model that is no springs, and for springs that a target cannot take; solve nothing."""
+    if not isinstance(model, Springs | SpringNetwork):
+        raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
     springs = model if isinstance(model, SpringNetwork) else model.potential(problem)
     for name in names:
         if TARGETS[name].program:

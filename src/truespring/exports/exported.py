@@ -95,7 +95,8 @@ class Exported:
     @cached_property
     def header(self) -> tuple[str, ...]:
         """Title, units, material, supports, loads and what to expect, a sentence a line, for the head of a file."""
-        return tuple(" ".join(line.split()) for line in self._header())
+        printable = ("".join(sign if sign.isprintable() else " " for sign in line) for line in self._header())
+        return tuple(" ".join(line.split()) for line in printable)
 
     def _header(self) -> Iterator[str]:
         mesh = self.problem.mesh
@@ -192,10 +193,8 @@ def solve_springs(
     """Solve springs up to full load, so that a file can tell what to expect of them.
 
     A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
-    programs put the load on. `probe` is by default the node that moves most. Raises ExportError for other models.
+    programs put the load on. `probe` is by default the node that moves most.
     """
-    if not isinstance(model, Springs | SpringNetwork):
-        raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
     chosen, remarks = solver or Newton(), []
     steps = chosen.steps if isinstance(chosen, DisplacementControl) else chosen.load_steps
     if not isinstance(chosen, Newton):

@@ -1,3 +1,12 @@
 """Paths from elsewhere: results of other programs."""
 
+from truespring.reference.calculix import CalculiX as CalculiX
+from truespring.reference.calculix import Program as Program
+from truespring.reference.placing import Placing as Placing
+from truespring.reference.placing import placed as placed
+from truespring.reference.record import Level as Level
+from truespring.reference.record import Record as Record
+from truespring.reference.result import read_record as read_record
+from truespring.reference.result import read_result as read_result
+from truespring.reference.stl import read_shell as read_shell
 from truespring.reference.stl import read_stl as read_stl

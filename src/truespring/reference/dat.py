@@ -43,7 +43,8 @@ def read_dat(file: Path, reading: Reading | None = None, mesh: Path | None = Non
     """
     if file.is_file() and not file.stat().st_size:
         raise ReferenceFileError(
-            f"{file} is empty, as CalculiX leaves it where it refuses the deck: see what it printed"
+            f"{file} is empty: CalculiX leaves it so where it refuses the deck (see what it said on the screen), or "
+            "where nothing asks for *NODE PRINT and a line U"
         )
     refuse_unreadable(file)
     deck = _deck(file, mesh)

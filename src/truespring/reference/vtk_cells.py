@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truespring.arrays import Ints
+from truespring.arrays import Bools, Ints
 from truespring.errors import ReferenceFileError
 from truespring.mesh.files.contents import Cells
 
@@ -17,6 +17,8 @@ VTK_NAMES: Mapping[int, str] = {
 }
 #: Vertices: points alone.
 VTK_POINTS = (1, 2)
+
+_CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 
 # By kind and number of nodes.
 _NAMES = {
@@ -50,3 +52,34 @@ def refuse_unknown(types: Ints, file: Path) -> None:
             raise ReferenceFileError(
                 f"{file}: cells of VTK's type {number} are not read; {', '.join(dict.fromkeys(VTK_NAMES.values()))} are"
             )
+
+
+def sized(types: Ints, offsets: Ints, connectivity: Ints, is_made: Bools, file: Path) -> tuple[dict[str, Ints], int]:
+    """Return cells whose order is told by their number of nodes alone, as Ansys' reader gives them to VTK.
+
+    Args:
+        types: VTK's numbers, of a first order whatever the cells have, shape (n_cells,).
+        offsets, connectivity: of the cells, shape (n_cells + 1,) and their points.
+        is_made: of the points, whether the reader made them up: cells with such a middle become their corners.
+        file: for messages.
+
+    Returns the points of the cells by meshio's name, and how many lost their middles.
+    """
+    refuse_unknown(types, file)
+    n_lost = 0
+    found: dict[str, list[Ints]] = {}
+    for number, size in np.unique(np.stack([types, np.diff(offsets)], axis=1), axis=0).tolist():
+        if number in VTK_POINTS:
+            continue
+        base = VTK_NAMES[number].rstrip("0123456789")
+        members = np.flatnonzero((types == number) & (np.diff(offsets) == size))
+        nodes = connectivity[offsets[members, None] + np.arange(size)]
+        name = base if size == _CORNERS[base] else f"{base}{size}"
+        if name not in VTK_NAMES.values():
+            raise ReferenceFileError(f"{file}: a {base} of {size} nodes is not read")
+        lost = np.asarray(is_made[nodes].any(axis=1))
+        n_lost += int(lost.sum())
+        found.setdefault(name, []).append(nodes[~lost])
+        found.setdefault(base, []).append(nodes[lost][:, : _CORNERS[base]])
+    joined = {name: np.concatenate(blocks) for name, blocks in found.items()}
+    return {name: nodes for name, nodes in joined.items() if len(nodes)}, n_lost

@@ -5,9 +5,6 @@ from truespring.study.compare import read_probe as read_probe
 from truespring.study.compare import write_comparisons as write_comparisons
 from truespring.study.converge import converge as converge
 from truespring.study.converge import write_settling as write_settling
-from truespring.study.export import check_targets as check_targets
-from truespring.study.export import export_study as export_study
-from truespring.study.export import springs_of as springs_of
 from truespring.study.export import export_study as export_study
 from truespring.study.export import springs_of as springs_of
 from truespring.study.network import read_network as read_network

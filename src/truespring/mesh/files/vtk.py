@@ -6,7 +6,7 @@ offsets and connectivity, vtkDataReader and vtkDataWriter.
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 from urllib.parse import unquote
 
 import numpy as np
@@ -76,18 +76,28 @@ _NO_GROUPS = {
 }
 
 
-def contents(
-    points: Floats, offsets: Ints, connectivity: Ints, types: Ints, point_arrays: Arrays, cell_arrays: Arrays
-) -> Contents:
-    """Return the contents of a grid, whose points and cells are numbered from 0.
+class Grid(NamedTuple):
+    """An unstructured grid, whose points and cells are numbered from 0.
 
-    Args:
+    Attributes:
         points: shape (n_points, 3).
         offsets: where each cell begins in `connectivity`, and the end of the last one, shape (n_cells + 1,).
         connectivity: the points of all cells.
         types: VTK's numbers of the cell types, shape (n_cells,).
         point_arrays, cell_arrays: by name, a row for each point or cell.
     """
+
+    points: Floats
+    offsets: Ints
+    connectivity: Ints
+    types: Ints
+    point_arrays: Arrays
+    cell_arrays: Arrays
+
+
+def contents(grid: Grid) -> Contents:
+    """Return the contents of a grid; raise MeshError where its cells are not whole."""
+    points, offsets, connectivity, types, point_arrays, cell_arrays = grid
     if len(offsets) != len(types) + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
         raise MeshError(f"{len(offsets)} offsets do not belong to {len(types)} cells, or do not ascend from 0")
     if offsets[-1] != len(connectivity):
@@ -162,6 +172,11 @@ _CODES = {
 
 def read_vtk(data: bytes) -> Contents:
     """Read a legacy .vtk file; raise MeshError where it is damaged or no unstructured grid."""
+    return contents(read_legacy_grid(data))
+
+
+def read_legacy_grid(data: bytes) -> Grid:
+    """Read a legacy .vtk file with its arrays; raise MeshError where it is damaged or no unstructured grid."""
     head = re.match(
         rb"# vtk DataFile Version\s+(\d+)\.\d+[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)[ \t\r]*\n",
         data,
@@ -222,7 +237,7 @@ def read_vtk(data: bytes) -> Contents:
         for name, values in arrays[what].items():
             if len(values) != there:
                 raise MeshError(f"array '{name}' of {what} has {len(values)} rows, wanted are {there}")
-    return contents(**grid, point_arrays=arrays["POINT_DATA"], cell_arrays=arrays["CELL_DATA"])
+    return Grid(**grid, point_arrays=arrays["POINT_DATA"], cell_arrays=arrays["CELL_DATA"])
 
 
 class _Cursor:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truespring.arrays import Ints
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
-from truespring.mesh.files.vtk import contents
+from truespring.mesh.files.vtk import Grid, contents
 
 _CODES = {
     **{"Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8"},
@@ -37,13 +37,18 @@ _DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
 
 def read_vtu(data: bytes) -> Contents:
     """Read a .vtu file; raise MeshError where it is damaged, in several pieces or compressed in another way."""
+    return contents(read_grid(data))
+
+
+def read_grid(data: bytes) -> Grid:
+    """Read a .vtu file with its arrays; raise MeshError as `read_vtu`."""
     root, reader = open_vtk(data, "UnstructuredGrid")
     grid = root.find("UnstructuredGrid")
     assert grid is not None  # open_vtk has looked
     pieces = [piece for piece in grid.iter("Piece") if piece.get("NumberOfPoints") != "0"]
     if len(pieces) != 1:
         raise MeshError(f"there are {len(pieces)} pieces: merge them into one grid")
-    return reader.contents(pieces[0])
+    return reader.grid(pieces[0])
 
 
 def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
@@ -72,7 +77,7 @@ class Reader:
         self._is_raw = section is not None and section.get("encoding") == "raw"
         self._appended = appended.lstrip()[1:]  # it begins with an underscore
 
-    def contents(self, piece: ElementTree.Element) -> Contents:
+    def grid(self, piece: ElementTree.Element) -> Grid:
         """Return what a piece holds."""
         n_points, n_cells = (_count(piece, name) for name in ("NumberOfPoints", "NumberOfCells"))
         points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 0)))
@@ -82,7 +87,7 @@ class Reader:
         connectivity, ends, types = (_integers(cells, name) for name in ("connectivity", "offsets", "types"))
         if len(ends) != n_cells:
             raise MeshError(f"{n_cells} cells are announced, there are {len(ends)} offsets")
-        return contents(
+        return Grid(
             points.astype(np.float64),
             np.concatenate([[0], ends]),
             connectivity,

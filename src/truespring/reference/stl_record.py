@@ -1,0 +1,59 @@
+"""Two STL files of one body, at rest and deformed, as a record: its surface and where each of its points went."""
+
+from pathlib import Path
+
+import numpy as np
+
+from truespring.errors import ReferenceFileError
+from truespring.reference.checks import checked, refuse_unreadable
+from truespring.reference.placing import Placing
+from truespring.reference.record import Level, Reading, Record
+from truespring.reference.stl import merged, read_facets
+
+# A share of the body's diameter: facets that meet at rest still meet when deformed.
+_APART = 1e-5
+
+
+def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path | None = None) -> Record:
+    """Read the surface of a body in space from two STL files, which list the same triangles in the same order.
+
+    Args:
+        file: the deformed body.
+        reading: is called with the share that is read.
+        undeformed: the body at rest.
+
+    Returns a record of kind "stl" of triangles and one level of time 1. Raises ReferenceFileError where a file cannot
+    be read, `undeformed` is missing, or the files do not belong together.
+    """
+    if undeformed is None:
+        raise ReferenceFileError(
+            f"{file}: a deformed STL file alone does not tell which point went where: give the body at rest, too "
+            "(undeformed)"
+        )
+    for one in (file, undeformed):
+        refuse_unreadable(one)
+    deformed = read_facets(file, Placing())
+    if reading:
+        reading(0.5)
+    rest = read_facets(undeformed, Placing())
+    if len(rest) != len(deformed):
+        raise ReferenceFileError(
+            f"{file} has {len(deformed)} facets, {undeformed} has {len(rest)}: export both from one mesh"
+        )
+    before, after = rest.reshape(-1, 3), deformed.reshape(-1, 3)
+    first, numbers = merged(before)
+    spread = np.linalg.norm(after - after[first][numbers], axis=1)
+    worst = int(spread.argmax())
+    if spread[worst] > _APART * np.linalg.norm(np.ptp(after, axis=0)):
+        raise ReferenceFileError(
+            f"the vertex of {undeformed} at {before[worst].tolist()} goes to two places in {file}, "
+            f"{after[worst].tolist()} and {after[first][numbers][worst].tolist()}: the files list their facets in "
+            "different orders; export both in one order"
+        )
+    triangles = numbers.reshape(-1, 3)
+    a, b, c = triangles.T
+    whole = triangles[(a != b) & (b != c) & (c != a)]  # without those that merging closed
+    if reading:
+        reading(1.0)
+    level = Level(1.0, after[first] - before[first])
+    return checked(Record(file, "stl", before[first], {"triangle": whole}, (level,)))
