@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from truespring.material import PlaneStrain
-from truespring.models.fem import Fem
 from truespring.models.fitness import springs_lock
 from truespring.models.moduli import Moduli, moduli
 from truespring.models.springs import Springs
@@ -17,11 +16,12 @@ _SAME_MODULI, _SAME_BENDING = 0.01, 0.05
 
 
 def model_warnings(problem: Problem, model: Any) -> tuple[str, ...]:
-    """Return what should be known of a model: springs of other moduli than the material's, elements that lock."""
-    if isinstance(model, Fem):
-        return model.warnings(problem)
+    """Return what should be known of a model: springs of other moduli than the material's, elements that lock.
+
+    Models other than springs tell it themselves, by a method `warnings(problem)`, if there is anything to tell.
+    """
     if not isinstance(model, Springs):
-        return ()
+        return tuple(model.warnings(problem)) if hasattr(model, "warnings") else ()
     found: dict[str, list[str]] = {}  # each warning once, with its materials
     for twin in problem.homogeneous:
         material = twin.material

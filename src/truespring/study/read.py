@@ -387,7 +387,7 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or {_OTHER_MESHES}"
         case "union_tag_invalid" | "union_tag_not_found":
             given = value.get("kind") if isinstance(value, dict) else value
-            kinds = ("springs", "fem", "network", "calculix", "stl")
+            kinds = schema.MODEL_KINDS
             return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
         case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
             return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
@@ -414,13 +414,6 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
         "solver": schema.SolverTable,
         "compare": schema.CompareTable,
     }
-    kinds: dict[str | int, type[schema.Table]] = {
-        "springs": schema.SpringsTable,
-        "fem": schema.FemTable,
-        "network": schema.NetworkTable,
-        "calculix": schema.CalculixTable,
-        "stl": schema.StlTable,
-    }
     if not loc:
         return list(schema.StudyTable.model_fields)
     if loc[0] == "mesh":
@@ -430,7 +423,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
         return list(meshes[str(loc[1])].model_fields)
     if loc[-1] == "stiffness":
         return list(schema.StiffnessTable.model_fields)
-    return list((kinds[loc[2]] if loc[0] == "models" else tables[loc[0]]).model_fields)
+    return list((schema.MODEL_KINDS[str(loc[2])] if loc[0] == "models" else tables[loc[0]]).model_fields)
 
 
 def _place(file: FilePath, key: tuple[str | int, ...], lines: Mapping[tuple[str | int, ...], int]) -> str:

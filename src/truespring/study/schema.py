@@ -1,6 +1,7 @@
 """The tables of a study file, as pydantic knows them. Numbers are SI; texts carry units."""
 
 from collections.abc import Callable, Collection
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -346,6 +347,16 @@ class CompareTable(Table):
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
 
 
+#: What a model may be, by its kind.
+MODEL_KINDS: MappingProxyType[str, type[Table]] = MappingProxyType(
+    {
+        "springs": SpringsTable,
+        "fem": FemTable,
+        "network": NetworkTable,
+        "calculix": CalculixTable,
+        "stl": StlTable,
+    }
+)
 ModelTable = Annotated[SpringsTable | FemTable | NetworkTable | CalculixTable | StlTable, Discriminator("kind")]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
