@@ -18,7 +18,7 @@ from truespring import potential as potential_module
 from truespring.arrays import Floats
 from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings, biquadratic, fem, volume
+from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings, fem, linked, volume
 from truespring.potential import Potential, Projectable, Refined, Stressed, Stretched
 
 THIN, LONG = ts.PlaneStress(0.4), ts.PlaneStrain(0.4)
@@ -479,7 +479,7 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
         ]
 
     at_once = answers()
-    for module in (biquadratic, fem, volume):
+    for module in (fem, linked, volume):
         monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
     monkeypatch.setattr(fem, "_SLICE_POINTS", 1)
     monkeypatch.setattr(potential_module, "_SLICE_BYTES", 1)

@@ -35,14 +35,14 @@ def changes(first: int, last: int, x: Any, rest: Any, elements: Any, number: Any
 
 
 @kernel
-def carry_on(first: int, last: int, x: Any, step: Any, elements: Any, number: Any, change: Any, zero: Any) -> None:
-    """Add to it what is linear in a further step."""
+def growths(first: int, last: int, x: Any, step: Any, elements: Any, number: Any, growth: Any, zero: Any) -> None:
+    """The change of each link's squared length that is linear in a step."""
     for e in range(first, last):
         for a in range(elements.shape[1]):
             for b in range(a):
-                i, j = elements[e, a], elements[e, b]
-                d = minus(row(x, i, zero), row(x, j, zero))
-                change[e, number[a, b]] += 2 * dot(d, minus(row(step, i, zero), row(step, j, zero)))
+                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
+                moved = minus(row(step, elements[e, a], zero), row(step, elements[e, b], zero))
+                growth[e, number[a, b]] = 2 * dot(d, moved)
 
 
 @kernel
