@@ -31,6 +31,8 @@ from .models import LAWS as LAWS
 from .models import RULES as RULES
 from .models import Fem as Fem
 from .models import Fitness as Fitness
+from .models import Heml as Heml
+from .models import MassTensor as MassTensor
 from .models import Moduli as Moduli
 from .models import SpringNetwork as SpringNetwork
 from .models import Springs as Springs

@@ -12,7 +12,18 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError, ProblemError
 from truespring.mesh import Grid, Shell, Surface, select
 from truespring.mesh.selections import AXES
-from truespring.models import LAWS, Fem, Model, Moduli, SpringNetwork, Springs, model_warnings, moduli, refuse_mechanism
+from truespring.models import (
+    LAWS,
+    Fem,
+    MassTensor,
+    Model,
+    Moduli,
+    SpringNetwork,
+    Springs,
+    model_warnings,
+    moduli,
+    refuse_mechanism,
+)
 from truespring.potential import Loading, Potential, Refined, Stretched
 from truespring.problem import Problem
 from truespring.solvers import ArcLength, Cost, DisplacementControl, Equilibrium, Newton, Reporter
@@ -236,7 +247,7 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
         )
     if isinstance(model, SpringNetwork):
         refuse_mechanism(model, problem.loading.held)
-    linear = isinstance(model, Fem) and not LAWS[model.law].finite
+    linear = isinstance(model, Fem | MassTensor) and not LAWS[model.law].finite
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
     if linear:
         loading = loading.at_rest(potential.nodes)

@@ -10,7 +10,9 @@ from truespring.models.fem import FemPotential as FemPotential
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
+from truespring.models.heml import Heml as Heml
 from truespring.models.laws import LAWS as LAWS
+from truespring.models.mass_tensor import MassTensor as MassTensor
 from truespring.models.mechanism import refuse_mechanism as refuse_mechanism
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli

@@ -116,6 +116,17 @@ def locks(problem: Problem) -> bool:
     return incompressible and not isinstance(problem.section, PlaneStress)
 
 
+def locking_warnings(problem: Problem) -> tuple[str, ...]:
+    """Return what should be known of a model that is linear elements in another form: that these lock."""
+    if not locks(problem):
+        return ()
+    largest = max(material.poisson for material in problem.materials)
+    return (
+        f"at a Poisson's ratio of {largest:g} these elements lock, as linear ones of FEM do: they are too stiff in "
+        'bending; kind = "fem" has elements that do not',
+    )
+
+
 def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" = None) -> "FemPotential":
     """Set up quadrature and constants of `law` on the problem's mesh."""
     if problem.material is None or problem.section is None or problem.mesh.element not in _SKFEM:

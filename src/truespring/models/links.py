@@ -7,6 +7,7 @@ from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.models.fem import fem_potential
 from truespring.models.laws import Constants
+from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 
 #: Corners of a square (the first four) and of a cube, in the order of quadrilaterals and hexahedra.
@@ -51,15 +52,25 @@ def link_coupling(problem: Problem) -> Floats:
     return coupling
 
 
+def link_strains(mesh: Mesh, gradients: Floats) -> Floats:
+    """Return C_ab = -(g_a g_b^T + g_b g_a^T) / 2 of each link, by which C = F^T F changes with its squared length.
+
+    `gradients` of the shape functions have axes (element, point, node, direction); the result (element, point, link,
+    component in Voigt's order) [1/m^2].
+    """
+    links = np.array(mesh.kind.links)
+    first, second = gradients[:, :, links[:, 0]], gradients[:, :, links[:, 1]]
+    both = [first[..., i] * second[..., j] + first[..., j] * second[..., i] for i, j in voigt_pairs(mesh.dim)]
+    return -np.stack(both, axis=-1) / 2
+
+
 def _coupling(mesh: Mesh, gradients: Floats, volumes: Floats, constants: Constants) -> Floats:
     """M of elements by the gradients of their shape functions, axes (element, point, node, direction)."""
     lam, mu = constants.lam_plane, constants.mu
-    links = np.array(mesh.kind.links)
-    first, second = gradients[:, :, links[:, 0]], gradients[:, :, links[:, 1]]
-    outer = first[..., :, None] * second[..., None, :]
-    C = -(outer + outer.swapaxes(-1, -2)) / 2
-    trace = np.einsum("eqlii->eql", C)
-    by_point = np.moveaxis(C.reshape(*C.shape[:3], -1), 2, 1).reshape(len(C), len(links), -1)
-    weighted = np.moveaxis((volumes * mu / 4)[:, :, None, None, None] * C, 2, 1).reshape(by_point.shape)
+    C = link_strains(mesh, gradients)
+    trace = C[..., : mesh.dim].sum(axis=-1)
+    twice = np.where(np.arange(C.shape[-1]) < mesh.dim, 1.0, 2.0)
+    by_point = np.moveaxis(C, 2, 1).reshape(len(C), C.shape[2], -1)
+    weighted = np.moveaxis((volumes * mu / 4)[:, :, None, None] * twice * C, 2, 1).reshape(by_point.shape)
     dilation = ((volumes * lam / 8)[:, :, None] * trace).swapaxes(1, 2) @ trace
     return np.asarray(dilation + weighted @ by_point.swapaxes(1, 2))

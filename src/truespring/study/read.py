@@ -27,7 +27,17 @@ from truespring.mesh import (
     select,
     select_elements,
 )
-from truespring.models import Fem, Model, SpringNetwork, Springs, UserStiffness, moduli, refuse_mechanism
+from truespring.models import (
+    Fem,
+    Heml,
+    MassTensor,
+    Model,
+    SpringNetwork,
+    Springs,
+    UserStiffness,
+    moduli,
+    refuse_mechanism,
+)
 from truespring.problem import Load, Problem, Region
 from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
@@ -271,6 +281,10 @@ class _Builder:
                     return program
                 case schema.FemTable():
                     model: Model = Fem(table.law, table.element)
+                case schema.HemlTable():
+                    model = Heml(table.law)
+                case schema.MassTensorTable():
+                    model = MassTensor(table.law)
                 case _:
                     model = _springs(table)
             model.potential(problem)  # what does not fit is said before anything is solved

@@ -21,6 +21,8 @@ from truespring.models import (
     RULES,
     Fem,
     Fitness,
+    Heml,
+    MassTensor,
     Moduli,
     SpringNetwork,
     Springs,
@@ -304,7 +306,8 @@ def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
         return {"kind": entry.kind, "label": entry.label_on(study.problem), "warnings": []}
     if not isinstance(entry, Springs):
         known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
-        law = {"law": entry.law, "element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
+        law = {"law": entry.law} if isinstance(entry, Fem | Heml | MassTensor) else {}
+        law |= {"element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
         return {"kind": entry.kind, "label": entry.label, **law, "warnings": list(known)}
     realised = moduli(study.problem.homogeneous[0], entry)
     fitness = judge(study.problem, entry, study.tolerance)

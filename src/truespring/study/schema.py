@@ -308,6 +308,20 @@ class FemTable(Table):
     element: FemElement | None = None
 
 
+class HemlTable(Table):
+    """Hyper-elastic mass links."""
+
+    kind: Literal["heml"]
+    law: LawName
+
+
+class MassTensorTable(Table):
+    """The mass-tensor method."""
+
+    kind: Literal["mass-tensor"]
+    law: LawName
+
+
 class NetworkTable(Table):
     """The network of the mesh itself."""
 
@@ -352,12 +366,17 @@ MODEL_KINDS: MappingProxyType[str, type[Table]] = MappingProxyType(
     {
         "springs": SpringsTable,
         "fem": FemTable,
+        "heml": HemlTable,
+        "mass-tensor": MassTensorTable,
         "network": NetworkTable,
         "calculix": CalculixTable,
         "stl": StlTable,
     }
 )
-ModelTable = Annotated[SpringsTable | FemTable | NetworkTable | CalculixTable | StlTable, Discriminator("kind")]
+ModelTable = Annotated[
+    SpringsTable | FemTable | HemlTable | MassTensorTable | NetworkTable | CalculixTable | StlTable,
+    Discriminator("kind"),
+]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 

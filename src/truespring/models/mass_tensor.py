@@ -1,0 +1,237 @@
+"""The mass-tensor method: forces as polynomials of the displacements, by tensors that are computed once."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints, ShortInts
+from truespring.errors import ModelError, nearest
+from truespring.memory import slices
+from truespring.models.biquadratic import BiquadraticSprings
+from truespring.models.fem import FemPotential, fem_potential, locking_warnings
+from truespring.models.laws import LAWS
+from truespring.models.strain import voigt_pairs
+from truespring.models.symmetric import identity
+from truespring.potential import Pattern, SparseMatrix
+from truespring.problem import Problem
+
+#: Laws whose energy is a polynomial of the displacements.
+_LAWS = ("linear", "saint-venant-kirchhoff")
+_SIMPLICES = ("triangle", "tetrahedron")
+# Threads share the elements, or the nodes, from so many on.
+_SMALLEST_PIECE = 256
+
+
+@dataclass(frozen=True)
+class MassTensor:
+    """The mass-tensor method (Cotin, Delingette, Ayache 1999; nonlinear: Picinbono, Delingette, Ayache 2003).
+
+    Attributes:
+        law: linear on any element; saint-venant-kirchhoff on triangles and tetrahedra.
+    """
+
+    law: str
+
+    kind = "mass-tensor"
+
+    def __post_init__(self) -> None:
+        if self.law in LAWS and self.law not in _LAWS:
+            raise ModelError(
+                f"law = '{self.law}': its energy is no polynomial of the displacements, which tensors need; "
+                f"allowed: {', '.join(_LAWS)}; this law is one of fem and heml"
+            )
+        if self.law not in _LAWS:
+            raise ModelError(f"law = '{self.law}' is unknown{nearest(self.law, _LAWS)}; allowed: {', '.join(_LAWS)}")
+
+    @property
+    def label(self) -> str:
+        """How curves and tables call the model."""
+        return f"mass-tensor ({LAWS[self.law].label.removesuffix(' FEM')})"
+
+    def warnings(self, problem: Problem) -> tuple[str, ...]:
+        """Return what should be known before the model is solved: elements that lock."""
+        return locking_warnings(problem)
+
+    def potential(self, problem: Problem) -> "LinearTensors | NonlinearTensors":
+        """Return the potential on the problem's mesh; raise ModelError for a law that does not fit its elements."""
+        element = problem.mesh.element
+        if self.law == "linear":
+            return LinearTensors(fem_potential(problem, self.law))
+        if element not in _SIMPLICES:
+            raise ModelError(
+                f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, where its tensors are few; the mesh "
+                f"has {element} elements: take kind = 'heml', which is the same function and goes with any, "
+                f"law = 'linear', or a mesh of {_SIMPLICES[problem.mesh.dim - 2]} elements"
+            )
+        return NonlinearTensors(fem_potential(problem, self.law))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tensors:
+    """What both laws share: the body, and what is drawn, which is told by the finite elements of the same function."""
+
+    fem: FemPotential
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference positions [m], shape (n_nodes, dim)."""
+        return self.fem.nodes
+
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """The elements, shape (n_elements, nodes)."""
+        return self.fem.cells
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""
+        return self.fem.cell_fields(positions)
+
+    @property
+    def _zero(self) -> tuple[float, ...]:
+        return (0.0,) * self.fem.mesh.dim
+
+
+class LinearTensors(_Tensors):
+    """Linear elasticity: force sum T_ij (u_j - u_i) on node i, a tensor T_ij for each two nodes of an element.
+
+    T_ij = sum V (lam g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I) over the elements at an edge of simplices, g the
+    gradients of the shape functions; of other elements the integral, and their diagonals have tensors too. A vertex has
+    minus the sum of the tensors of its edges. A force costs one product by edges: no element is looked at.
+    """
+
+    @cached_property
+    def tensors(self) -> SparseMatrix:
+        """The tensors of the edges, and on the diagonal those of the vertices [N/m]: the constant tangent."""
+        return self.fem.hessian(self.nodes)
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]."""
+        from truespring.kernels import tensors
+        from truespring.kernels.threads import run
+
+        known = self._known(positions)
+        return float(sum(run(tensors.edge_energy, len(positions), *known, self._zero, smallest=_SMALLEST_PIECE)))
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        from truespring.kernels import tensors
+        from truespring.kernels.threads import run
+
+        force, known = np.empty(positions.shape), self._known(positions)
+        run(tensors.edge_forces, len(positions), *known, force, self._zero, smallest=_SMALLEST_PIECE)
+        return force
+
+    def _known(self, positions: Floats) -> tuple[Floats, Floats, ShortInts, ShortInts, Floats]:
+        """What kernels ask for: positions at present and at rest, and the tensors by rows."""
+        from truespring.kernels.threads import writable
+
+        matrix = self.tensors
+        return writable(positions), writable(self.nodes), matrix.indptr, matrix.indices, matrix.data
+
+    def hessian(self, positions: Floats) -> SparseMatrix:
+        """Tangent stiffness [N/m], the same everywhere."""
+        return self.tensors
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """The tangent, which is positive semidefinite [N/m]."""
+        return self.tensors
+
+
+class NonlinearTensors(_Tensors):
+    """St. Venant-Kirchhoff's law on simplices: an energy of fourth order in the displacements.
+
+    In a simplex E is linear in z, the displacements w_a of its further nodes relative to the first and the products
+    w_a . w_b: W = z . T z / 2. The blocks of T are the tensors of second, third and fourth order by which
+    Picinbono and others write W = 1/2 sum w_a . K_ab w_b + sum (w_a . w_b) (C_abc . w_c) + sum D_abcd (w_a . w_b)
+    (w_c . w_d). They sum them over the elements at each vertex, edge and face; here each element keeps its own, for
+    with absolute displacements u cubes of u over the element's size are lost to rounding.
+
+    Biquadratic springs and HEML are the same function: the tangent and its stress are theirs.
+    """
+
+    @cached_property
+    def links(self) -> BiquadraticSprings:
+        """The same function of the lengths of the elements' links."""
+        return BiquadraticSprings(self.fem.problem)
+
+    @cached_property
+    def tensors(self) -> Floats:
+        """T of each element, or one of all, dim^2 displacements by nodes first, then products a <= b [N/m, N, N m]."""
+        problem, dim = self.fem.problem, self.fem.mesh.dim
+        alike = len(problem.materials) == 1 and problem.mesh.forms.single
+        size = dim * dim + dim * (dim + 1) // 2
+        found = np.empty((1 if alike else len(problem.mesh.elements), size, size))
+        for part in slices(len(found), 8 * size * size):
+            first, last, _ = part.indices(len(found))
+            gradients, volumes = self.fem.quadrature(first, last)
+            strain = _strain_of(gradients[:, 0, 1:])
+            at_rest = np.broadcast_to(identity(np.empty((strain.shape[1], 1, 1))), (strain.shape[1], len(strain), 1))
+            response = self.fem.law.respond(at_rest, self.fem.constants.part(first, last))
+            elasticity = np.moveaxis(response.elasticity()[..., 0], -1, 0)
+            twice = np.where(np.arange(strain.shape[1]) < dim, 1.0, 2.0)[:, None] * strain
+            found[part] = volumes[:, :, None] * (twice.swapaxes(1, 2) @ elasticity @ twice)
+        return found
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return Pattern(self.fem.elements, *self.nodes.shape)
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]."""
+        from truespring.kernels import tensors
+        from truespring.kernels.threads import run
+
+        energy = np.empty(len(self.fem.elements))
+        run(tensors.energies, len(energy), *self._known(positions), energy, self._zero, smallest=_SMALLEST_PIECE)
+        return float(energy.sum())
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        from truespring.kernels import tensors
+        from truespring.kernels.threads import run
+
+        force = np.empty((len(self.fem.elements), self.fem.elements.shape[1] * self._pattern.dim))
+        run(tensors.forces, len(force), *self._known(positions), force, self._zero, smallest=_SMALLEST_PIECE)
+        return self._pattern.vector(force)
+
+    def _known(self, positions: Floats) -> tuple[Floats, Floats, ShortInts, Floats]:
+        """What kernels ask for: positions at present and at rest, the elements and their tensors."""
+        from truespring.kernels.threads import writable
+
+        return writable(positions), writable(self.nodes), self._pattern.elements, self.tensors
+
+    def stress(self, positions: Floats) -> Floats:
+        """The stress of the links, see BiquadraticSprings [N/m], shape (n_elements, links)."""
+        return self.links.stress(positions)
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """That stress carried on linearly along `step` [m], in N/m, shape (n_elements, links)."""
+        return self.links.extrapolated_stress(positions, step)
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
+        return self.links.hessian(positions, stress)
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """The tangent without what compressed links add to its geometric part, positive semidefinite [N/m]."""
+        return self.links.projected_hessian(positions)
+
+
+def _strain_of(gradients: Floats) -> Floats:
+    """E by z, axes (element, component, place in z), by the gradients of the further nodes, (element, node, direction).
+
+    E_ij = sum_a (w_ai g_aj + w_aj g_ai) / 2 + sum_ab w_a . w_b (g_ai g_bj + g_aj g_bi) / 4.
+    """
+    n, dim, _ = gradients.shape
+    products = list(combinations_with_replacement(range(dim), 2))
+    strain = np.zeros((n, len(products), dim * dim + len(products)))
+    for component, (i, j) in enumerate(voigt_pairs(dim)):
+        for a in range(dim):
+            strain[:, component, a * dim + i] += gradients[:, a, j] / 2
+            strain[:, component, a * dim + j] += gradients[:, a, i] / 2
+        for place, (a, b) in enumerate(products, dim * dim):
+            both = gradients[:, a, i] * gradients[:, b, j] + gradients[:, a, j] * gradients[:, b, i]
+            strain[:, component, place] = both / (4 if a == b else 2)
+    return strain
