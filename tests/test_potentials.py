@@ -4,7 +4,7 @@ The cases come from the tables: every rule on every kind of element that it is m
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -18,7 +18,10 @@ from truespring import potential as potential_module
 from truespring.arrays import Floats
 from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, VolumeSprings, fem, linked, volume
+from truespring.models import ELEMENTS, LAWS, RULES, Model, VolumeSprings, fem, linked, mass_tensor, volume
+from truespring.models.heml import HEML_LAWS
+from truespring.models.mass_tensor import TENSOR_LAWS
+from truespring.models.terzopoulos import BOUNDARIES
 from truespring.potential import Potential, Projectable, Refined, Stressed, Stretched
 
 THIN, LONG = ts.PlaneStress(0.4), ts.PlaneStrain(0.4)
@@ -35,6 +38,7 @@ class Case:
         model, problem: what to solve; None for a plain network.
         quadratic: the energy is quadratic, and not frame invariant.
         springs: it tells how far its springs are stretched.
+        stressed: it takes a stress for its geometric part.
         geometric: a stress given to the Hessian makes its geometric part.
         quadratic_stress: the stress is at most quadratic in the positions.
         cuts: the projection does no more than cut negative eigenvalues off, of springs or of elements.
@@ -43,10 +47,11 @@ class Case:
     """
 
     build: Callable[[], Potential]
-    model: ts.Springs | ts.Fem | None = None
+    model: Model | None = None
     problem: ts.Problem | None = None
     quadratic: bool = False
     springs: bool = False
+    stressed: bool = True
     geometric: bool = True
     quadratic_stress: bool = False
     cuts: bool = True
@@ -167,8 +172,55 @@ def _fem() -> dict[str, Case]:
     return cases
 
 
-CASES = {"truss": Case(truss, springs=True), **_springs(), **_fem()}
+def _links_and_tensors() -> dict[str, Case]:
+    """HEML and the mass-tensor method by every law on every element that they go with."""
+    cases = {}
+    models = [ts.Heml(law) for law in HEML_LAWS] + [ts.MassTensor(law) for law in TENSOR_LAWS]
+    for model in models:
+        law, links = LAWS[model.law], isinstance(model, ts.Heml)
+        for kind in BODIES:
+            for section in (THIN, LONG) if ELEMENT_KINDS[kind].dim == 2 else (THIN,):
+                problem = body(shape(kind), section)
+                try:
+                    model.potential(problem)
+                except ts.TruespringError:
+                    continue
+                name = f"{model.kind} {model.law}, {kind}" + (", plane strain" if section is LONG else "")
+                cases[name] = Case(
+                    lambda model=model, problem=problem: model.potential(problem),
+                    model,
+                    problem,
+                    quadratic=not law.finite,
+                    springs=links,
+                    stressed=law.finite,
+                    quadratic_stress=not law.barrier,
+                    barrier=law.barrier,
+                    mirrored=law.finite and not law.barrier,
+                )
+    return cases
+
+
+def _metric() -> dict[str, Case]:
+    """Terzopoulos' model by both rules of the boundary, in both sections of the plane and in space, two materials."""
+    plane, space = ts.rectangle((3.6, 2.0), (3, 2)), ts.box((2.0, 1.1, 0.9), (2, 1, 1))
+    cases = {}
+    for boundary in BOUNDARIES:
+        for name, mesh, section in (("plane", plane, THIN), ("plane strain", plane, LONG), ("space", space, THIN)):
+            problem = replace(body(mesh, section, False), regions=[ts.Region([0], ts.Material(11.0, 0.1))])
+            model = ts.Terzopoulos(boundary)
+            cases[f"terzopoulos, {boundary}, {name}"] = Case(
+                lambda model=model, problem=problem: model.potential(problem),
+                model,
+                problem,
+                quadratic_stress=True,
+                mirrored=True,
+            )
+    return cases
+
+
+CASES = {"truss": Case(truss, springs=True), **_springs(), **_fem(), **_links_and_tensors(), **_metric()}
 SOLVED = [name for name, case in CASES.items() if case.model is not None]
+STRESSED = [name for name, case in CASES.items() if case.stressed]
 INVARIANT = [name for name, case in CASES.items() if not case.quadratic]
 
 
@@ -200,11 +252,14 @@ def test_every_rule_law_and_element_is_here() -> None:
     rules = sum(len(entry.elements) for entry in RULES.values())
     # Two interpolations on each of four kinds of element, the plane ones in two sections.
     laws = len(LAWS) * 2 * (2 * 2 + 2)
-    assert len(CASES) == 1 + rules + 11 + laws
+    # HEML: one law on every element, the others on simplices; mass-tensor: the linear law on every element, one on those.
+    links, tensors = 6 + 3 * (len(HEML_LAWS) - 1), 6 + 3
+    assert len(CASES) == 1 + rules + 11 + laws + links + tensors + 3 * len(BOUNDARIES)
     assert rules >= 19 and laws >= 48
     assert {type(potential_of(name)).__name__ for name in CASES} == {
         *("SpringNetwork", "BiquadraticSprings", "VolumeSprings"),
-        *("FemPotential", "MeanDilatationPotential", "QuadraticPotential"),
+        *("FemPotential", "MeanDilatationPotential", "QuadraticPotential", "MetricPotential"),
+        *("HyperelasticLinks", "LinearTensors", "NonlinearTensors"),
     }
 
 
@@ -411,7 +466,7 @@ def test_one_element_or_spring_is_projected_to_the_nearest(seed: int) -> None:
         assert potential.projected_hessian(positions).toarray() == pytest.approx(nearest, abs=1e-12 * values[-1])
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", STRESSED)
 def test_a_given_stress_makes_the_geometric_part(name: str) -> None:
     """With the stress of the positions the Hessian is the true one; it is affine in the stress."""
     potential = potential_of(name)
@@ -434,7 +489,7 @@ def test_a_given_stress_makes_the_geometric_part(name: str) -> None:
             assert np.abs(hessian - material).max() == 0
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", STRESSED)
 def test_the_stress_is_carried_on_by_its_derivative(name: str) -> None:
     """Central differences along a step meet it with order 2, or exactly where the stress is quadratic."""
     potential = potential_of(name)
@@ -466,20 +521,23 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
     positions = deformed(potential.nodes, 31)
 
     def answers() -> list[Floats]:
-        assert isinstance(potential, Projectable) and isinstance(potential, Stressed)
-        stress = potential.stress(positions)
+        assert isinstance(potential, Projectable)
+        by_stress = []
+        if isinstance(potential, Stressed):
+            stress = potential.stress(positions)
+            by_stress = [stress, potential.extrapolated_stress(positions, positions)]
+            by_stress += [potential.hessian(positions, 2 * stress).toarray()]
         return [
+            *by_stress,
             np.array(potential.energy(positions)),
-            stress,
-            potential.extrapolated_stress(positions, positions),
             potential.gradient(positions),
-            potential.hessian(positions, 2 * stress).toarray(),
+            potential.hessian(positions).toarray(),
             potential.projected_hessian(positions).toarray(),
             *potential.cell_fields(positions).values(),
         ]
 
     at_once = answers()
-    for module in (fem, linked, volume):
+    for module in (fem, linked, mass_tensor, volume):
         monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
     monkeypatch.setattr(fem, "_SLICE_POINTS", 1)
     monkeypatch.setattr(potential_module, "_SLICE_BYTES", 1)

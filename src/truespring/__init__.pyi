@@ -36,6 +36,7 @@ from .models import MassTensor as MassTensor
 from .models import Moduli as Moduli
 from .models import SpringNetwork as SpringNetwork
 from .models import Springs as Springs
+from .models import Terzopoulos as Terzopoulos
 from .models import UserStiffness as UserStiffness
 from .models import judge as judge
 from .models import moduli as moduli

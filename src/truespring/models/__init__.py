@@ -20,6 +20,7 @@ from truespring.models.network import SpringNetwork as SpringNetwork
 from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness
 from truespring.models.springs import Springs as Springs
+from truespring.models.terzopoulos import Terzopoulos as Terzopoulos
 from truespring.models.volume import VolumeSprings as VolumeSprings
 from truespring.potential import Potential
 from truespring.problem import Problem

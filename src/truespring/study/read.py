@@ -34,6 +34,7 @@ from truespring.models import (
     Model,
     SpringNetwork,
     Springs,
+    Terzopoulos,
     UserStiffness,
     moduli,
     refuse_mechanism,
@@ -285,6 +286,8 @@ class _Builder:
                     model = Heml(table.law)
                 case schema.MassTensorTable():
                     model = MassTensor(table.law)
+                case schema.TerzopoulosTable():
+                    model = Terzopoulos(table.boundary)
                 case _:
                     model = _springs(table)
             model.potential(problem)  # what does not fit is said before anything is solved

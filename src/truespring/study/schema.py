@@ -342,6 +342,13 @@ class CalculixTable(Table):
         return self
 
 
+class TerzopoulosTable(Table):
+    """The metric-tensor model on a regular grid."""
+
+    kind: Literal["terzopoulos"]
+    boundary: Literal["paper", "trapezoid"] = "paper"
+
+
 class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
@@ -368,13 +375,14 @@ MODEL_KINDS: MappingProxyType[str, type[Table]] = MappingProxyType(
         "fem": FemTable,
         "heml": HemlTable,
         "mass-tensor": MassTensorTable,
+        "terzopoulos": TerzopoulosTable,
         "network": NetworkTable,
         "calculix": CalculixTable,
         "stl": StlTable,
     }
 )
 ModelTable = Annotated[
-    SpringsTable | FemTable | HemlTable | MassTensorTable | NetworkTable | CalculixTable | StlTable,
+    SpringsTable | FemTable | HemlTable | MassTensorTable | TerzopoulosTable | NetworkTable | CalculixTable | StlTable,
     Discriminator("kind"),
 ]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
