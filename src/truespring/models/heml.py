@@ -18,7 +18,8 @@ from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-_LAWS = tuple(name for name, law in LAWS.items() if law.finite)
+#: Laws that links can tell: those of finite strain.
+HEML_LAWS = tuple(name for name, law in LAWS.items() if law.finite)
 _SIMPLICES = ("triangle", "tetrahedron")
 
 
@@ -38,10 +39,11 @@ class Heml:
         if self.law == "linear":
             raise ModelError(
                 "law = 'linear': links know lengths, whose change is no linear strain; "
-                f"allowed: {', '.join(_LAWS)}; the linear law is that of fem and mass-tensor"
+                f"allowed: {', '.join(HEML_LAWS)}; the linear law is that of fem and mass-tensor"
             )
-        if self.law not in _LAWS:
-            raise ModelError(f"law = '{self.law}' is unknown{nearest(self.law, _LAWS)}; allowed: {', '.join(_LAWS)}")
+        if self.law not in HEML_LAWS:
+            close = nearest(self.law, HEML_LAWS)
+            raise ModelError(f"law = '{self.law}' is unknown{close}; allowed: {', '.join(HEML_LAWS)}")
 
     @property
     def label(self) -> str:

@@ -18,7 +18,7 @@ from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
 #: Laws whose energy is a polynomial of the displacements.
-_LAWS = ("linear", "saint-venant-kirchhoff")
+TENSOR_LAWS = ("linear", "saint-venant-kirchhoff")
 _SIMPLICES = ("triangle", "tetrahedron")
 # Threads share the elements, or the nodes, from so many on.
 _SMALLEST_PIECE = 256
@@ -37,13 +37,14 @@ class MassTensor:
     kind = "mass-tensor"
 
     def __post_init__(self) -> None:
-        if self.law in LAWS and self.law not in _LAWS:
+        if self.law in LAWS and self.law not in TENSOR_LAWS:
             raise ModelError(
                 f"law = '{self.law}': its energy is no polynomial of the displacements, which tensors need; "
-                f"allowed: {', '.join(_LAWS)}; this law is one of fem and heml"
+                f"allowed: {', '.join(TENSOR_LAWS)}; this law is one of fem and heml"
             )
-        if self.law not in _LAWS:
-            raise ModelError(f"law = '{self.law}' is unknown{nearest(self.law, _LAWS)}; allowed: {', '.join(_LAWS)}")
+        if self.law not in TENSOR_LAWS:
+            close = nearest(self.law, TENSOR_LAWS)
+            raise ModelError(f"law = '{self.law}' is unknown{close}; allowed: {', '.join(TENSOR_LAWS)}")
 
     @property
     def label(self) -> str:
