@@ -117,3 +117,43 @@ def stiffnesses(
                     for i in range(dim):
                         blocks[e, a * dim + i, a * dim + i] += 2 * pull[e, number[a, b]]
                         blocks[e, a * dim + i, b * dim + i] -= 2 * pull[e, number[a, b]]
+
+
+@kernel
+def strain(first: int, last: int, change: Any, strains: Any, result: Any) -> None:
+    """The change of C that goes with the change of the squared lengths, axes (component, element, 1)."""
+    for e in range(first, last):
+        for component in range(strains.shape[2]):
+            total = 0.0
+            for s in range(strains.shape[1]):
+                total += change[e, s] * strains[e, s, component]
+            result[component, e, 0] = total
+
+
+@kernel
+def work(first: int, last: int, stress: Any, works: Any, pull: Any) -> None:
+    """What a stress, axes (component, element, 1), makes of each squared length: the sum over its components."""
+    for e in range(first, last):
+        for s in range(works.shape[1]):
+            total = 0.0
+            for component in range(works.shape[2]):
+                total += works[e, s, component] * stress[component, e, 0]
+            pull[e, s] = total
+
+
+@kernel
+def couplings(first: int, last: int, elasticity: Any, works: Any, share: Any, coupling: Any) -> None:
+    """The sum of works_s D works_t times an element's share; D has axes (component, component, element, 1)."""
+    n_strains = works.shape[2]
+    row = np.empty(n_strains)
+    for e in range(first, last):
+        for s in range(works.shape[1]):
+            for two in range(n_strains):
+                row[two] = 0.0
+                for one in range(n_strains):
+                    row[two] += share[e] * works[e, s, one] * elasticity[one, two, e, 0]
+            for t in range(works.shape[1]):
+                total = 0.0
+                for two in range(n_strains):
+                    total += row[two] * works[e, t, two]
+                coupling[e, s, t] = total

@@ -20,6 +20,8 @@ from truespring.problem import Problem
 
 #: Laws that links can tell: those of finite strain.
 HEML_LAWS = tuple(name for name, law in LAWS.items() if law.finite)
+# Threads share the elements of a slice from so many on.
+_SMALLEST_PIECE = 256
 _SIMPLICES = ("triangle", "tetrahedron")
 
 
@@ -107,8 +109,13 @@ class HyperelasticLinks(LinkedElements):
 
     def _response(self, change: Floats, first: int = 0, last: int | None = None) -> Response:
         """What the law answers in a slice of the elements, axes (component, element, 1)."""
-        grown = np.matmul(change[first:last, None], self._work.strain[first:last])[:, 0].T[..., None]
+        from truespring.kernels import links
+        from truespring.kernels.threads import run, writable
+
         end = len(change) if last is None else last
+        strains = self._work.strain[first:end]
+        grown = np.empty((strains.shape[2], len(strains), 1))
+        run(links.strain, len(strains), writable(change[first:end]), strains, grown, smallest=_SMALLEST_PIECE)
         return LAWS[self.law].respond(identity(grown) + grown, self._fem.constants.part(first, end))
 
     def _energies(self, change: Floats) -> Floats:
@@ -149,8 +156,11 @@ class HyperelasticLinks(LinkedElements):
         return self._pattern.summed(positive)
 
     def _pulls(self, change: Floats) -> Floats:
-        stress = self._response(change).stress[..., 0]
-        return np.asarray(np.matmul(self._work.work, stress.T[..., None])[..., 0])
+        from truespring.kernels import links
+
+        pull = self._by_link()
+        self._run(links.work, self._response(change).stress, self._work.work, pull)
+        return pull
 
     def _carried_on(self, change: Floats, growth: Floats) -> Floats:
         coupled = np.matmul(self._couplings(change, 0, len(change)), growth[..., None])[..., 0]
@@ -158,10 +168,14 @@ class HyperelasticLinks(LinkedElements):
 
     def _couplings(self, change: Floats, first: int, last: int) -> Floats:
         """M = V/8 C_k : D : C_l."""
-        elasticity = np.moveaxis(self._response(change, first, last).elasticity()[..., 0], -1, 0)
-        work = self._work.work[first:last]
-        scaled = work / (2 * self._volumes[first:last, None, None])
-        return np.ascontiguousarray(work @ elasticity @ scaled.swapaxes(1, 2))
+        from truespring.kernels import links
+        from truespring.kernels.threads import run
+
+        works, share = self._work.work[first:last], 1 / (2 * self._volumes[first:last])
+        coupling = np.empty((len(works), works.shape[1], works.shape[1]))
+        known = (self._response(change, first, last).elasticity(), works, share)
+        run(links.couplings, len(works), *known, coupling, smallest=_SMALLEST_PIECE)
+        return coupling
 
     def _link_energies(self, change: Floats) -> Floats:
         """No law but the quadratic ones tells whose the energy is: its element's links have equal shares."""
