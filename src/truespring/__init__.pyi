@@ -29,6 +29,7 @@ from .mesh import read_voxels as read_voxels
 from .mesh import rectangle as rectangle
 from .models import LAWS as LAWS
 from .models import RULES as RULES
+from .models import BemSprings as BemSprings
 from .models import Fem as Fem
 from .models import Fitness as Fitness
 from .models import Heml as Heml

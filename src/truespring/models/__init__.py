@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from truespring.models.advice import model_warnings as model_warnings
+from truespring.models.bem_springs import BemSprings as BemSprings
 from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprings
 from truespring.models.fem import ELEMENTS as ELEMENTS
 from truespring.models.fem import Fem as Fem

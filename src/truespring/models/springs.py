@@ -135,10 +135,11 @@ class Springs:
         if self.coupled:
             check_rule(problem, str(self.rule), self._parameters)
             return BiquadraticSprings(problem)
-        network = self._network(problem, self.element_stiffness(problem))
+        network = self.network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
-    def _network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
+    def network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
+        """Return the springs of the given stiffness of each element's links [N/m], shape (n_elements, links)."""
         from truespring.kernels.sparsity import unique_pairs
         from truespring.kernels.threads import writable
 

@@ -28,6 +28,7 @@ from truespring.mesh import (
     select_elements,
 )
 from truespring.models import (
+    BemSprings,
     Fem,
     Heml,
     MassTensor,
@@ -288,6 +289,10 @@ class _Builder:
                     model = MassTensor(table.law)
                 case schema.TerzopoulosTable():
                     model = Terzopoulos(table.boundary)
+                case schema.BemSpringsTable():
+                    bem = BemSprings(table.block, table.rule, table.corotated)
+                    bem.check(problem)  # its potential takes long
+                    return bem
                 case _:
                     model = _springs(table)
             model.potential(problem)  # what does not fit is said before anything is solved

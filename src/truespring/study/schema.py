@@ -70,6 +70,8 @@ Acceleration = Annotated[float, _si("acceleration"), _quantity("acceleration")]
 Moment = Annotated[float, _si("moment"), _quantity("moment")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
 RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
+_PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
+PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
 LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
 FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
 PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
@@ -349,6 +351,15 @@ class TerzopoulosTable(Table):
     boundary: Literal["paper", "trapezoid"] = "paper"
 
 
+class BemSpringsTable(Table):
+    """A block of boundary elements, and springs beside it."""
+
+    kind: Literal["bem-springs"]
+    block: On
+    rule: PlainRuleName = "isotropic"
+    corotated: bool = False
+
+
 class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
@@ -376,13 +387,22 @@ MODEL_KINDS: MappingProxyType[str, type[Table]] = MappingProxyType(
         "heml": HemlTable,
         "mass-tensor": MassTensorTable,
         "terzopoulos": TerzopoulosTable,
+        "bem-springs": BemSpringsTable,
         "network": NetworkTable,
         "calculix": CalculixTable,
         "stl": StlTable,
     }
 )
 ModelTable = Annotated[
-    SpringsTable | FemTable | HemlTable | MassTensorTable | TerzopoulosTable | NetworkTable | CalculixTable | StlTable,
+    SpringsTable
+    | FemTable
+    | HemlTable
+    | MassTensorTable
+    | TerzopoulosTable
+    | BemSpringsTable
+    | NetworkTable
+    | CalculixTable
+    | StlTable,
     Discriminator("kind"),
 ]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]

@@ -1,0 +1,296 @@
+"""Boundary elements and springs: a block that is known by its surface, and springs everywhere else."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.errors import ModelError, nearest
+from truespring.loading import Gravity
+from truespring.mesh import Mesh, Selection, select_elements
+from truespring.models.block import inner_nodes, make_block
+from truespring.models.frames import AtRest, Frame, Tangent, Turning
+from truespring.models.network import SpringNetwork
+from truespring.models.rules import RULES, require_body
+from truespring.models.springs import Springs
+from truespring.potential import SparseMatrix
+from truespring.problem import Problem
+
+
+@dataclass(frozen=True)
+class BemSprings:
+    """A block of boundary elements beside springs, coupled at the nodes that they share.
+
+    The block is linear elastic material, known by its surface only (see `make_block`). All other elements carry the
+    springs of a rule; springs on the interface count what those elements give. The idea is that of Zhu and Gu,
+    "A hybrid deformable model for real-time surgical simulation" (2012), whose formulas for the coupling were not to be
+    had: this split in space is a reading of it for equilibrium.
+
+    Attributes:
+        block: the elements that are the block: an element group, a Box that holds their centres, or element numbers.
+        rule: of the springs, a key of RULES; none that couples them.
+        corotated: let the block turn as a whole, by the rotation that fits its surface best; else it takes a turn
+            for strain, as linear elasticity does.
+    """
+
+    block: Selection
+    rule: str = "isotropic"
+    corotated: bool = False
+
+    def __post_init__(self) -> None:
+        plain = [name for name, rule in RULES.items() if not rule.coupled]
+        if self.rule not in RULES:
+            raise ModelError(
+                f"rule = {self.rule!r} is unknown{nearest(str(self.rule), plain)}; allowed: {', '.join(plain)}"
+            )
+        if RULES[self.rule].coupled:
+            raise ModelError(
+                f"rule = '{self.rule}' couples its springs, which are then finite elements: beside a block there are "
+                f"plain springs; allowed: {', '.join(plain)}"
+            )
+
+    kind = "bem-springs"
+
+    @property
+    def label(self) -> str:
+        """How curves and tables call the model."""
+        return f"BEM + springs ({self.rule}{', corotated' if self.corotated else ''})"
+
+    def potential(self, problem: Problem) -> "BlockSprings":
+        """Return the block and the springs on the problem's mesh; raise ModelError where they do not go together."""
+        chosen, network = self._parts(problem)
+        block = make_block(problem, np.flatnonzero(chosen))
+        return BlockSprings(problem.mesh, chosen, network, Turning(block) if self.corotated else AtRest(block))
+
+    def check(self, problem: Problem) -> None:
+        """Raise ModelError where block and springs do not go together; quick, for nothing is integrated."""
+        self._parts(problem)
+
+    def _parts(self, problem: Problem) -> tuple[Bools, SpringNetwork]:
+        """Which elements are the block, shape (n_elements,), and the springs beside it."""
+        require_body(problem)
+        chosen = self._chosen(problem)
+        _refuse_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
+        return chosen, _springs_beside(problem, self.rule, chosen)
+
+    def _chosen(self, problem: Problem) -> Bools:
+        """Which elements are the block, shape (n_elements,)."""
+        mesh = problem.mesh
+        chosen = np.zeros(len(mesh.elements), dtype=bool)
+        chosen[select_elements(mesh, self.block)] = True
+        if chosen.all():
+            raise ModelError("block: all elements are in it, and none are left for springs: choose a part of the body")
+        several = np.unique(problem.material_numbers[chosen])
+        if len(several) > 1:
+            raise ModelError(
+                f"block: its elements are of {len(several)} materials, boundary elements know one: choose others"
+            )
+        _refuse_apart(mesh, chosen)
+        return chosen
+
+    def warnings(self, problem: Problem) -> tuple[str, ...]:
+        """Return what should be known before the model is solved: what its springs do not realise."""
+        from truespring.models.advice import model_warnings
+
+        return tuple(f"beside the block: {text}" for text in model_warnings(problem, Springs(self.rule)))
+
+
+def _refuse_apart(mesh: Mesh, chosen: Bools) -> None:
+    """Raise ModelError for a block in several parts, or one that no facet joins to the springs."""
+    nodes, elements = np.unique(mesh.elements[chosen], return_inverse=True)
+    n_parts = int(Mesh(mesh.nodes[nodes], elements.reshape(-1, mesh.kind.n_nodes), mesh.element).parts.max()) + 1
+    if n_parts > 1:
+        raise ModelError(f"block: it is in {n_parts} parts that do not touch each other: choose one of them")
+    facets, alone = mesh.facets_of(mesh.elements[chosen])
+    outside, outside_alone = mesh.facets_of(mesh.elements[~chosen])
+    mine = {tuple(facet) for facet in np.sort(facets[alone], axis=1).tolist()}
+    if mine.isdisjoint(tuple(facet) for facet in np.sort(outside[outside_alone], axis=1).tolist()):
+        raise ModelError(
+            "block: it has no facet in common with the elements beside it, so that no springs are joined to it: choose "
+            "elements that border on others"
+        )
+
+
+def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork:
+    """The springs of the elements that are not `chosen`, on nodes of their own."""
+    mesh = problem.mesh
+    springs = Springs(rule)
+    per_element = np.where(chosen[:, None], 0.0, springs.element_stiffness(problem))
+    network = springs.network(problem, per_element)
+    pairs = np.sort(mesh.elements[~chosen][:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
+    kept = np.isin(np.sort(network.springs, axis=1) @ [mesh.n_nodes, 1], pairs @ [mesh.n_nodes, 1])
+    return SpringNetwork(mesh.nodes, network.springs[kept], network.stiffness[kept])
+
+
+def _refuse_inside(problem: Problem, inside: Ints) -> None:
+    """Raise ModelError where something acts inside the block, which only its surface knows of."""
+    gravity = any(isinstance(load, Gravity) for load in problem.loads)
+    loading = problem.loading
+    loaded = np.flatnonzero(loading.external_force[inside].any(axis=1))
+    held = np.flatnonzero(loading.held[inside].any(axis=1))
+    if gravity or loaded.size:
+        where = "gravity acts" if gravity else f"a load acts at {loaded.size} nodes, first node {inside[loaded[0]]},"
+        raise ModelError(
+            f"block: {where} within it, and boundary elements know no force but on their surface: load the surface, or "
+            "choose another block"
+        )
+    if held.size:
+        raise ModelError(
+            f"block: a support holds {held.size} of its nodes inside, the first node {inside[held[0]]}: boundary "
+            "elements are held at their surface only; choose another block, or a support on the surface"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSprings:
+    """A block in its frame and the springs beside it, on the nodes of the mesh.
+
+    Attributes:
+        chosen: which elements are the block, shape (n_elements,).
+    """
+
+    mesh: Mesh
+    chosen: Bools
+    network: SpringNetwork
+    frame: Frame
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference positions [m], shape (n_nodes, dim)."""
+        return self.mesh.nodes
+
+    @property
+    def springs(self) -> Ints:
+        """Node numbers of the springs, shape (n_springs, 2)."""
+        return self.network.springs
+
+    @cached_property
+    def _pattern(self) -> "_Union":
+        return _Union(self)
+
+    def _local(self, positions: Floats) -> Floats:
+        """Positions of the block's nodes [m], those of its surface first."""
+        return positions[self.frame.block.numbers]
+
+    def _force(self, positions: Floats) -> Floats:
+        """Forces on what strains the block [N], shape (n_block, dim)."""
+        return self.frame.block.forces(self.frame.displacement(self._local(positions)))
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]."""
+        return self.network.energy(positions) + float(self._node_energies(positions).sum())
+
+    def _node_energies(self, positions: Floats) -> Floats:
+        """Half the work of the block's forces at each of its nodes [J], shape (n_block,)."""
+        moved = self.frame.displacement(self._local(positions))
+        return np.asarray((moved * self.frame.block.forces(moved)).sum(axis=1) / 2)
+
+    def stress(self, positions: Floats) -> Floats:
+        """Tension of the springs [N], then the block's forces in its frame [N], shape (n_springs + n_block * dim,)."""
+        return np.concatenate([self.network.stress(positions), self._force(positions).ravel()])
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """The stress carried on linearly along `step` [m], in N, shape (n_springs + n_block * dim,)."""
+        local, frame = self._local(positions), self.frame
+        further = frame.displacement(local) + frame.change(local, step[frame.block.numbers])
+        tension = self.network.extrapolated_stress(positions, step)
+        return np.concatenate([tension, frame.block.forces(further).ravel()])
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        force = self.network.gradient(positions)
+        force[self.frame.block.numbers] += self.frame.gradient(self._local(positions), self._force(positions))
+        return force
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
+        given = self.stress(positions) if stress is None else stress
+        tension, force = np.split(given, [len(self.springs)])
+        local = self._local(positions)
+        tangent = self.frame.tangent(local, force.reshape(local.shape))
+        return self._pattern.sum(self.network.hessian(positions, tension), tangent)
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """The projected springs, and the block without the geometric part of its frame [N/m]."""
+        local = self._local(positions)
+        tangent = self.frame.tangent(local, np.zeros_like(local))
+        return self._pattern.sum(self.network.projected_hessian(positions), tangent)
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Length over rest length of the springs, shape (n_springs,)."""
+        return self.network.stretch(positions)
+
+    @cached_property
+    def _edges(self) -> Ints:
+        """The edges of the block's elements, which are no springs, shape (n_edges, 2)."""
+        pairs = self.mesh.elements[self.chosen][:, np.array(self.mesh.kind.edges)].reshape(-1, 2)
+        return np.unique(np.sort(pairs, axis=1), axis=0)
+
+    @property
+    def cells(self) -> tuple[str, Ints]:
+        """The springs as lines, then the edges of the block's elements, shape (n_springs + n_edges, 2)."""
+        return "line", np.concatenate([self.springs, self._edges])
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each line.
+
+        Edges of the block have no tension and no stiffness; of its energy each takes the part of its two nodes, half
+        the work of the block's forces there, which may be negative and adds up to the whole.
+        """
+        block, edges = self.frame.block, self._edges
+        of_nodes = np.zeros(len(self.nodes))
+        of_nodes[block.numbers] = self._node_energies(positions)
+        of_nodes /= np.maximum(np.bincount(edges.ravel(), minlength=len(of_nodes)), 1)
+        now, rest = (np.linalg.norm(at[edges[:, 1]] - at[edges[:, 0]], axis=1) for at in (positions, self.nodes))
+        nothing = np.zeros(len(edges))
+        of_block = {
+            "tension": nothing,
+            "stretch": now / rest,
+            "stiffness": nothing,
+            "strain_energy": of_nodes[edges].sum(axis=1),
+        }
+        springs = self.network.cell_fields(positions)
+        return {name: np.concatenate([springs[name], values]) for name, values in of_block.items()}
+
+
+class _Union:
+    """The sparsity of the springs and the block together, built once."""
+
+    def __init__(self, potential: BlockSprings) -> None:
+        self.n_nodes, self.dim = potential.nodes.shape
+        of_springs = potential.network.hessian(potential.nodes)
+        rows = np.repeat(np.arange(self.n_nodes), np.diff(of_springs.indptr))
+        block = potential.frame.block
+        surface, inside = block.surface, block.inside
+        parts = [
+            self._keys(rows, of_springs.indices.astype(np.int64)),
+            self._keys(surface[:, None], surface).ravel(),
+            self._keys(surface[:, None], inside).ravel(),
+            self._keys(inside[:, None], surface).ravel(),
+            self._keys(inside, inside),
+        ]
+        keys = np.unique(np.concatenate(parts))
+        self._places = [np.searchsorted(keys, part) for part in parts]
+        self._columns = (keys % self.n_nodes).astype(np.int32)
+        self._starts = np.searchsorted(keys, np.arange(self.n_nodes + 1) * self.n_nodes).astype(np.int32)
+
+    def _keys(self, rows: Ints, columns: Ints) -> Ints:
+        return np.asarray(rows * self.n_nodes + columns)
+
+    def sum(self, springs: SparseMatrix, block: Tangent) -> SparseMatrix:
+        """Add the matrix of the springs and the tangent of the block."""
+        dim, size = self.dim, self.n_nodes * self.dim
+        values = np.zeros((len(self._columns), dim, dim))
+        within, across = block.surface.transpose(0, 2, 1, 3), block.inside.transpose(0, 2, 1, 3)
+        added = [
+            springs.data,
+            within,
+            across,
+            across.transpose(1, 0, 3, 2),
+            np.broadcast_to(block.alone * np.eye(dim), (across.shape[1], dim, dim)),
+        ]
+        for place, part in zip(self._places, added, strict=True):
+            values[place] += part.reshape(-1, dim, dim)
+        return sparse.bsr_array((values, self._columns, self._starts), shape=(size, size))

@@ -1,0 +1,139 @@
+"""A block of elastic material known by its surface: boundary elements condensed to a stiffness of its nodes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import ModelError
+from truespring.material import PlaneStress
+from truespring.memory import available_memory
+from truespring.mesh import Mesh
+from truespring.models.boundary import Influence, Kelvin
+from truespring.models.panels import Panels
+from truespring.models.rules import require_body
+from truespring.potential import rigid_body_modes
+from truespring.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A linear elastic block, in its own frame.
+
+    The energy of a displacement u of its nodes, at the surface u_s and inside u_i, is u_s . S u_s / 2 +
+    kappa/2 |u_i - W u_s|^2: S is the stiffness of the surface, W what Somigliana's identity makes of its displacement
+    at the nodes inside. These bear nothing: they follow the surface exactly, without a part in its balance.
+
+    Attributes:
+        surface, inside: numbers of the nodes of the mesh, shapes (n_surface,) and (n_inside,).
+        nodes: reference positions, those of the surface first [m], shape (n_surface + n_inside, dim).
+        stiffness: S [N/m], symmetric, its null space the rigid motions.
+        following: W [-], exact for rigid motions.
+        kappa: the mean of the diagonal of S [N/m].
+    """
+
+    surface: Ints
+    inside: Ints
+    nodes: Floats
+    stiffness: Floats
+    following: Floats
+    kappa: float
+
+    @property
+    def numbers(self) -> Ints:
+        """The nodes of the mesh in the order of `nodes`, shape (n,)."""
+        return np.concatenate([self.surface, self.inside])
+
+    @cached_property
+    def coupled(self) -> tuple[Floats, Floats]:
+        """The parts of the matrix of the energy between nodes of the surface, and from these to those inside [N/m]."""
+        W = self.following
+        return self.stiffness + self.kappa * (W.T @ W), -self.kappa * W.T
+
+    def forces(self, displacement: Floats) -> Floats:
+        """The derivative of the energy by a displacement [N], both of shape (n_nodes, dim, ...)."""
+        n, dim = len(self.surface), self.nodes.shape[1]
+        flat = displacement.reshape(len(displacement) * dim, -1)
+        at_surface, at_inside = flat[: n * dim], flat[n * dim :]
+        apart = self.kappa * (at_inside - self.following @ at_surface)
+        force = np.concatenate([self.stiffness @ at_surface - self.following.T @ apart, apart])
+        return np.asarray(force.reshape(displacement.shape))
+
+
+def inner_nodes(mesh: Mesh, elements: Ints) -> Ints:
+    """Return the nodes of some elements that are not on their surface, ascending."""
+    facets, alone = mesh.facets_of(mesh.elements[elements])
+    return np.setdiff1d(mesh.elements[elements], facets[alone])
+
+
+def make_block(problem: Problem, elements: Ints) -> Block:
+    """Return the block that some elements of one material are, by boundary elements on their surface.
+
+    With G t = H u at the middles of the panels, and M what a traction t on the panels gives to the nodes, the
+    stiffness is K = thickness M G^-1 H. It is symmetric but for the error of its discretisation: (K + K^T) / 2 is
+    taken, without what it does to rigid motions. Raises ModelError where that is not stable or does not fit in memory.
+    """
+    mesh = problem.mesh
+    _, section = require_body(problem)
+    facets, alone = mesh.facets_of(mesh.elements[elements])
+    facets = facets[alone]
+    surface = np.unique(facets)
+    inside = inner_nodes(mesh, elements)
+    panels = Panels(mesh.nodes[surface], np.searchsorted(surface, facets))
+    _refuse_too_large(panels, len(inside))
+    nodes = mesh.nodes[np.concatenate([surface, inside])]
+    material = problem.materials[problem.material_numbers[elements[0]]]
+    poisson = material.poisson / (1 + material.poisson) if isinstance(section, PlaneStress) else material.poisson
+    influence = Influence(panels, Kelvin(material.lame.mu, poisson, float(np.linalg.norm(np.ptp(nodes, axis=0)))))
+    G, H = influence.equations()
+    traction = np.asarray(np.linalg.solve(G, H), dtype=np.float64)
+    K = section.thickness * _at_nodes(influence, traction)
+    rigid = rigid_body_modes(nodes)
+    stiffness = _without_rigid((K + K.T) / 2, rigid[: len(K)])
+    following = np.zeros((len(inside) * mesh.dim, len(K)))
+    if len(inside):
+        U, T = influence.at(mesh.nodes[inside])
+        following = U @ traction - T
+        at_surface, at_inside = rigid[: len(K)], rigid[len(K) :]
+        following -= (following @ at_surface - at_inside) @ np.linalg.pinv(at_surface)
+    return Block(surface, inside, nodes, stiffness, following, float(np.diag(stiffness).mean()))
+
+
+def _at_nodes(influence: Influence, traction: Floats) -> Floats:
+    """Forces of the nodes of unit displacements [N/m per thickness] from the traction that each makes on the panels."""
+    panels, dim = influence.surface, influence.surface.dim
+    by_panel = traction.reshape(panels.n_panels, dim, -1)
+    force = np.zeros((len(panels.nodes), *by_panel.shape[1:]))
+    shares, corners = influence.shares(), panels.facets[panels.of]
+    for place in range(corners.shape[1]):
+        np.add.at(force, corners[:, place], shares[:, place, None, None] * by_panel)
+    return force.reshape(-1, by_panel.shape[2])
+
+
+def _without_rigid(stiffness: Floats, rigid: Floats) -> Floats:
+    """Take out what a symmetric matrix does to rigid motions; raise ModelError where the rest is not positive."""
+    basis = np.linalg.qr(rigid)[0]
+    projector = np.eye(len(basis)) - basis @ basis.T
+    projected = projector @ stiffness @ projector
+    projected = (projected + projected.T) / 2
+    try:
+        linalg.cholesky(projected + np.trace(projected) / len(projected) * (basis @ basis.T))
+    except linalg.LinAlgError:
+        raise ModelError(
+            "the boundary elements of the block are not stable: its facets are too coarse or too unequal; take finer "
+            "elements, or elements nearer to squares, cubes or regular simplices"
+        ) from None
+    return np.asarray(projected)
+
+
+def _refuse_too_large(panels: Panels, n_inside: int) -> None:
+    """Raise ModelError for dense matrices that do not fit in memory."""
+    n, n_surface = panels.n_panels * panels.dim, panels.nodes.size
+    needed = 8 * (2 * n * n + 4 * n * n_surface + 4 * n_surface**2 + n_inside * panels.dim * (n + 3 * n_surface))
+    if needed > available_memory():
+        raise ModelError(
+            f"the boundary elements of the block, {len(panels.facets):,} facets, need about {needed / 2**30:,.0f} GiB, "
+            f"{available_memory() / 2**30:,.1f} GiB are there: choose a smaller block or coarser elements"
+        )
