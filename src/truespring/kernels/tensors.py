@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.kernels.small import dot, minus, plus, put, row, times
+from truespring.kernels.small import dot, minus, plus, put, row, times, unsigned
 from truespring.kernels.threads import kernel
 
 
@@ -13,7 +13,8 @@ def _edges(i: int, here: Any, x: Any, rest: Any, starts: Any, columns: Any, tens
     """The sum of the tensors of a node's edges times the displacement of their far ends relative to its own."""
     total = zero
     for p in range(starts[i], starts[i + 1]):
-        there = minus(row(x, columns[p], zero), row(rest, columns[p], zero))
+        j = columns[unsigned(p)]
+        there = minus(row(x, j, zero), row(rest, j, zero))
         total = plus(total, times(tensors, p, minus(there, here), zero))
     return total
 

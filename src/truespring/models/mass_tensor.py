@@ -20,7 +20,7 @@ from truespring.problem import Problem
 #: Laws whose energy is a polynomial of the displacements.
 TENSOR_LAWS = ("linear", "saint-venant-kirchhoff")
 _SIMPLICES = ("triangle", "tetrahedron")
-# Threads share the elements, or the nodes, from so many on.
+# Threads share the simplices from so many on.
 _SMALLEST_PIECE = 256
 
 
@@ -113,7 +113,7 @@ class LinearTensors(_Tensors):
         from truespring.kernels.threads import run
 
         known = self._known(positions)
-        return float(sum(run(tensors.edge_energy, len(positions), *known, self._zero, smallest=_SMALLEST_PIECE)))
+        return float(sum(run(tensors.edge_energy, len(positions), *known, self._zero)))
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
@@ -121,7 +121,7 @@ class LinearTensors(_Tensors):
         from truespring.kernels.threads import run
 
         force, known = np.empty(positions.shape), self._known(positions)
-        run(tensors.edge_forces, len(positions), *known, force, self._zero, smallest=_SMALLEST_PIECE)
+        run(tensors.edge_forces, len(positions), *known, force, self._zero)
         return force
 
     def _known(self, positions: Floats) -> tuple[Floats, Floats, ShortInts, ShortInts, Floats]:
