@@ -101,8 +101,29 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ("models.springs", "isotropic lattices", "biquadratic"),
     ),
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
+    "links of the linear law": (
+        ('kind = "fem"', 'kind = "heml"'),
+        ("models.linear", "no linear strain", "mass-tensor"),
+    ),
+    "neo-Hookean links of squares": (
+        ('kind = "fem"\nlaw = "linear"', 'kind = "heml"\nlaw = "neo-hookean"'),
+        ("models.linear", "triangle and tetrahedron", "saint-venant-kirchhoff", "kind = 'fem'"),
+    ),
+    "tensors of squares": (
+        ('kind = "fem"\nlaw = "linear"', 'kind = "mass-tensor"\nlaw = "saint-venant-kirchhoff"'),
+        ("models.linear", "kind = 'heml'", "law = 'linear'"),
+    ),
+    "tensors of a logarithm": (
+        ('kind = "fem"\nlaw = "linear"', 'kind = "mass-tensor"\nlaw = "neo-hookean"'),
+        ("models.linear", "no polynomial"),
+    ),
+    "links without a law": (('kind = "fem"\nlaw = "linear"', 'kind = "heml"'), ("models.linear.law", "missing")),
+    "links that are incompressible": (
+        ("poisson = 0.3", 'poisson = 0.5\n[models.links]\nkind = "heml"\nlaw = "saint-venant-kirchhoff"'),
+        ("material", "0.5", "between -1 and 0.5"),
+    ),
     "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
-    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, network, ")),
+    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, heml, ")),
     "decimal comma": (('["0 N", "-0.01 N"]', '["0 N", "-0,01 N"]'), ("load.1.force.2", "-0,01 N", "comma")),
     "blank in a number": (('["0 N", "-0.01 N"]', '["0 N", "1 000 N"]'), ("load.1.force.2", "1 000 N")),
     "arithmetic in a number": (('["0 N", "-0.01 N"]', '["0 N", "9**9**9 N"]'), ("load.1.force.2", "9**9**9 N")),
