@@ -13,10 +13,12 @@ from tests.closed_forms import principal_state
 from tests.studies import changed, written
 from tests.test_biquadratic import PLANE, ROUNDING, apart, body, random_mesh
 from tests.test_fem import GRADIENTS, TIGHT, distorted, in_section, patch
+from tests.test_report import words
 from truespring.arrays import Floats
 from truespring.models import Model
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS
+from truespring.report.figures import draw_figures
 from truespring.study import plan, read_study, run, write
 
 SIMPLICES, OTHERS = ("triangle", "tetrahedron"), ("quadrilateral", "hexahedron")
@@ -310,6 +312,8 @@ def test_a_study_of_them(tmp_path: Path) -> None:
     assert apart(ends["sums"], ends["tensors"]) > 1e-3
     write(result, tmp_path / "out")
     page = (tmp_path / "out" / "study" / "report.html").read_text(encoding="utf-8")
+    drawn = words(draw_figures(result)["undeformed"])
+    assert any(text.endswith(" 58 links") for text in drawn) and "links" in drawn and "springs" not in drawn
     for label in ("HEML (St. Venant-Kirchhoff)", "HEML (neo-Hookean)", "mass-tensor (linear)"):
         assert label in page
     assert (tmp_path / "out" / "study" / "rubber.pvd").exists()

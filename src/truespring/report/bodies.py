@@ -30,6 +30,11 @@ def spring_lines(path: Path) -> Ints | None:
     return springs
 
 
+def spring_word(path: Path) -> str:
+    """Return what these are called."""
+    return "links" if path.kind == "heml" else "springs"
+
+
 def path_lines(path: Path) -> Ints:
     """Return the pairs of nodes that a path is drawn by: its springs, else the edges of its elements, shape (n, 2)."""
     springs = spring_lines(path)
@@ -229,12 +234,12 @@ def undeformed_figure(result: Result) -> Sheet:
     arrows = find_arrows(result, size)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    springs = spring_lines(model) is not None
+    springs, called = spring_lines(model) is not None, spring_word(model)
     legend = [Entry("elements", INK)] if mesh.element != "line" else []
-    legend += [Entry("springs", BLUE)] if springs else []
+    legend += [Entry(called, BLUE)] if springs else []
     legend += [Entry("probe", RED, "o", "")]
     title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
-    title += f", {len(path_lines(model))} springs" if springs else ""
+    title += f", {len(path_lines(model))} {called}" if springs else ""
     area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":
         _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")

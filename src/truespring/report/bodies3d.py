@@ -11,7 +11,15 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.report.bar import Bar, bar_of
-from truespring.report.bodies import as_asked, magnification, over_title, path_lines, picture_box, spring_lines
+from truespring.report.bodies import (
+    as_asked,
+    magnification,
+    over_title,
+    path_lines,
+    picture_box,
+    spring_lines,
+    spring_word,
+)
 from truespring.report.frame3d import Picture
 from truespring.report.legend import Entry
 from truespring.report.lines import draw_lines
@@ -36,7 +44,7 @@ def undeformed_picture(result: Result) -> Picture:
     """The body as it is asked for: mesh, springs, supports, loads and the probe."""
     mesh = result.problem.mesh
     model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
-    springs = spring_lines(model)
+    springs, called = spring_lines(model), spring_word(model)
     size = float((mesh.upper - mesh.lower).max())
     points, facets = seen(mesh.nodes), facets_of(mesh)
     arrows = find_arrows(result, size, lambda places: seen(places)[:, :2])
@@ -48,9 +56,9 @@ def undeformed_picture(result: Result) -> Picture:
     elif not len(facets):
         layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
     title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
-    title += f", {len(springs)} springs" if springs is not None else ""
+    title += f", {len(springs)} {called}" if springs is not None else ""
     legend = [Entry("elements", INK)] if len(facets) else []
-    legend += [Entry("springs", BLUE)] if springs is not None else []
+    legend += [Entry(called, BLUE)] if springs is not None else []
     taken = np.concatenate([_spots(points, facets, mesh.edges), *(np.stack([*one.ends, one.room]) for one in arrows)])
 
     def marks(area: Area, scale: Scale) -> None:
