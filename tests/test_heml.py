@@ -256,6 +256,14 @@ def test_elements_that_do_not_go_are_refused(element: str) -> None:
         ts.MassTensor(SAME).potential(problem)
 
 
+@pytest.mark.parametrize("model", [ts.Heml(SAME), ts.MassTensor("linear")])
+def test_a_plain_network_is_refused(model: ts.Heml | ts.MassTensor) -> None:
+    network = ts.SpringNetwork([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1], [1, 2]], [1.0, 1.0])
+    problem = ts.Problem(network.mesh, supports=[ts.Fixed([0, 2])], loads=[ts.Force([1], (0.0, -0.1))])
+    with pytest.raises(ts.TruespringError, match="need a material, a section and elements of a kind"):
+        model.potential(problem)
+
+
 def test_locking_is_told() -> None:
     section = {"plane strain": True, "plane stress": False}
     for name, locks in section.items():

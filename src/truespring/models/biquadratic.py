@@ -27,8 +27,12 @@ class BiquadraticSprings(LinkedElements):
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""
+        from truespring.kernels import vectors
+        from truespring.kernels.threads import run
+
         change = self._changes(positions)
-        return float(np.vdot(change, self._pulls(change))) / 2
+        pull = self._pulls(change)
+        return float(sum(run(vectors.scalar_product, change.size, change.ravel(), pull.ravel()))) / 2
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """The Hessian without what compressed links add to its geometric part, positive semidefinite [N/m]."""

@@ -59,6 +59,7 @@ class Heml:
     def potential(self, problem: Problem) -> LinkedElements:
         """Return the potential on the problem's mesh; raise ModelError for a law that does not fit its elements."""
         element = problem.mesh.element
+        fem_potential(problem, self.law)  # refuses what is no continuum, such as a plain network
         if self.law == "saint-venant-kirchhoff":
             return BiquadraticSprings(problem)
         if element not in _SIMPLICES:
