@@ -15,10 +15,12 @@ from truespring.arrays import Bools, Floats
 from truespring.memory import slices
 from truespring.models.panels import Panels, Patch
 
-# Gauss points a direction: on panels nearby, and on those further from a point than so many times their radius.
-_NEAR, _FAR, _FAR_AWAY = {2: 24, 3: 12}, {2: 8, 3: 4}, {2: 6.0, 3: 4.0}
-# Points a direction of the triangles from the middle of a panel to its edges, for the panel's action on itself.
-_OWN = 12
+# Gauss points a direction on panels that are nearer to a point than so many times their radius, in the plane and in
+# space: their error is some 1e-14 and 1e-8.
+_LEVELS = {
+    2: ((2.0, 24), (6.0, 12), (np.inf, 8)),
+    3: ((1.3, 20), (2.2, 12), (4.0, 6), (10.0, 4), (np.inf, 3)),
+}
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,7 @@ class Influence:
 
     def __init__(self, surface: Panels, kelvin: Kelvin) -> None:
         self.surface, self.kelvin = surface, kelvin
-        self._near = surface.gauss(_NEAR[surface.dim])
-        self._far = surface.gauss(_FAR[surface.dim])
+        self._levels = [(reach, surface.gauss(n)) for reach, n in _LEVELS[surface.dim]]
 
     def at(self, points: Floats, own: bool = False) -> tuple[Floats, Floats]:
         """Return the integrals of U over the panels and of T times the nodes' functions at points [m], shape (n, dim).
@@ -80,14 +81,15 @@ class Influence:
         for part in slices(n, 8 * surface.n_panels * (at_nodes.shape[1] + 1) * 3 * dim**2):
             here = points[part]
             apart = np.linalg.norm(middles - here[:, None], axis=2)
-            near = apart < _FAR_AWAY[dim] * surface.radii
-            itself = np.zeros_like(near)
+            left = np.ones(apart.shape, dtype=bool)
             if own:
-                itself[np.arange(len(here)), np.arange(part.start, part.start + len(here))] = True
-            u = np.zeros((*near.shape, dim, dim))
-            h = np.zeros((*near.shape, at_nodes.shape[1], dim, dim))
-            for patch, chosen in ((self._far, ~near), (self._near, near & ~itself)):
+                left[np.arange(len(here)), np.arange(part.start, part.start + len(here))] = False
+            u = np.zeros((*apart.shape, dim, dim))
+            h = np.zeros((*apart.shape, at_nodes.shape[1], dim, dim))
+            for reach, patch in self._levels:
+                chosen = left & (apart < reach * surface.radii)
                 self._integrate(patch, here, chosen, u, h)
+                left &= ~chosen
             U[part] = u.swapaxes(1, 2)
             for corner in range(at_nodes.shape[1]):
                 spread = h[:, :, corner].transpose(1, 0, 2, 3)
@@ -141,7 +143,7 @@ class Influence:
             linear = (1 - 2 * kelvin.poisson) / (4 * math.pi * (1 - kelvin.poisson)) * (turned - turned.swapaxes(1, 2))
             slope = np.stack([-length / whole, length / whole], axis=1)
             return u, slope[:, :, None, None] * linear[:, None]
-        patch = surface.around_middles(_OWN)
+        patch = surface.around_middles()
         across = patch.places - middles.places
         u = np.einsum("nq,nqij->nij", patch.measures, kelvin.displacement(across))
         weighted = (patch.shape - middles.shape) * patch.measures[..., None]
@@ -149,4 +151,5 @@ class Influence:
 
     def shares(self) -> Floats:
         """Return what a unit traction on a panel gives to its facet's corners [m, m^2], shape (n_panels, corners)."""
-        return np.asarray((self._far.shape * self._far.measures[..., None]).sum(axis=1))
+        patch = self._levels[0][1]
+        return np.asarray((patch.shape * patch.measures[..., None]).sum(axis=1))

@@ -8,6 +8,10 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 
+# Points of the triangles from the middle of a panel to its edges: outward, where what is integrated is a polynomial on
+# flat panels, and along the edge.
+_OUTWARD, _AROUND = 4, 28
+
 
 @dataclass(frozen=True, eq=False)
 class Patch:
@@ -116,11 +120,11 @@ class Panels:
             )
         return self._patch(*_collapsed(first, second, last, s, t, both))
 
-    def around_middles(self, n: int) -> Patch:
+    def around_middles(self) -> Patch:
         """Return points of the triangles from the middle of each panel to its edges, dense towards the middle."""
-        x, w = _unit_gauss(n)
-        s, t = (one.ravel() for one in np.meshgrid(x, x, indexing="ij"))
-        both, pieces = np.outer(w, w).ravel(), self._pieces
+        (x, w), (y, v) = _unit_gauss(_OUTWARD), _unit_gauss(_AROUND)
+        s, t = (one.ravel() for one in np.meshgrid(x, y, indexing="ij"))
+        both, pieces = np.outer(w, v).ravel(), self._pieces
         middle, following = pieces.mean(axis=1)[:, None], np.roll(pieces, -1, axis=1)
         parts = [
             _collapsed(middle, pieces[:, k, None], following[:, k, None], s, t, both) for k in range(pieces.shape[1])
