@@ -12,7 +12,19 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"study", "report"},
+    "cli": {"study", "report", "table1"},
+    "table1": {
+        "report",
+        "comparison",
+        "equilibrium",
+        "models",
+        "solvers",
+        "potential",
+        "problem",
+        "loading",
+        "mesh",
+        "material",
+    },
     "study": {
         "report",
         "comparison",

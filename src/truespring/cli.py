@@ -100,6 +100,11 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--model", metavar="NAME", help="default: the compared model, or the first springs")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     add("check", _check, "check a study and show what would be run, solving nothing")
+    verb = add(
+        "table1", _table1, "measure the paper's Table 1: six methods on one body, beside its signs", studies=False
+    )
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    verb.add_argument("--dim", type=int, choices=(2, 3), help="in the plane or in space only; default: both")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
@@ -337,6 +342,23 @@ def _rules(options: argparse.Namespace) -> int:
     _console(options).print(rules_table(rules))
     if options.json:
         _print_json(rules)
+    return CONVERGED
+
+
+def _table1(options: argparse.Namespace) -> int:
+    from truespring.table1 import measure_table, write_table
+
+    with _writing(options.out):
+        options.out.mkdir(parents=True, exist_ok=True)
+    dims = (2, 3) if options.dim is None else (options.dim,)
+    with _progress(options) as progress:
+        advance = None if progress is None else lambda what, share: progress("table1", what, share)
+        table = measure_table(dims, progress=advance)
+    with _writing(options.out):
+        page = write_table(table, options.out)
+    _console(options).print(f"table: {page}", soft_wrap=True)
+    if options.json:
+        _print_json(table)
     return CONVERGED
 
 

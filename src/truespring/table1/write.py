@@ -1,0 +1,23 @@
+"""What `truespring table1` leaves: the figures as JSON, the page, its pictures."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from truespring.table1.figure import files
+from truespring.table1.page import page
+
+
+def write_table(table: Mapping[str, Any], folder: Path) -> Path:
+    """Write table1.json, table1.md and a figure for each dimension as PNG and SVG into a folder; return the page."""
+    (folder / "table1.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    figures = {}
+    for dim in sorted({row["dim"] for row in table["rows"]}):
+        png, svg = files(table, dim)
+        figures[dim] = f"table1_{dim}d.svg"
+        (folder / figures[dim]).write_bytes(svg)
+        (folder / f"table1_{dim}d.png").write_bytes(png)
+    written = folder / "table1.md"
+    written.write_text(page(table, figures), encoding="utf-8")
+    return written
