@@ -16,8 +16,10 @@ from truespring.models.bem_springs import BlockSprings
 from truespring.models.block import Block, make_block
 from truespring.models.boundary import Influence, Kelvin
 from truespring.models.elasticity import hooke
+from truespring.models.frames import Turning
 from truespring.models.panels import Panels
 from truespring.potential import rigid_body_modes
+from truespring.report.bodies import path_lines
 from truespring.study import read_study, run
 from truespring.study.run import plan, write
 
@@ -310,6 +312,19 @@ def test_small_turns_need_no_frame() -> None:
     assert ends[0][1] == pytest.approx(ends[1][1], rel=1e-5)
 
 
+@pytest.mark.parametrize("name", ["squares", "cubes"])
+def test_a_mirror_image_is_no_turn(name: str) -> None:
+    """The frame turns; turned inside out the block is strained."""
+    block = whole(body(BODIES[name]))
+    frame = Turning(block)
+    mirror = np.eye(block.nodes.shape[1])
+    mirror[0, 0] = -1.0
+    for positions in (block.nodes @ mirror, block.nodes @ (0.9 * mirror)):
+        moved = frame.displacement(positions)
+        assert np.linalg.norm(moved) > 0.1 * np.linalg.norm(block.nodes)
+    assert np.linalg.norm(frame.displacement(block.nodes @ (mirror @ mirror).T)) < 1e-12
+
+
 @pytest.mark.verification
 def test_a_block_in_space() -> None:
     """16 by 4 by 4 cubes, half of them a block: the linear end within 1 %, and what turning takes of the error."""
@@ -428,6 +443,10 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
     assert result.converged
     assert 0 < result.comparisons["linear"].rms_error < 0.15  # of which FEM on so coarse a mesh has most
     write(result, tmp_path / "out", report=False)
+    springs = result.paths["springs"].potential
+    assert isinstance(springs, BlockSprings)
+    drawn = path_lines(result.paths["springs"])
+    assert len(drawn) > len(springs.springs) and set(drawn.ravel().tolist()) == set(range(27))
     kinds = json.loads((tmp_path / "out" / "study" / "summary.json").read_text("utf-8"))["models"]
     assert kinds["springs"]["kind"] == "bem-springs"
     assert (tmp_path / "out" / "study" / "springs.pvd").exists()

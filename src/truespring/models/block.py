@@ -91,7 +91,7 @@ def make_block(problem: Problem, elements: Ints) -> Block:
     traction = np.asarray(np.linalg.solve(G, H), dtype=np.float64)
     K = section.thickness * _at_nodes(influence, traction)
     rigid = rigid_body_modes(nodes)
-    stiffness = _without_rigid((K + K.T) / 2, rigid[: len(K)])
+    stiffness = _symmetric(K, rigid[: len(K)])
     following = np.zeros((len(inside) * mesh.dim, len(K)))
     if len(inside):
         U, T = influence.at(mesh.nodes[inside])
@@ -112,8 +112,8 @@ def _at_nodes(influence: Influence, traction: Floats) -> Floats:
     return force.reshape(-1, by_panel.shape[2])
 
 
-def _without_rigid(stiffness: Floats, rigid: Floats) -> Floats:
-    """Take out what a symmetric matrix does to rigid motions; raise ModelError where the rest is not positive."""
+def _symmetric(stiffness: Floats, rigid: Floats) -> Floats:
+    """The symmetric part without what it does to rigid motions; raise ModelError where that is not positive."""
     basis = np.linalg.qr(rigid)[0]
     projector = np.eye(len(basis)) - basis @ basis.T
     projected = projector @ stiffness @ projector

@@ -131,7 +131,11 @@ class Turning:
         left[:, -1] *= np.sign(np.linalg.det(left @ right))
         R = left @ right
         S = R.T @ M
-        flexibility = np.asarray(np.linalg.inv(self._resistance(S)), dtype=np.float64)
+        resistance = self._resistance(S)
+        try:
+            flexibility = np.asarray(np.linalg.inv(resistance), dtype=np.float64)
+        except np.linalg.LinAlgError:  # a block turned inside out may have no nearest rotation
+            flexibility = np.full_like(resistance, np.nan)
         rates = np.einsum("kl,lij,aj->kai", flexibility, R @ spins, X)
         return _Turned(R, x @ R, rates, flexibility, S)
 

@@ -10,6 +10,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State
 from truespring.mesh import Mesh
+from truespring.potential import Visible
 from truespring.report.bar import BAR, Bar, bar_of, draw_error_bar
 from truespring.report.frame import draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
@@ -36,9 +37,14 @@ def spring_word(path: Path) -> str:
 
 
 def path_lines(path: Path) -> Ints:
-    """Return the pairs of nodes that a path is drawn by: its springs, else the edges of its elements, shape (n, 2)."""
-    springs = spring_lines(path)
-    return path.problem.mesh.edges if springs is None else springs
+    """Return the pairs of nodes that a path is drawn by, shape (n, 2).
+
+    Its springs, with the edges of elements that have none beside them; of a path without springs those of all elements.
+    """
+    if spring_lines(path) is None:
+        return path.problem.mesh.edges
+    assert isinstance(path.potential, Visible)  # as all that have springs are
+    return path.potential.cells[1]
 
 
 def magnification(result: Result) -> float:
@@ -234,17 +240,17 @@ def undeformed_figure(result: Result) -> Sheet:
     arrows = find_arrows(result, size)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    springs, called = spring_lines(model) is not None, spring_word(model)
+    springs, called = spring_lines(model), spring_word(model)
     legend = [Entry("elements", INK)] if mesh.element != "line" else []
-    legend += [Entry(called, BLUE)] if springs else []
+    legend += [Entry(called, BLUE)] if springs is not None else []
     legend += [Entry("probe", RED, "o", "")]
     title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
-    title += f", {len(path_lines(model))} {called}" if springs else ""
+    title += f", {len(springs)} {called}" if springs is not None else ""
     area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":
         _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
-    if springs:
-        _lines(area, mesh.nodes / scale.size, path_lines(model), BLUE, 0.6, 3, "springs")
+    if springs is not None:
+        _lines(area, mesh.nodes / scale.size, springs, BLUE, 0.6, 3, "springs")
     _supports(area, result, scale, 0.028 * size)
     for arrow in arrows:
         draw_loaded(area, mesh.nodes[arrow.nodes] / scale.size, arrow.color)

@@ -36,11 +36,10 @@ def _lines(path: Path) -> tuple[Ints, Ints]:
     none = np.zeros((0, 2), dtype=np.int64)
     if not len(facets):
         return lines, none
-    springs = spring_lines(path)
-    if springs is None:
+    if spring_lines(path) is None:
         return edges_of(facets), none
-    on, _ = lines_on(facets, springs)
-    return springs[on], springs[~on] if len(springs) < _MOST_SPRINGS else none
+    on, _ = lines_on(facets, lines)
+    return lines[on], lines[~on] if len(lines) < _MOST_SPRINGS else none
 
 
 def surface_in_scene(mesh: Mesh, pack: Packing) -> dict[str, Any]:
