@@ -54,7 +54,14 @@ def distorted(mesh: ts.Mesh) -> ts.Mesh:
     return ts.Mesh(mesh.nodes + jitter, mesh.elements, mesh.element)
 
 
+def ring() -> ts.Mesh:
+    """Squares about a hole."""
+    mesh = ts.rectangle((5.0, 3.0), (5, 3))
+    return ts.Mesh(mesh.nodes, np.delete(mesh.elements, 7, axis=0), mesh.element)
+
+
 PLANE = {
+    "ring": ring(),
     "squares": ts.rectangle((8.0, 4.0), (8, 4)),
     "distorted": distorted(ts.rectangle((5.0, 3.0), (5, 3))),
     "triangles": ts.rectangle((4.0, 3.0), (4, 3), "triangle", "alternating"),
