@@ -72,6 +72,12 @@ class AtRest:
         return Tangent(*_coupled(self.block), self.block.kappa)
 
 
+def _turned_by(rotation: Floats, blocks: Floats) -> Floats:
+    """Blocks R A R^T of a matrix, of shape (n, dim, m, dim)."""
+    n, dim, m, _ = blocks.shape
+    return (rotation @ blocks.reshape(n, dim, m * dim)).reshape(n, dim, m, dim) @ rotation.T
+
+
 def _coupled(block: Block) -> tuple[Floats, Floats]:
     n, dim = len(block.surface), block.nodes.shape[1]
     surface, inside = block.coupled
@@ -169,18 +175,18 @@ class Turning:
         """The stiffness turned with the frame and through its spins, and the forces times the second derivatives."""
         at = self._turned(positions)
         R, rates, n = at.rotation, at.rates, at.rates.shape[1]
-        surface, inside = (np.einsum("pi,aibj,qj->apbq", R, one, R, optimize=True) for one in _coupled(self.block))
+        surface, inside = (_turned_by(R, one) for one in _coupled(self.block))
         swung = self._swung(at.arms)
         resisting = self.block.forces(swung)
         of_spins = np.einsum("aik,ail->kl", swung, resisting)
         beside = np.einsum("ij,ajk->kai", R, resisting) + np.einsum("kij,aj->kai", R @ self._spins, force)
         half = beside[:, :n] + np.einsum("kl,lai->kai", of_spins, rates) / 2
-        both = np.einsum("kai,kbj->aibj", rates, half)
+        both = np.tensordot(rates, half, axes=(0, 0))
         surface += both + both.transpose(2, 3, 0, 1)
         X = self._at_rest[:n]
         curvature = self._curvature(at, at.arms.T @ force)
-        surface += np.einsum("aj,ijkl,bl->aibk", X, curvature, X, optimize=True)
-        inside += np.einsum("kai,kbj->aibj", rates, beside[:, n:])
+        surface += np.tensordot(X, np.einsum("ijkl,bl->jibk", curvature, X), axes=(1, 0))
+        inside += np.tensordot(rates, beside[:, n:], axes=(0, 0))
         return Tangent(surface, inside, self.block.kappa)
 
     def _curvature(self, at: _Turned, turned: Floats) -> Floats:

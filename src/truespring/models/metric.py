@@ -1,16 +1,19 @@
 """The energy of the change of the metric tensor on a regular grid: squares of products of finite differences."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
-from truespring.memory import slices
+from truespring.arrays import Floats, Ints, ShortInts
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
+
+# Threads share the cells from so many on.
+_SMALLEST_PIECE = 64
 
 
 class Component(NamedTuple):
@@ -39,7 +42,7 @@ class MetricPotential:
     2 w dq dq^T and p times that of the product, which is constant.
 
     Attributes:
-        cells: nodes of each cell, corners in the order of `components`, shape (n_cells, 4 or 8).
+        cells_by_corner: nodes of each cell, corners in the order of `components`, shape (n_cells, 4 or 8).
         weights: [J/m^4], shape (n_cells, n_products), in the order of `components`.
     """
 
@@ -57,28 +60,22 @@ class MetricPotential:
         return Pattern(self.cells_by_corner, *self.nodes.shape)
 
     @cached_property
-    def _differences(self) -> tuple[Floats, Floats]:
-        """What the corners give to the two differences of each product, both of shape (n_products, corners)."""
-        eye = np.eye(self.cells_by_corner.shape[1])
+    def _ends(self) -> Ints:
+        """The corners of each product of differences: where both lead from, and where each leads to."""
         parts = components(self.nodes.shape[1])
-        first = [eye[one.corners + 2**one.i] - eye[one.corners] for one in parts]
-        second = [eye[one.corners + 2**one.j] - eye[one.corners] for one in parts]
-        return np.concatenate(first), np.concatenate(second)
+        ends = [np.stack([one.corners, one.corners + 2**one.i, one.corners + 2**one.j], axis=1) for one in parts]
+        return np.concatenate(ends)
 
-    @cached_property
-    def _curvature(self) -> Floats:
-        """Second derivative of each product along one direction, shape (n_products, corners^2)."""
-        first, second = self._differences
-        both = np.einsum("sa,sb->sab", first, second)
-        return np.asarray((both + both.swapaxes(1, 2)).reshape(len(first), -1))
+    def _run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
+        """Run a kernel over all cells."""
+        from truespring.kernels.threads import run
 
-    def _taken(self, positions: Floats, part: slice) -> tuple[Floats, Floats]:
-        """The two differences of each product of some cells [m], both of shape (n, n_products, dim)."""
-        at = positions[self.cells_by_corner[part]]
-        return self._differences[0] @ at, self._differences[1] @ at
+        run(kernel, len(self.weights), *arguments, self._pattern.zero, smallest=_SMALLEST_PIECE)
 
-    def _slices(self) -> list[slice]:
-        return list(slices(len(self.cells_by_corner), 64 * self.weights.shape[1] * self.nodes.shape[1]))
+    @property
+    def _place(self) -> tuple[ShortInts, Ints]:
+        """What kernels ask of the cells: their nodes, and the corners of the products."""
+        return self._pattern.elements, self._ends
 
     @cached_property
     def _at_rest(self) -> Floats:
@@ -86,10 +83,11 @@ class MetricPotential:
         return self._products(self.nodes)
 
     def _products(self, positions: Floats) -> Floats:
+        from truespring.kernels import metric
+        from truespring.kernels.threads import writable
+
         found = np.empty(self.weights.shape)
-        for part in self._slices():
-            first, second = self._taken(positions, part)
-            found[part] = (first * second).sum(axis=2)
+        self._run(metric.products, writable(positions), *self._place, found)
         return found
 
     def energy(self, positions: Floats) -> float:
@@ -105,50 +103,48 @@ class MetricPotential:
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
         """The stress carried on linearly along `step` [m], in N/m, shape (n_cells, n_products)."""
-        stress = self.stress(positions)
-        for part in self._slices():
-            (first, second), (more, other) = self._taken(positions, part), self._taken(step, part)
-            stress[part] += 2 * self.weights[part] * (first * other + more * second).sum(axis=2)
-        return stress
+        from truespring.kernels import metric
+        from truespring.kernels.threads import writable
+
+        growth = np.empty(self.weights.shape)
+        self._run(metric.growths, writable(positions), writable(step), *self._place, growth)
+        return self.stress(positions) + 2 * self.weights * growth
 
     def gradient(self, positions: Floats) -> Floats:
         """Internal force [N], shape (n_nodes, dim)."""
-        stress, force = self.stress(positions), np.empty((*self.cells_by_corner.shape, self.nodes.shape[1]))
-        one, other = self._differences
-        for part in self._slices():
-            first, second = self._taken(positions, part)
-            pull = stress[part, :, None]
-            force[part] = one.T @ (pull * second) + other.T @ (pull * first)
-        return self._pattern.vector(force.reshape(len(force), -1))
+        from truespring.kernels import metric
+        from truespring.kernels.threads import writable
+
+        force = np.empty((len(self.weights), self.cells_by_corner.shape[1] * self._pattern.dim))
+        self._run(metric.forces, writable(positions), *self._place, self.stress(positions), force)
+        return self._pattern.vector(force)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
         given = self.stress(positions) if stress is None else stress
-        return self._pattern.summed(lambda first, last: self._matrices(positions, given, slice(first, last)))
+        return self._pattern.summed(lambda first, last: self._matrices(positions, given, first, last))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Sum of the Hessians of the cells, each with its negative eigenvalues cut off [N/m]."""
         stress = self.stress(positions)
 
         def positive(first: int, last: int) -> Floats:
-            values, vectors = np.linalg.eigh(self._matrices(positions, stress, slice(first, last)))
+            values, vectors = np.linalg.eigh(self._matrices(positions, stress, first, last))
             return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
 
         return self._pattern.summed(positive)
 
-    def _matrices(self, positions: Floats, stress: Floats, part: slice) -> Floats:
-        """Tangent stiffness of some cells [N/m], shape (n, n_dof, n_dof), dofs corner by corner."""
-        first, second = self._taken(positions, part)
-        one, other = self._differences
-        n, dim, corners = len(first), self.nodes.shape[1], self.cells_by_corner.shape[1]
-        change = one[:, :, None] * second[:, :, None] + other[:, :, None] * first[:, :, None]
-        change = change.reshape(n, -1, corners * dim)
-        matrices = change.swapaxes(1, 2) @ (2 * self.weights[part, :, None] * change)
-        along = (stress[part] @ self._curvature).reshape(n, corners, corners)
-        blocks = matrices.reshape(n, corners, dim, corners, dim)
-        for axis in range(dim):
-            blocks[:, :, axis, :, axis] += along
-        return matrices
+    def _matrices(self, positions: Floats, stress: Floats, first: int, last: int) -> Floats:
+        """Tangent stiffness of a slice of the cells [N/m], shape (n, n_dof, n_dof), dofs corner by corner."""
+        from truespring.kernels import metric
+        from truespring.kernels.threads import run, writable
+
+        cells, ends = self._place
+        n_dof = cells.shape[1] * self._pattern.dim
+        blocks, here = np.empty((last - first, n_dof, n_dof)), slice(first, last)
+        known = (writable(positions), cells[here], ends, self.weights[here], writable(stress)[here])
+        run(metric.stiffnesses, last - first, *known, blocks, self._pattern.zero, smallest=_SMALLEST_PIECE)
+        return blocks
 
     @property
     def cells(self) -> tuple[str, Ints]:
