@@ -181,12 +181,12 @@ class Turning:
         of_spins = np.einsum("aik,ail->kl", swung, resisting)
         beside = np.einsum("ij,ajk->kai", R, resisting) + np.einsum("kij,aj->kai", R @ self._spins, force)
         half = beside[:, :n] + np.einsum("kl,lai->kai", of_spins, rates) / 2
-        both = np.tensordot(rates, half, axes=(0, 0))
+        both = np.einsum("kai,kbj->aibj", rates, half)
         surface += both + both.transpose(2, 3, 0, 1)
         X = self._at_rest[:n]
         curvature = self._curvature(at, at.arms.T @ force)
-        surface += np.tensordot(X, np.einsum("ijkl,bl->jibk", curvature, X), axes=(1, 0))
-        inside += np.tensordot(rates, beside[:, n:], axes=(0, 0))
+        surface += np.einsum("aj,ijbk->aibk", X, np.einsum("ijkl,bl->ijbk", curvature, X))
+        inside += np.einsum("kai,kbj->aibj", rates, beside[:, n:])
         return Tangent(surface, inside, self.block.kappa)
 
     def _curvature(self, at: _Turned, turned: Floats) -> Floats:
