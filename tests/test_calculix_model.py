@@ -83,7 +83,7 @@ def test_a_study_runs_calculix_at_every_level(tmp_path: Path, capsys: pytest.Cap
     labels = [told["models"][name]["label"] for name in TWINS]
     assert labels == ["CalculiX CPS4 NLGEOM", "CalculiX CPS4 linear", "CalculiX SPRINGA NLGEOM"]
     page = (tmp_path / "report.html").read_text("utf-8")
-    assert "another program found balance at every load level" in page and "read from a file" not in page
+    assert page.count("not proven</td>") == 3 and "read from a file" not in page
 
 
 @needs_ccx
@@ -159,11 +159,11 @@ def test_turned_supports_stand_exactly_at_every_level_and_tell_their_force(law: 
     problem = moved(displacement=(0.01, 0.005, 0.0), rotation=2.0, axis=(1.0, 0.0, 0.0))
     newton = ts.Newton(load_steps=4)
     theirs, ours = CalculiX(law).run(problem, newton), ts.solve(problem, ts.Fem(law, "linear"), newton)
-    for one, other in zip(theirs.states, ours.states, strict=True):
+    for one, other in zip(theirs.states[1:], ours.states[1:], strict=True):
         motion = problem.loading.motion(one.load_factor)
         held = problem.loading.held
-        assert one.displacement[held] == pytest.approx(motion[held], abs=1e-9)
-        size = max(float(np.abs(other.reaction).max()), np.finfo(float).tiny)
+        assert one.displacement[held] == pytest.approx(motion[held], rel=1e-6, abs=1e-12)
+        size = float(np.abs(other.reaction).max())
         assert np.abs(one.reaction - other.reaction).max() < 1e-5 * size
         assert theirs.applied_force(one) == pytest.approx(ours.applied_force(other), rel=1e-5, abs=1e-6 * size)
     assert np.linalg.norm(theirs.applied_force(theirs.states[-1])) > 1e-2
@@ -211,19 +211,22 @@ def test_regions_have_their_materials() -> None:
 
 
 @needs_ccx
-@pytest.mark.parametrize("section", [ts.PlaneStrain(0.01), ts.PlaneStress(0.002)])
-def test_triangles(section: ts.PlaneStrain | ts.PlaneStress) -> None:
-    problem = ts.Problem(
-        ts.rectangle((0.16, 0.04), (16, 4), "triangle"),
-        ts.Material(10e3, 0.3),
-        section,
-        [ts.Fixed("left"), ts.Fixed("right")],
-        [ts.Pressure("top", 200.0)],
-    )
-    theirs = CalculiX().run(problem, ts.Newton(load_steps=4))
-    assert theirs.label == f"CalculiX {'CPE3' if isinstance(section, ts.PlaneStrain) else 'CPS3'} NLGEOM"
-    ours = ts.solve(problem, ts.Fem("saint-venant-kirchhoff", "linear"), ts.Newton(load_steps=4))
-    assert gap(theirs, ours) < (1e-5 if isinstance(section, ts.PlaneStrain) else 7e-3)
+def test_triangles() -> None:
+    """Of plane strain the same elements; CPS3 is a wedge with free faces, stiffer on a coarse mesh."""
+
+    def problem(section: ts.PlaneStrain | ts.PlaneStress, rows: int) -> ts.Problem:
+        mesh, force = ts.rectangle((0.16, 0.04), (4 * rows, rows), "triangle"), ts.Force("right", (0.0, -0.01))
+        return ts.Problem(mesh, ts.Material(10e3, 0.3), section, [ts.Fixed("left")], [force])
+
+    def apart(asked: ts.Problem) -> tuple[str, float]:
+        theirs = CalculiX().run(asked, ts.Newton(load_steps=4))
+        ours = ts.solve(asked, ts.Fem("saint-venant-kirchhoff", "linear"), ts.Newton(load_steps=4))
+        return theirs.label, gap(theirs, ours)
+
+    label, strain = apart(problem(ts.PlaneStrain(0.002), 4))
+    assert label == "CalculiX CPE3 NLGEOM" and strain < 1e-6
+    coarse, fine = (apart(problem(ts.PlaneStress(0.002), rows)) for rows in (4, 8))
+    assert fine[0] == "CalculiX CPS3 NLGEOM" and fine[1] < 7e-3 and fine[1] < 0.4 * coarse[1]
 
 
 @needs_ccx
@@ -344,7 +347,7 @@ def test_elements_turned_inside_out_are_told() -> None:
         ts.Material(10e3, 0.3),
         ts.PlaneStrain(0.01),
         [ts.Fixed("left")],
-        [ts.Force("right", (-2.0, 0.0))],
+        [ts.Force("right", (-200.0, 0.0))],
     )
     path = CalculiX().run(problem, ts.Newton(load_steps=4))
     assert path.status is ts.Status.INVERTED and path.states[-1].area_ratio < 0

@@ -287,7 +287,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "label": path.label,
         "status": str(path.status),
         "sound": path.status is Status.CONVERGED,
-        "advice": _advice(path),
+        "advice": path.status.advice if solved else "read from a file, not solved here",
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "effort": _effort(path),
@@ -297,14 +297,6 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "stretch": stretch,
         "stability": _stability(path) if solved else "–",
     }
-
-
-def _advice(path: Path) -> str:
-    if not path.solved:
-        return "read from a file, not solved here"
-    if path.potential is None and path.status is Status.CONVERGED:
-        return "another program found balance at every load level; it does not tell whether that is stable"
-    return path.status.advice
 
 
 def _effort(path: Path) -> str | None:
