@@ -129,6 +129,7 @@ _TOLD = {
     "axes": "a file's axes along ours: x,z,-y has its z along our y, and our z against its y",
     "shift": "what is added to a file's places: 0,0,5 mm",
     "load_factor": "the load level of a file of one level; default: 1",
+    "force_unit": "the unit of force of a .dat file, without which its energies are left out",
     "field": "the name of the displacement in a VTK file",
     "undeformed": "the body at rest, of STL or marker files that hold the deformed one only",
     "mesh": "the deck with the nodes of a .dat file; default: the .inp of its name",

@@ -17,8 +17,8 @@ class Level:
     Attributes:
         time: what the file counts levels by: a time, a load factor or a number.
         displacement: of each point [the file's unit of length], shape (n_points, 3).
-        energy: stored elastic energy [J], None where the file tells none.
-        force: total of the loads [N], shape (3,), None where the file tells none.
+        energy: stored elastic energy [J, of CalculiX the deck's units], None where the file tells none.
+        force: total of the loads [N, of CalculiX the deck's unit], shape (3,), None where the file tells none.
     """
 
     time: float

@@ -28,7 +28,8 @@ class Told:
     """What is told of a result file that it does not tell itself.
 
     Attributes:
-        unit, axes, shift, load_factor: see Placing; None where nothing is told, which takes m, x,y,z, no shift, 1.
+        unit, axes, shift, load_factor, force_unit: see Placing; None where nothing is told, which takes m, x,y,z, no
+            shift, 1 and no energies.
         field: the name of the displacement among a VTK file's arrays.
         undeformed: the body at rest, of STL or marker files that hold no more than where it went.
         mesh: the deck with the nodes of a .dat file.
@@ -38,6 +39,7 @@ class Told:
     axes: tuple[str, ...] | None = None
     shift: tuple[float, ...] | None = None
     load_factor: float | None = None
+    force_unit: str | None = None
     field: str | None = None
     undeformed: FilePath | None = None
     mesh: FilePath | None = None
@@ -51,6 +53,7 @@ class Told:
             axes=self.axes or plain.axes,
             shift=self.shift or plain.shift,
             load_factor=self.load_factor,
+            force_unit=self.force_unit,
         )
 
     @property
@@ -275,6 +278,9 @@ def _value(name: str, text: str, given: str) -> Any:
                 return factor
             case "unit":
                 Placing(unit=text)
+                return text
+            case "force_unit":
+                Placing(force_unit=text)
                 return text
             case "undeformed" | "mesh":
                 return FilePath(text)
