@@ -449,11 +449,13 @@ def test_static_states_of_the_sofa_scene_end_in_our_equilibrium(
     free = ~fixed(body, len(network.nodes))
     newton, tight = body.one("NewtonRaphsonSolver"), body.one("NewtonRaphsonSolver")["relativeInitialStoppingThreshold"]
     assert newton["maxNbIterationsLineSearch"] == 1
-    for _ in range(exported(case).load_steps):
+    full = np.where(free, in_space(our_force(exported(case))), 0.0)
+    for level in range(1, exported(case).load_steps + 1):
         levels.onAnimateBeginEvent({})
         positions, force = np.array(levels.dofs.position.value), np.zeros((len(network.nodes), 3))
         for data in body.all("ConstantForceField"):
             force[data["indices"]] = levels.forces.forces.value
+        assert force == pytest.approx(level / exported(case).load_steps * full, rel=1e-12, abs=1e-15)
         first = None
         for _ in range(newton["maxNbIterationsNewton"]):
             residual = (force - network.gradient(positions))[free]
@@ -474,6 +476,8 @@ def test_the_finite_element_twin_in_the_sofa_scene(scene_of: Callable[[Exported]
     corners = np.array(strip.one("MeshTopology")["position"])[triangles]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
     assert len(areas) == 2 * 8 * 4 and areas == pytest.approx(np.full(64, 5e-5))
+    centres = corners.mean(axis=1).reshape(-1, 2, 3).mean(axis=1)[:, :2]
+    assert centres == pytest.approx(exported("pressed").problem.mesh.centres)
     elements = strip.one("TriangleFEMForceField")
     assert (elements["youngModulus"], elements["poissonRatio"]) == ([10e3], [0.25])
     assert (elements["thickness"], elements["planeStrain"], elements["method"]) == (0.02, True, "large")
@@ -513,7 +517,10 @@ def test_files_tell_units_supports_loads_and_what_to_expect(case: str, target: s
     assert ("turned places" in head) == (case == "turned")
 
 
-def test_springs_that_a_program_has_not_are_refused_before_they_are_solved(tmp_path: Path) -> None:
+def test_springs_that_a_program_has_not_are_refused_before_they_are_solved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("truespring.exports.exported.solve", None)
     mesh = ts.box(size=(0.08, 0.04, 0.04), elements=(4, 2, 2))
     pull = [ts.Force(on="right", total=(0.0, -1.0, 0.0))]
     problem = ts.Problem(mesh, ts.Material(10e3, 0.3), supports=[ts.Fixed(on="left")], loads=pull)

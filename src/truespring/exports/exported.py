@@ -193,7 +193,7 @@ def solve_springs(
     """Solve springs up to full load, so that a file can tell what to expect of them.
 
     A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
-    programs put the load on. `probe` is by default the node that moves most.
+    programs put the load on. `probe` is by default the free node that moves most.
     """
     chosen, remarks = solver or Newton(), []
     steps = chosen.steps if isinstance(chosen, DisplacementControl) else chosen.load_steps
@@ -202,7 +202,9 @@ def solve_springs(
         remarks = ["The load is taken up in steps here, not followed past limit points as it was asked."]
     path = solve(problem, model, chosen, report)
     if probe is None:
-        probe = int(np.linalg.norm(path.states[-1].displacement, axis=1).argmax())
+        told = problem.loading.held.all(axis=1)  # such a node's motion tells nothing of the springs
+        moved = np.linalg.norm(path.states[-1].displacement, axis=1)
+        probe = int(np.where(told & ~told.all(), -1.0, moved).argmax())
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 

@@ -172,12 +172,12 @@ def _settled(
     exported: Exported, network: SpringNetwork, motion: tuple[Floats, float, float, Floats], usual: int
 ) -> tuple[int, bool | None]:
     """The steps to come within 0.1 % of our equilibrium and stay, and whether that is so; by the motion itself."""
-    if exported.state is None:
+    longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
+    if exported.state is None or longest < usual:
         return usual, None
     mass, damping, step, start = motion
     goal = exported.state.positions
     largest = float(np.linalg.norm(exported.state.displacement, axis=1).max()) or 1.0
-    longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
     free = ~exported.held
     force, gain = exported.external_force, np.where(free, step / mass[:, None], 0.0)
     positions, velocity, last = start.copy(), np.zeros(start.shape), 0
