@@ -97,8 +97,8 @@ def _explained(name: str) -> tuple[str, ...]:
 
 _FEM = (
     "*ELASTIC under NLGEOM is St. Venant-Kirchhoff's law. Gravity and pressure are CalculiX's own *DLOAD; pressure "
-    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks with free faces: plane "
-    "stress but for what thickness over size tells.",
+    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks or wedges with free "
+    "faces: plane stress in the mean, and a pressure acts on the thickness as it becomes.",
 )
 
 

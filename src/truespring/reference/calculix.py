@@ -15,6 +15,8 @@ from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside
 from truespring.exports.exported import plain_springs
+from truespring.loading import Pressure
+from truespring.material import PlaneStress
 from truespring.models import SpringNetwork, Springs
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
@@ -146,6 +148,12 @@ class CalculiX:
             warnings.append(
                 f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints that of the last "
                 "increment only, and took several to a level"
+            )
+        pressed = any(isinstance(load, Pressure) for load in problem.loads)
+        if pressed and isinstance(problem.section, PlaneStress) and not self._linear:
+            warnings.append(
+                "the pressure acts on the thickness as it becomes, in truespring's own models on that at rest: plane "
+                "strain has no such difference"
             )
         warnings.append("stability not proven: CalculiX does not tell it")
         return Path(
