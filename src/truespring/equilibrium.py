@@ -182,8 +182,11 @@ class Path:
 
     def at(self, load_factor: float) -> State | None:
         """Return the state at a level of what the solver was asked for, None where the path has none there."""
-        found = np.flatnonzero(np.abs(np.array([state.level for state in self.states]) - load_factor) <= _SAME_LEVEL)
-        return self.states[found[0]] if found.size else None
+        apart = np.abs(np.array([state.level for state in self.states]) - load_factor)
+        if not apart.size or np.isnan(apart).all():
+            return None
+        nearest = int(np.nanargmin(apart))
+        return self.states[nearest] if apart[nearest] <= _SAME_LEVEL else None
 
     def applied_force(self, state: State) -> Floats:
         """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion.
