@@ -102,7 +102,7 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
     "kind unknown": (('kind = "fem"', 'kind = "fen"'), ("models.linear", "fen", "did you mean 'fem'")),
-    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, network, stl")),
+    "kind missing": (('kind = "fem"\n', ""), ("models.linear", "kind", "springs, fem, network, calculix, stl")),
     "decimal comma": (('["0 N", "-0.01 N"]', '["0 N", "-0,01 N"]'), ("load.1.force.2", "-0,01 N", "comma")),
     "blank in a number": (('["0 N", "-0.01 N"]', '["0 N", "1 000 N"]'), ("load.1.force.2", "1 000 N")),
     "arithmetic in a number": (('["0 N", "-0.01 N"]', '["0 N", "9**9**9 N"]'), ("load.1.force.2", "9**9**9 N")),
