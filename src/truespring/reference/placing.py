@@ -115,11 +115,13 @@ def placed(record: Record, placing: Placing, label: str) -> Path:
     # Energies in VTK files are truespring's own, in joules; others are in the file's units.
     joules = 1.0 if record.kind in ("vtu", "pvd") else placing.joules
     states = [
-        _state(mesh, grid, move[order, :dim], level.energy, joules, factor)
+        told_state(
+            mesh, grid.points, move[order, :dim], factor, math.nan if level.energy is None else joules * level.energy
+        )
         for level, move, factor in zip(record.levels, moves, factors, strict=True)
     ]
     if len(states) > 1 and factors[0] > 0:
-        states.insert(0, _state(mesh, grid, np.zeros(grid.points.shape), 0.0, 1.0, 0.0))
+        states.insert(0, told_state(mesh, grid.points, np.zeros(grid.points.shape), 0.0, energy=0.0))
     return Path(
         problem=Problem(mesh, stated=False),
         label=label,
@@ -202,19 +204,28 @@ def _picked(grid: Grid, order: Ints) -> Grid:
     return Grid(grid.points[order], {kind: number[cells] for kind, cells in grid.cells.items()})
 
 
-def _state(
-    mesh: Mesh, grid: Grid, displacement: Floats, energy: float | None, joules: float, load_factor: float
+def told_state(
+    mesh: Mesh,
+    points: Floats,
+    displacement: Floats,
+    load_factor: float,
+    energy: float = math.nan,
+    applied_force: Floats | None = None,
 ) -> State:
-    """A state of which no more is known than how far each point has moved [m], shape (n_points, dim), and an energy."""
+    """Return a state of which no more is known than how far each point has moved [m], shape (n_points, dim).
+
+    The mesh's nodes are the first of the points; energy [J] and the total applied force [N] where they are told.
+    """
     positions = mesh.nodes + displacement[: mesh.n_nodes]
+    unknown = np.full(mesh.dim, math.nan if load_factor else 0.0)
     return State(
         load_factor=load_factor,
         positions=positions,
-        all_positions=grid.points + displacement,
+        all_positions=points + displacement,
         displacement=displacement[: mesh.n_nodes],
         reaction=np.full(positions.shape, math.nan),
-        applied_force=np.full(mesh.dim, math.nan if load_factor else 0.0),
-        energy=math.nan if energy is None else joules * energy,
+        applied_force=unknown if applied_force is None else applied_force,
+        energy=energy,
         iterations=0,
         residual=math.nan,
         negative_eigenvalues=None,
