@@ -15,7 +15,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ExportError
-from truespring.exports.exported import Exported
+from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.material import PlaneStrain
 from truespring.mesh import facets_within, select
@@ -352,19 +352,13 @@ def check_springs(problem: Problem, network: SpringNetwork) -> None:
 
 # --- headers -------------------------------------------------------------------------------------
 
-# Sentences that hold for files of springs in SI units at full load, of which a deck says its own.
-_OTHERWISE = ("Units are SI", "Loads and prescribed motions stand")
-_OF_SPRINGS = ("Expect", "Another program need not", "Warning of truespring")
-
 
 def described(exported: Exported, what: str, springs: bool) -> list[str]:
-    """Return what every target says of the problem, without what a deck says otherwise, and what the deck is."""
-    left_out = _OTHERWISE if springs else _OTHERWISE + _OF_SPRINGS
-    title, written, *lines = (line for line in exported.header if not line.startswith(left_out))
+    """Return what a deck is, and what the problem asks; of springs also what to expect of them."""
+    (title,) = printable([exported.title])
     if springs:
-        return [title, f"{what}: {written}", *lines]
-    by_program = [line.replace(", as forces on nodes", "") for line in lines]
-    return [title, f"{what}, written by truespring {version('truespring')}.", *by_program]
+        return [title, f"{what}: {exported.written}", *exported.asked, *exported.told_of_springs]
+    return [title, f"{what}, written by truespring {version('truespring')}.", *exported.asked]
 
 
 def comments(header: Sequence[str]) -> list[str]:
