@@ -31,6 +31,7 @@ class Status(StrEnum):
     UNSTABLE = "unstable"
     INVERTED = "inverted"
     NOT_CONVERGED = "not-converged"
+    READ = "read"
 
     @property
     def advice(self) -> str:
@@ -43,6 +44,7 @@ _ADVICE = {
     Status.UNSTABLE: "a real body would leave such a state; load less, or add a small side force to choose a branch",
     Status.INVERTED: "an element is turned inside out; load less or take more load_steps: springs and "
     "St. Venant-Kirchhoff have nothing that resists it",
+    Status.READ: "read from a file: what it converged to is known to the program that wrote it",
     Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; load less, take more load_steps, "
     "or another law: each bears a largest load",
 }

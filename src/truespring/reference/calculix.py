@@ -97,7 +97,7 @@ class CalculiX:
         """Run ccx in a folder of its own and return the states that it reached, those at rest first.
 
         A run that does not converge is not an exception: the path ends at the last level reached. Raises ModelError
-        and ExportError as `check` does, ReferenceFileError where ccx refuses the deck or its result is damaged.
+        and ExportError as `check` does.
         """
         self.check(problem, solver)
         assert isinstance(solver, Newton)
@@ -116,9 +116,10 @@ class CalculiX:
             file = FilePath(folder) / "model.inp"
             file.write_text(deck, encoding="utf-8")
             finished = run_ccx(file, reached=reached)
-            found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
-        if not found and not finished.efforts:
-            raise ReferenceFileError(f"CalculiX took no step: {_said(finished)}")
+            try:
+                found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
+            except ReferenceFileError as error:  # as where ccx was ended while it wrote
+                found, finished = [], replace(finished, errors=(*finished.errors, str(error)))
         rest = Level(0.0, np.zeros((problem.mesh.n_nodes, 3)), 0.0)
         states = [self._state(problem, 0.0, rest, np.zeros((problem.mesh.n_nodes, 3)), None, network)]
         for place, (load_factor, (level, force)) in enumerate(zip(levels, found, strict=False)):

@@ -29,6 +29,7 @@ class Placing:
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m], shape (3,).
         load_factor: of a file of one level; None takes full load.
+        full_time: the file's time of full load; None takes 1, or the last time where that is later.
         force_unit: the file's unit of force, such as "N"; None leaves out energies of files that tell none.
     """
 
@@ -37,6 +38,7 @@ class Placing:
     shift: tuple[float, ...] = (0.0, 0.0, 0.0)
     load_factor: float | None = None
     force_unit: str | None = None
+    full_time: float | None = None
 
     def __post_init__(self) -> None:
         letters = [axis.removeprefix("-") for axis in self.axes]
@@ -46,6 +48,8 @@ class Placing:
             )
         if self.load_factor is not None and not 0 < self.load_factor <= 1:
             raise ReferenceFileError(f"load_factor = {self.load_factor:g} is not above 0 and at most 1")
+        if self.full_time is not None and not (math.isfinite(self.full_time) and self.full_time > 0):
+            raise ReferenceFileError(f"full_time = {self.full_time:g} is not above 0")
         _ = self.scale, self.joules
 
     @property
@@ -127,7 +131,7 @@ def placed(record: Record, placing: Placing, label: str) -> Path:
         label=label,
         kind=record.kind,
         states=tuple(states),
-        status=Status.CONVERGED,
+        status=Status.NOT_CONVERGED if record.stopped else Status.READ,
         warnings=(*record.notes, *left_out, *notes, unproven(label)),
         grid=grid,
     )
@@ -156,7 +160,7 @@ def _without_unknown(record: Record) -> tuple[Record, list[str]]:
 def unproven(label: str) -> str:
     """Return the warning that what was read was not solved here."""
     return (
-        f"{label} was read, not solved: its convergence and stability are those of the program that wrote it; "
+        f"read from {label}, not solved here: its convergence and stability are those of the program that wrote it; "
         "stability not proven"
     )
 
@@ -164,20 +168,39 @@ def unproven(label: str) -> str:
 def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[str]]:
     """The load factor of each level, and what should be known of how they were found."""
     times = [level.time for level in record.levels]
-    if len(times) == 1:
-        factor = 1.0 if placing.load_factor is None else placing.load_factor
-        return [factor], []
     if placing.load_factor is not None:
-        raise ReferenceFileError(f"{record.file} has {len(times)} levels: load_factor is for a file of one")
+        if len(times) > 1:
+            raise ReferenceFileError(
+                f"{record.file} has {len(times)} levels, a load factor is for a file of one: say the time of full load "
+                "(--full-time) where its times are no load factors"
+            )
+        return [placing.load_factor], []
     if any(later <= earlier for earlier, later in itertools.pairwise(times)) or times[0] < 0:
         factors = [(number + 1) / len(times) for number in range(len(times))]
         return factors, [f"its {len(times)} levels have no ascending times and were taken as equal shares of the load"]
     last = times[-1]
-    if math.isclose(last, 1.0, rel_tol=1e-6):
-        return [*times[:-1], 1.0], []
-    return [time / last for time in times[:-1]] + [1.0], [
-        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1"
+    if placing.full_time is not None:
+        if last > placing.full_time * (1 + 1e-6):
+            raise ReferenceFileError(
+                f"{record.file} goes on to time {last:g}, beyond that of full load, {placing.full_time:g}"
+            )
+        return [_rounded(time / placing.full_time) for time in times], []
+    if last <= 1 + 1e-6:
+        short = (
+            [] if last >= 1 - 1e-6 else [f"it ends at time {last:.6g}, which was taken as load factor: full load is 1"]
+        )
+        return [_rounded(time) for time in times], short
+    if len(times) == 1:
+        return [1.0], [f"its only level, of time {last:.6g}, was taken as full load"]
+    return [_rounded(time / last) for time in times], [
+        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1, the last as "
+        "full load; --full-time tells another"
     ]
+
+
+def _rounded(load_factor: float) -> float:
+    """Full load exactly, where digits of a file fall short of it."""
+    return 1.0 if math.isclose(load_factor, 1.0, rel_tol=1e-6) else load_factor
 
 
 def _dim(record: Record, points: Floats, moves: list[Floats]) -> int:

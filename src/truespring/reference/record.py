@@ -39,6 +39,7 @@ class Record:
             nodes, each of shape (n_cells, k); empty for markers.
         levels: in the file's order, at least one; a state of rest is among them only if the file has it.
         names: the number or name that the file gives each point, of length n_points.
+        stopped: whether the file tells that the run did not get to its end.
         notes: what should be known of the file, in words.
     """
 
@@ -49,3 +50,4 @@ class Record:
     levels: tuple[Level, ...]
     names: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    stopped: bool = False

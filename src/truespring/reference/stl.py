@@ -104,7 +104,7 @@ def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> 
         label=file.name,
         kind="stl",
         states=(),
-        status=Status.CONVERGED,
+        status=Status.READ,
         warnings=(unproven(file.name),),
         shell=Shell(points, triangles, factor),
     )
