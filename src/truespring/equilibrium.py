@@ -155,6 +155,11 @@ class Path:
         return Grid(mesh.nodes, {} if mesh.element == "line" else {mesh.kind.vtk: mesh.elements})
 
     @property
+    def is_cloud(self) -> bool:
+        """Whether it was read as points alone, which lines of its mesh join for no more than order."""
+        return self.grid is not None and not self.grid.cells
+
+    @property
     def load_factor(self) -> float:
         """The last load level reached; of a surface that was read, its own."""
         if self.states:

@@ -31,7 +31,12 @@ def spring_lines(path: Path) -> Ints | None:
 
 
 def path_lines(path: Path) -> Ints:
-    """Return the pairs of nodes that a path is drawn by: its springs, else the edges of its elements, shape (n, 2)."""
+    """Return the pairs of nodes that a path is drawn by: its springs, else the edges of its elements, shape (n, 2).
+
+    None of points alone.
+    """
+    if path.is_cloud:
+        return np.zeros((0, 2), dtype=np.int64)
     springs = spring_lines(path)
     return path.problem.mesh.edges if springs is None else springs
 
@@ -146,6 +151,9 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         _lines(area, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
     _lines(area, points / scale.size, lines, INK, 1.3, 3, "reference")
     _lines(area, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
+    for path, places, color in ((reference, points, INK), (model, positions, BLUE)):
+        if path.is_cloud:
+            draw_loaded(area, places / scale.size, color)
     watched = comparison.model.at(level)
     if watched is not None:
         draw_dot(area, _magnified(comparison.model, watched, factor)[comparison.probe] / scale.size)
@@ -180,7 +188,8 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     if not np.isfinite(farthest) or farthest <= ROUNDING * size:
         return None
     factor = magnification(result)
-    reference = _drawn_on(comparison, 1)
+    framed = name if not comparison.known_on[1].is_cloud else result.model or ""  # markers have no outline
+    reference = _drawn_on(comparison, 1 if framed == name else 0)
     own = reference.at(level)
     positions = _magnified(comparison.model, mine, factor)
     others = positions if own is None else _magnified(reference, own, factor)
@@ -189,7 +198,7 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     margin = 0.04 * float((upper - lower).max())
     remarks = [f"displacements {times(factor)}"] if factor != 1 else []
     remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
-    legend = [Entry(f"outline of {full_name(result, name)}", INK), Entry("probe", RED, "o", "")]
+    legend = [Entry(f"outline of {full_name(result, framed)}", INK), Entry("probe", RED, "o", "")]
     legend += [Entry("outside", LOAD, "x", "")] if comparison.n_outside else []
     title = f"{level_name(result, level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
     area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks), bar)
@@ -234,6 +243,7 @@ def undeformed_figure(result: Result) -> Sheet:
     legend += [Entry("springs", BLUE)] if springs else []
     legend += [Entry("probe", RED, "o", "")]
     title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
+    title = f"At rest: {mesh.n_nodes} markers" if model.is_cloud else title
     title += f", {len(path_lines(model))} springs" if springs else ""
     area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":

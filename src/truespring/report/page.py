@@ -278,7 +278,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
     """What a path cost and how sound it is; a dash where it was read, not solved."""
     solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
-    areas = [state.area_ratio for state in path.states]
+    areas = [] if path.is_cloud else [state.area_ratio for state in path.states]
     stretch = "–"
     if stretches:
         stretch = f"{min(low for low, _ in stretches):.3f} to {max(high for _, high in stretches):.3f}"
