@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import shutil
 import sys
 from dataclasses import replace
@@ -16,7 +17,7 @@ from tests.calculix import needs_ccx
 from tests.studies import changed, written
 from tests.test_examples import EXAMPLES
 from truespring.cli import main
-from truespring.errors import ExportError, ModelError, ReferenceFileError
+from truespring.errors import ExportError, ModelError
 from truespring.reference import CalculiX
 from truespring.reference.ccx import run_ccx
 from truespring.study import read_study, run
@@ -83,7 +84,7 @@ def test_a_study_runs_calculix_at_every_level(tmp_path: Path, capsys: pytest.Cap
     labels = [told["models"][name]["label"] for name in TWINS]
     assert labels == ["CalculiX CPS4 NLGEOM", "CalculiX CPS4 linear", "CalculiX SPRINGA NLGEOM"]
     page = (tmp_path / "report.html").read_text("utf-8")
-    assert "another program found balance at every load level" in page and "read from a file" not in page
+    assert page.count("not proven</td>") == 3 and "read from a file" not in page
 
 
 @needs_ccx
@@ -120,28 +121,11 @@ def test_shipped_studies_agree(name: str, law: str) -> None:
 @needs_ccx
 @pytest.mark.verification
 def test_the_organ_agrees() -> None:
-    """Nearly ten thousand voxels, as shipped under the linear law; St. Venant-Kirchhoff's collapses there."""
+    """Nearly ten thousand voxels as shipped, where St. Venant-Kirchhoff's law collapses: see test_calculix for it."""
     study = read_study(EXAMPLES / "organ.toml")
     theirs = CalculiX("linear").run(study.problem, study.solver)
     ours = ts.solve(study.problem, ts.Fem("linear", "linear"), study.solver)
     assert gap(theirs, ours) < 1e-3
-
-
-@needs_ccx
-@pytest.mark.verification
-def test_the_organ_agrees_at_large_strain() -> None:
-    study = read_study(EXAMPLES / "organ.toml")
-    held, grasped = study.problem.supports
-    motion = tuple(0.3 * part for part in grasped.displacement or ())
-    problem = replace(
-        study.problem,
-        material=ts.Material(3e3, 0.3, density=1060.0),
-        supports=(held, replace(grasped, displacement=motion)),
-        loads=(ts.Gravity((0.0, -0.3 * 9.81, 0.0)),),
-    )
-    newton = ts.Newton(load_steps=3)
-    theirs = CalculiX().run(problem, newton)
-    assert gap(theirs, ts.solve(problem, ts.Fem("saint-venant-kirchhoff", "linear"), newton)) < 1e-3
 
 
 def moved(**motion: object) -> ts.Problem:
@@ -159,11 +143,11 @@ def test_turned_supports_stand_exactly_at_every_level_and_tell_their_force(law: 
     problem = moved(displacement=(0.01, 0.005, 0.0), rotation=2.0, axis=(1.0, 0.0, 0.0))
     newton = ts.Newton(load_steps=4)
     theirs, ours = CalculiX(law).run(problem, newton), ts.solve(problem, ts.Fem(law, "linear"), newton)
-    for one, other in zip(theirs.states, ours.states, strict=True):
+    for one, other in zip(theirs.states[1:], ours.states[1:], strict=True):
         motion = problem.loading.motion(one.load_factor)
         held = problem.loading.held
-        assert one.displacement[held] == pytest.approx(motion[held], abs=1e-9)
-        size = max(float(np.abs(other.reaction).max()), np.finfo(float).tiny)
+        assert one.displacement[held] == pytest.approx(motion[held], rel=1e-6, abs=1e-12)
+        size = float(np.abs(other.reaction).max())
         assert np.abs(one.reaction - other.reaction).max() < 1e-5 * size
         assert theirs.applied_force(one) == pytest.approx(ours.applied_force(other), rel=1e-5, abs=1e-6 * size)
     assert np.linalg.norm(theirs.applied_force(theirs.states[-1])) > 1e-2
@@ -211,19 +195,40 @@ def test_regions_have_their_materials() -> None:
 
 
 @needs_ccx
-@pytest.mark.parametrize("section", [ts.PlaneStrain(0.01), ts.PlaneStress(0.002)])
-def test_triangles(section: ts.PlaneStrain | ts.PlaneStress) -> None:
+def test_triangles() -> None:
+    """Of plane strain the same elements; CPS3 is a wedge with free faces, stiffer on a coarse mesh."""
+
+    def problem(section: ts.PlaneStrain | ts.PlaneStress, rows: int) -> ts.Problem:
+        mesh, force = ts.rectangle((0.16, 0.04), (4 * rows, rows), "triangle"), ts.Force("right", (0.0, -0.01))
+        return ts.Problem(mesh, ts.Material(10e3, 0.3), section, [ts.Fixed("left")], [force])
+
+    def apart(asked: ts.Problem) -> tuple[str, float]:
+        theirs = CalculiX().run(asked, ts.Newton(load_steps=4))
+        ours = ts.solve(asked, ts.Fem("saint-venant-kirchhoff", "linear"), ts.Newton(load_steps=4))
+        return theirs.label, gap(theirs, ours)
+
+    label, strain = apart(problem(ts.PlaneStrain(0.002), 4))
+    assert label == "CalculiX CPE3 NLGEOM" and strain < 1e-6
+    coarse, fine = (apart(problem(ts.PlaneStress(0.002), rows)) for rows in (4, 8))
+    assert fine[0] == "CalculiX CPS3 NLGEOM" and fine[1] < 7e-3 and fine[1] < 0.4 * coarse[1]
+
+
+@needs_ccx
+def test_a_pressure_on_a_sheet_whose_thickness_changes_is_told() -> None:
+    """Pushed in by a quarter of its height: CalculiX presses on the thickness as it has become."""
     problem = ts.Problem(
-        ts.rectangle((0.16, 0.04), (16, 4), "triangle"),
+        ts.rectangle((0.16, 0.04), (16, 4)),
         ts.Material(10e3, 0.3),
-        section,
+        ts.PlaneStress(0.002),
         [ts.Fixed("left"), ts.Fixed("right")],
         [ts.Pressure("top", 200.0)],
     )
-    theirs = CalculiX().run(problem, ts.Newton(load_steps=4))
-    assert theirs.label == f"CalculiX {'CPE3' if isinstance(section, ts.PlaneStrain) else 'CPS3'} NLGEOM"
-    ours = ts.solve(problem, ts.Fem("saint-venant-kirchhoff", "linear"), ts.Newton(load_steps=4))
-    assert gap(theirs, ours) < (1e-5 if isinstance(section, ts.PlaneStrain) else 7e-3)
+    told = CalculiX().run(problem, ts.Newton(load_steps=4))
+    assert any("thickness as it becomes" in warning for warning in told.warnings)
+    assert 7e-3 < gap(told, ts.solve(problem, ts.Fem("saint-venant-kirchhoff"), ts.Newton(load_steps=4))) < 2e-2
+    linear = CalculiX("linear").run(problem, ts.Newton(load_steps=4))
+    assert not any("thickness" in warning for warning in linear.warnings)
+    assert gap(linear, ts.solve(problem, ts.Fem("linear"), ts.Newton(load_steps=4))) < 3e-3
 
 
 @needs_ccx
@@ -344,7 +349,7 @@ def test_elements_turned_inside_out_are_told() -> None:
         ts.Material(10e3, 0.3),
         ts.PlaneStrain(0.01),
         [ts.Fixed("left")],
-        [ts.Force("right", (-2.0, 0.0))],
+        [ts.Force("right", (-200.0, 0.0))],
     )
     path = CalculiX().run(problem, ts.Newton(load_steps=4))
     assert path.status is ts.Status.INVERTED and path.states[-1].area_ratio < 0
@@ -433,12 +438,25 @@ def program(folder: Path, monkeypatch: pytest.MonkeyPatch, *lines: str) -> None:
         (("kill -9 $$",), "exit code -9"),
     ],
 )
-def test_a_run_without_a_step_is_an_error(
+def test_a_run_without_a_step_is_a_path_that_says_why(
     lines: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program(tmp_path, monkeypatch, *lines)
-    with pytest.raises(ReferenceFileError, match=f"CalculiX took no step.*{words}"):
-        CalculiX().run(moved(displacement=(0.01, 0.0, 0.0)), ts.Newton(load_steps=2))
+    path = CalculiX().run(moved(displacement=(0.01, 0.0, 0.0)), ts.Newton(load_steps=2))
+    assert path.status is ts.Status.NOT_CONVERGED and path.load_factor == 0 and len(path.states) == 1
+    assert re.search(f"load factor 0.5 was not reached.*CalculiX says.*{words}", path.warnings[0])
+
+
+def test_a_failing_program_does_not_take_the_rest_of_a_study_along(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program(tmp_path, monkeypatch, "exit 3")
+    study = written(tmp_path, changed(("[compare]", '[models.other]\nkind = "calculix"\n\n[compare]')))
+    assert main(["verify", str(study), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert "model 'other' is not-converged" in capsys.readouterr().err
+    summary = json.loads((tmp_path / "out" / "study" / "summary.json").read_text())
+    assert summary["models"]["springs"]["status"] == summary["models"]["linear"]["status"] == "converged"
+    assert summary["models"]["other"]["load_factor"] == 0 and summary["comparison"]["linear"]["rms_error"] > 0
 
 
 STA = """\
@@ -475,6 +493,3 @@ def test_efforts_and_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     finished = run_ccx(deck, threads=3)
     assert finished.code == 201 and finished.efforts == {1: (1, 11)}
     assert deck.with_suffix(".txt").read_text() == "3\n"
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    run_ccx(deck)
-    assert deck.with_suffix(".txt").read_text() == "1\n"

@@ -39,7 +39,7 @@ def rows(file: Path) -> list[dict[str, str]]:
 
 def test_verify_writes_every_file_of_the_contract(out: Path) -> None:
     assert {path.name for path in out.iterdir()} == {"study", "report.html"}
-    expected = {"curves.csv", "summary.json", "figures", "report.html"}
+    expected = {"curves.csv", "summary.json", "mesh.vtu", "figures", "report.html"}
     for model in MODELS:
         expected |= {f"{model}.pvd", model, f"deformed_{model}.stl"}
     assert {path.name for path in (out / "study").iterdir()} == expected
@@ -65,7 +65,7 @@ def test_curves(out: Path) -> None:
 
 def test_summary(out: Path) -> None:
     summary = json.loads((out / "study" / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == ["title", "truespring", "models", "probe", "comparison", "closest"]
+    assert list(summary) == ["title", "truespring", "model", "models", "probe", "comparison", "closest"]
     springs, linear = summary["models"]["springs"], summary["models"]["linear"]
     assert springs["status"] == linear["status"] == "converged"
     assert (springs["kind"], linear["kind"]) == ("springs", "fem")

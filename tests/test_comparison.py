@@ -285,3 +285,27 @@ def test_a_body_that_lies_right_but_moves_along_other_axes_is_noticed(solid: ts.
     longer = placed(Record(FILE, "vtu", mesh.nodes, {"hexahedron": mesh.elements}, levels), Placing(), "file")
     found = displacement_misfit(ts.compare(longer, solid))
     assert found is not None and found.factor == pytest.approx(1e-3)
+
+
+def test_points_of_which_nothing_is_told_are_left_out_with_their_cells(coarse: ts.Path) -> None:
+    """As a .dat file of CalculiX that prints a set of nodes only."""
+    mesh = coarse.problem.mesh
+    pad = ((0, 0), (0, 1))
+    moved = np.pad(coarse.states[-1].displacement, pad)
+    moved[mesh.nodes[:, 0] < 0.05] = np.nan
+    path = placed(
+        Record(FILE, "dat", np.pad(mesh.nodes, pad), {"quad": mesh.elements}, (Level(1.0, moved),)), Placing(), "file"
+    )
+    assert path.problem.mesh.lower[0] == pytest.approx(0.05) and "25 of 85 points is not told" in path.warnings[0]
+    assert ts.compare(path, coarse).rms_error == pytest.approx(0, abs=1e-15)
+    assert ts.compare(coarse, path).n_outside == 25
+
+
+def test_energies_in_a_files_own_units_are_told_with_its_unit_of_force(coarse: ts.Path) -> None:
+    mesh, state = coarse.problem.mesh, coarse.states[-1]
+    pad = ((0, 0), (0, 1))
+    level = Level(1.0, 1e3 * np.pad(state.displacement, pad), energy=1e6 * state.energy)  # mm, mN
+    record = Record(FILE, "dat", 1e3 * np.pad(mesh.nodes, pad), {"quad": mesh.elements}, (level,))
+    assert ts.compare(placed(record, Placing("mm"), "file"), coarse).energy_error is None
+    told = placed(record, Placing("mm", force_unit="mN"), "file")
+    assert ts.compare(told, coarse).energy_error == pytest.approx(0, abs=1e-12)

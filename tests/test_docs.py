@@ -12,13 +12,13 @@ from truespring.study import read_study, run
 from truespring.study.schema import StudyTable
 
 ROOT = EXAMPLES.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "export").glob("*.md"))]
 
 
 def blocks(language: str) -> list[tuple[str, str]]:
     """Page and text of every fenced block of a language."""
     return [
-        (page.name, text)
+        (page.relative_to(ROOT).as_posix(), text)
         for page in PAGES
         for text in re.findall(
             rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
@@ -32,7 +32,8 @@ def test_the_pages_hold_code() -> None:
 
 
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
-def test_python_on_the_pages_runs(page: str, code: str) -> None:
+def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # some write files
     exec(compile(code, page, "exec"), {})
 
 

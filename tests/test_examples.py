@@ -31,7 +31,24 @@ def script(name: str) -> ModuleType:
 
 def test_every_example_is_run_here() -> None:
     names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
-    assert names == {*NAMES, "truss", "organ"}
+    assert names == {*NAMES, "truss", "organ", "six_methods"}
+
+
+def test_six_methods_stand_side_by_side() -> None:
+    result = run(read_study(EXAMPLES / "six_methods.toml"))
+    assert result.converged
+    assert {path.kind for path in result.paths.values()} == {
+        "springs",
+        "fem",
+        "terzopoulos",
+        "heml",
+        "bem-springs",
+        "mass-tensor",
+    }
+    errors = {name: one.rms_error for name, one in result.comparisons.items()}
+    assert (
+        max(errors, key=lambda name: errors[name]) == "mass-tensor"
+    )  # linear, where the body bends by half its length
 
 
 def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:

@@ -87,6 +87,7 @@ def test_a_file_that_is_cut_is_refused(sample: Path, tmp_path: Path) -> None:
         (300_000, b"\xff" * 40, "is damaged, or of a kind that is not read"),  # its reader ends the process
         (282_400, b"\xff" * 40, "is damaged, or of a kind that is not read"),  # its reader raises
     ],
+    ids=["text", "header", "no sets", "pointer", "aborts", "raises"],
 )
 def test_what_is_damaged_is_refused(place: int, damage: bytes, message: str, sample: Path, tmp_path: Path) -> None:
     data = bytearray(sample.read_bytes())

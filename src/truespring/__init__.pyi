@@ -43,6 +43,7 @@ from .models import judge as judge
 from .models import moduli as moduli
 from .problem import Problem as Problem
 from .problem import Region as Region
+from .reference import CalculiX as CalculiX
 from .reference import read_result as read_result
 from .reference import read_stl as read_stl
 from .solvers import ArcLength as ArcLength

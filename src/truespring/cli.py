@@ -134,6 +134,8 @@ _TOLD = {
     "axes": "a file's axes along ours: x,z,-y has its z along our y, and our z against its y",
     "shift": "what is added to a file's places: 0,0,5 mm",
     "load_factor": "the load level of a file of one level; default: 1",
+    "full_time": "a file's time of full load; default: 1, or its last time where that is later",
+    "force_unit": "the unit of force of a .dat file, without which its energies are left out",
     "field": "the name of the displacement in a VTK file",
     "undeformed": "the body at rest, of STL or marker files that hold the deformed one only",
     "mesh": "the deck with the nodes of a .dat file; default: the .inp of its name",
@@ -219,7 +221,7 @@ def _writing(out: Path) -> Iterator[None]:
 def _say_failures(result: "Result", out: Path, shown: bool) -> None:
     """Name on standard error what did not converge and, unless `shown` already, why and what to try."""
     for name, path in result.paths.items():
-        if str(path.status) != "converged":
+        if str(path.status) not in ("converged", "read"):
             print(
                 f"truespring: {result.stem}: model '{name}' is {path.status}; "
                 f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
@@ -295,6 +297,8 @@ def _compare(options: argparse.Namespace) -> int:
     if options.json:
         values = [difference(result) for result in results]
         _print_json({one["model"]: one for one in values} if len(values) > 1 else values[0])
+    for result in results:
+        _say_failures(result, options.out, shown=not console.quiet)
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
 
 

@@ -94,6 +94,15 @@ class Comparison:
         return int(self.outside.sum())
 
     @cached_property
+    def n_reference_outside(self) -> int | None:
+        """The number of the reference's own nodes outside of the model's body; None where the model has no inside."""
+        model, reference = self.known_on
+        nodes = reference.problem.mesh.nodes
+        if not reference.states or not model.states or not model.whole.fills or nodes.shape[1] != model.whole.dim:
+            return None
+        return int(model.whole.locate(nodes).outside.sum())
+
+    @cached_property
     def hausdorff(self) -> Gap | None:
         """How far the deformed surfaces of both are apart at the last level that both have [m].
 
@@ -189,14 +198,15 @@ def compare(
 
 
 def _common_problem(model: Path, reference: Path) -> Problem:
-    """The problem on whose nodes two paths are compared: the model's but where only those of the reference will do."""
+    """The problem on whose nodes two paths are compared: the model's but where those of the reference tell more."""
     mine, theirs = model.problem, reference.problem
     if mine.mesh.dim != theirs.mesh.dim:
         return mine if mine.mesh.dim == 2 else theirs
+    if mine.mesh.n_nodes == theirs.mesh.n_nodes and matching_points(model.whole, theirs.mesh.nodes) is not None:
+        # One body: by its elements rather than as a network, with its supports and loads rather than without.
+        return max((mine, theirs), key=lambda one: (one.mesh.element != "line", one.stated))
     if not reference.whole.fills and model.whole.fills:  # markers, networks, surfaces in space
         return theirs
-    if theirs.stated and not mine.stated and mine.mesh.n_nodes == theirs.mesh.n_nodes:
-        return theirs if matching_points(model.whole, theirs.mesh.nodes) is not None else mine
     return mine
 
 

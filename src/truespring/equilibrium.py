@@ -42,6 +42,7 @@ class Status(StrEnum):
     UNSTABLE = "unstable"
     INVERTED = "inverted"
     NOT_CONVERGED = "not-converged"
+    READ = "read"
 
     @property
     def advice(self) -> str:
@@ -54,6 +55,7 @@ _ADVICE = {
     Status.UNSTABLE: "a real body would leave such a state; load less, or add a small side force to choose a branch",
     Status.INVERTED: "an element is turned inside out; load less or take more load_steps: springs and "
     "St. Venant-Kirchhoff have nothing that resists it",
+    Status.READ: "read from a file: what it converged to is known to the program that wrote it",
     Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; load less, take more load_steps, "
     "or another law: each bears a largest load",
 }
@@ -164,6 +166,11 @@ class Path:
         return Grid(mesh.nodes, {} if mesh.element == "line" else {mesh.kind.vtk: mesh.elements})
 
     @property
+    def is_cloud(self) -> bool:
+        """Whether it was read as points alone, which lines of its mesh join for no more than order."""
+        return self.grid is not None and not self.grid.cells
+
+    @property
     def load_factor(self) -> float:
         """The last load level reached; of a surface that was read, its own."""
         if self.states:
@@ -193,8 +200,11 @@ class Path:
 
     def at(self, load_factor: float) -> State | None:
         """Return the state at a level of what the solver was asked for, None where the path has none there."""
-        found = np.flatnonzero(np.abs(np.array([state.level for state in self.states]) - load_factor) <= _SAME_LEVEL)
-        return self.states[found[0]] if found.size else None
+        apart = np.abs(np.array([state.level for state in self.states]) - load_factor)
+        if not apart.size or np.isnan(apart).all():
+            return None
+        nearest = int(np.nanargmin(apart))
+        return self.states[nearest] if apart[nearest] <= _SAME_LEVEL else None
 
     def applied_force(self, state: State) -> Floats:
         """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion.

@@ -1,7 +1,7 @@
 """Two bodies that are one, told in other units, along other axes or from another origin: noticed, never mended."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,16 +55,16 @@ class _Box:
         return float(np.linalg.norm(np.nan_to_num(self.upper - self.lower)))
 
 
-def find_misfit(path: Path, reference: Path) -> Misfit | None:
-    """Return what would make a body lie where the reference lies; None where it does, or where nothing would."""
-    mine, theirs, tolerance = _box(path), _box(reference), _SAME_BOX
-    if not path.states or not reference.states:  # one is known deformed only: the other is taken there too
-        level = (path if not path.states else reference).load_factor
-        mine, theirs, tolerance = _box(path, level), _box(reference, level), _SAME_DEFORMED_BOX
+def find_misfit(path: Path, reference: Path, factors: Sequence[float] = _FACTORS) -> Misfit | None:
+    """Return what would make a body lie where the reference lies; None where it does, or where nothing would.
+
+    `factors` are what its lengths may be multiplied by: sizes of units over that which was taken.
+    """
+    mine, theirs, tolerance = _boxes(path, reference)
     if _fits(mine, theirs, tolerance):
         return None
     best, least = None, np.inf
-    for candidates in _tiers(mine, theirs, tolerance):
+    for candidates in _tiers(mine, theirs, tolerance, factors):
         for one in candidates:
             error = _sampled_error(path, reference, one)
             # The less is changed the likelier, but for what brings the motion much nearer.
@@ -77,6 +77,19 @@ def find_misfit(path: Path, reference: Path) -> Misfit | None:
 
 def _changes(one: Misfit) -> int:
     return (one.factor != 1) + (one.axes != ("x", "y", "z")) + any(one.shift)
+
+
+def same_place(path: Path, reference: Path) -> bool:
+    """Tell whether two bodies lie in one place, as far as their boxes tell."""
+    return _fits(*_boxes(path, reference))
+
+
+def _boxes(path: Path, reference: Path) -> "tuple[_Box, _Box, float]":
+    """The boxes of both, and how much they may differ as a share of their diagonal."""
+    if path.states and reference.states:
+        return _box(path), _box(reference), _SAME_BOX
+    level = (reference if path.states else path).load_factor  # one is known deformed only: the other is taken there too
+    return _box(path, level), _box(reference, level), _SAME_DEFORMED_BOX
 
 
 def displacement_misfit(comparison: Comparison) -> Misfit | None:
@@ -147,10 +160,11 @@ def _axes() -> Iterator[tuple[str, ...]]:
     yield from (axes for handed, axes in sorted(order, key=lambda one: -one[0]) if axes != ("x", "y", "z"))
 
 
-def _tiers(mine: _Box, theirs: _Box, tolerance: float) -> Iterator[Iterator[Misfit]]:
+def _tiers(mine: _Box, theirs: _Box, tolerance: float, factors: Sequence[float]) -> Iterator[Iterator[Misfit]]:
     """What fits of ever more that is changed: unit, axes, origin, and two or all of them."""
-    units, axes = [Misfit(factor) for factor in _FACTORS], [Misfit(axes=one) for one in _axes()]
-    both = [Misfit(factor, one.axes) for factor in _FACTORS for one in axes]
+    units = [Misfit(factor) for factor in factors if abs(factor - 1) > 1e-9]
+    axes = [Misfit(axes=one) for one in _axes()]
+    both = [Misfit(one.factor, other.axes) for one in units for other in axes]
     yield (one for one in units if _fits(_moved(mine, one), theirs, tolerance))
     yield (one for one in axes if _fits(_moved(mine, one), theirs, tolerance))
     if mine.filled and theirs.filled:

@@ -38,6 +38,8 @@ class Table:
         rows, self._lines = self._read()
         if len(rows) < 2:
             raise error(f"{file}: a line of column names and a row at least are wanted")
+        if len(rows[0]) == 1 and ";" in rows[0][0]:
+            raise error(f"{file}:1: values are separated by ';': commas are wanted, and points in numbers")
         self.columns: dict[str, int] = {}
         self._scales: dict[str, float] = {}
         for place, head in enumerate(rows[0]):

@@ -10,6 +10,7 @@ from truespring.errors import ExportError, nearest
 from truespring.exports.abaqus import abaqus
 from truespring.exports.arrays import as_json, npz
 from truespring.exports.calculix import calculix
+from truespring.exports.decks import check_springs
 from truespring.exports.exported import Exported as Exported
 from truespring.exports.exported import plain_springs
 from truespring.exports.exported import solve_springs as solve_springs
@@ -31,20 +32,36 @@ class Target:
         about: what they are, in a sentence.
         program: the name of a program that knows nothing but springs, empty for what takes any.
         negative: whether it takes springs of negative stiffness.
+        names: the files that it writes.
+        check: raises ExportError for plain springs or loads that it cannot take, None where it takes all.
     """
 
     files: Callable[[Exported], Files]
     about: str
     program: str = ""
     negative: bool = True
+    names: tuple[str, ...] = ()
+    check: Callable[[Problem, SpringNetwork], None] | None = None
 
+
+_DECKS = ("springs.inp", "fem.inp")
 
 TARGETS: Mapping[str, Target] = MappingProxyType(
     {
         "calculix": Target(
-            calculix, "CalculiX decks: springs.inp of SPRINGA elements, fem.inp of finite elements", "CalculiX"
+            calculix,
+            "CalculiX decks: springs.inp of SPRINGA elements, fem.inp of finite elements",
+            "CalculiX",
+            names=_DECKS,
+            check=check_springs,
         ),
-        "abaqus": Target(abaqus, "the same for Abaqus; Abaqus itself was not run on them", "Abaqus"),
+        "abaqus": Target(
+            abaqus,
+            "the same for Abaqus; Abaqus itself was not run on them",
+            "Abaqus",
+            names=_DECKS,
+            check=check_springs,
+        ),
         "mujoco": Target(mujoco, "MuJoCo's MJCF: springs.xml of sliding bodies and tendons", "MuJoCo", negative=False),
         "sofa": Target(
             sofa, "a Python scene for SOFA, of springs and finite elements; experimental: SOFA was not run", "SOFA"
@@ -86,31 +103,29 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_targets(names: Collection[str], problem: Problem, model: Springs | SpringNetwork) -> None:
-    """Raise ExportError for a model that is no springs, and for springs that a target cannot take; solve nothing."""
+    """Raise ExportError for what a target cannot take, and for two that write one file; solve nothing."""
     if not isinstance(model, Springs | SpringNetwork):
         raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
     springs = model if isinstance(model, SpringNetwork) else model.potential(problem)
-    for name in names:
-        if TARGETS[name].program:
-            plain_springs(springs, TARGETS[name].program, TARGETS[name].negative)
-
-
-def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]:
-    """Return the files of each target.
-
-    Raises ExportError for what one cannot express, and where two write the same file.
-    """
-    found = {name: TARGETS[name].files(exported) for name in names}
     written: dict[str, str] = {}
-    for name, files in found.items():
-        for file in files:
+    for name in names:
+        target = TARGETS[name]
+        if target.program:
+            network = plain_springs(springs, target.program, target.negative)
+            if target.check:
+                target.check(problem, network)
+        for file in target.names:
             if file in written:
                 raise ExportError(
                     f"targets {written[file]} and {name} both write {file}: export them one at a time, "
                     "into folders of their own"
                 )
             written[file] = name
-    return found
+
+
+def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]:
+    """Return the files of each target; raise ExportError for what one cannot express."""
+    return {name: TARGETS[name].files(exported) for name in names}
 
 
 def write_files(files: Files, folder: FilePath) -> tuple[FilePath, ...]:

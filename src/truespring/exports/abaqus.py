@@ -47,8 +47,9 @@ def _explained(name: str) -> tuple[str, ...]:
     return (
         f"Run it by: abaqus job={name} interactive (Abaqus/Standard)",
         "Units are SI: m, N, N/m, Pa, kg/m^3, J.",
-        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, and gives its loads and "
-        f"motions in full. {name}.dat gets the displacement of all nodes at the end of each, {name}.odb fields.",
+        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, time the load factor; it "
+        f"gives loads and motions in full. {name}.dat gets the displacement of all nodes after each, {name}.odb "
+        "fields.",
         "Abaqus was not run on this file: its form was checked by reading it back and by running it in CalculiX.",
     )
 
@@ -66,11 +67,11 @@ def _opening(header: Sequence[str]) -> list[str]:
 
 
 def _start(step: Step, nonlinear: bool) -> list[str]:
-    first = real(step.first_increment)
+    first, period = real(step.first_increment), real(step.period)
     return [
         f"*STEP, NAME=LEVEL-{step.number}, NLGEOM={'YES' if nonlinear else 'NO'}, INC=1000000",
         "*STATIC",
-        f"{first}, 1., 1.E-5, {first}",
+        f"{first}, {period}, {real(1e-5 * step.period)}, {first}",
         "*CONTROLS, PARAMETERS=FIELD",  # by default a residual of 0.5 % of the mean force is taken for balance
         "1.E-6, 1.E-6",
     ]

@@ -89,23 +89,29 @@ def _explained(name: str) -> tuple[str, ...]:
         f"Run it by: ccx {name}",
         "Units: metres, and micronewtons (uN) for forces, for ccx takes any residual below 1e-6 for zero, whatever the "
         "unit: stiffness is in uN/m, Young's modulus and pressure in uN/m^2, density in 1e-6 kg/m^3, energy in uJ.",
-        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, and gives its loads and "
-        f"motions in full. {name}.dat gets the displacement of all nodes at the end of each, {name}.frd fields.",
+        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, time the load factor; it "
+        f"gives loads and motions in full. {name}.dat gets the displacement of all nodes after each, {name}.frd "
+        "fields.",
     )
 
 
 _FEM = (
     "*ELASTIC under NLGEOM is St. Venant-Kirchhoff's law. Gravity and pressure are CalculiX's own *DLOAD; pressure "
-    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks with free faces: plane "
-    "stress but for what thickness over size tells.",
+    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks or wedges with free "
+    "faces: plane stress in the mean, and a pressure acts on the thickness as it becomes.",
 )
 
 
 def _start(step: Step, nonlinear: bool) -> list[str]:
     if not nonlinear:
-        return ["*STEP", "*STATIC"]
-    first = real(step.first_increment)
-    return ["*STEP, NLGEOM, INC=1000000", *_CONTROLS, "*STATIC", f"{first}, 1., 1.E-5, {first}"]
+        return ["*STEP", "*STATIC", f"{real(step.period)}, {real(step.period)}"]
+    first, period = real(step.first_increment), real(step.period)
+    return [
+        "*STEP, NLGEOM, INC=1000000",
+        *_CONTROLS,
+        "*STATIC",
+        f"{first}, {period}, {real(1e-5 * step.period)}, {first}",
+    ]
 
 
 def _output(continuum: bool) -> list[str]:

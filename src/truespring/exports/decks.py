@@ -7,7 +7,7 @@ Source: the manual of CalculiX CrunchiX, https://www.dhondt.de, and the keywords
 import itertools
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -15,17 +15,21 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ExportError
-from truespring.exports.exported import Exported
+from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.material import PlaneStrain
 from truespring.mesh import facets_within, select
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
-from truespring.potential import Loading, Potential
+from truespring.potential import Loading
 from truespring.problem import Problem
 
 # The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
 _LARGEST_INCREMENT = 0.25
+# How long a step is that is no load level.
+_NO_TIME = 1e-9
+# Nodes are led aside by this share of their longest spring; a stiffness below that share of the largest is none.
+_ASIDE, _LOOSE = 1e-2, 1e-9
 # How far lengths at rest may be from the distances of the nodes, a share of them: rounding.
 _AT_REST = 1e-12
 # Numbers in a line.
@@ -43,10 +47,13 @@ _PLANES = {"triangle": "3", "quadrilateral": "4"}
 
 
 class Step(NamedTuple):
-    """A load level: its number from 1, its load factor, and its first increment as a share of it."""
+    """A load level: its number from 1, the load factor that it adds, and how much of that its first increment does.
+
+    Time is the load factor in all decks: a result knows its level.
+    """
 
     number: int
-    load_factor: float
+    period: float
     first_increment: float
 
 
@@ -76,13 +83,25 @@ class OwnLoad(NamedTuple):
     further: str = ""
 
 
-class Twin(NamedTuple):
-    """A body as the program knows it: the lines of its model, what acts on its nodes, and what the program spreads."""
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """A body as the program knows it.
+
+    Attributes:
+        nodes: [m], shape (n_nodes, dim).
+        model: the lines of elements, materials and springs.
+        loading: what acts on the nodes.
+        own: what the program spreads.
+        aside: how far nodes are led aside before the first level [m], of the shape of `nodes`; empty if they are not.
+        for_good: boundary lines that hold at all levels.
+    """
 
     nodes: Floats
     model: list[str]
     loading: Loading
-    own: list[OwnLoad]
+    own: list[OwnLoad] = field(default_factory=list)
+    aside: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    for_good: list[str] = field(default_factory=list)
 
 
 def real(value: float) -> str:
@@ -113,22 +132,33 @@ def deck(
         *twin.model,
         *number_set("NSET", "HELD", np.flatnonzero(twin.loading.held.any(axis=1))),
     ]
+    if twin.aside.any():
+        lines += [*dialect.start(Step(0, _NO_TIME, _NO_TIME), nonlinear), *_led_aside(twin), "*END STEP"]
     for number, (last, level) in enumerate(itertools.pairwise([0.0, *levels]), 1):
-        step = Step(number, level, min(1.0, _LARGEST_INCREMENT / (level - last)))
+        step = Step(number, level - last, min(level - last, _LARGEST_INCREMENT))
         lines += [
             f"** Step {number}: load factor {level:.9g}",
             *dialect.start(step, nonlinear),
-            *_acting(twin, level, dialect.force_unit),
+            *_acting(twin, level, dialect.force_unit, anew=number == 1 and bool(twin.aside.any())),
             *(dialect.output(continuum) if number == 1 else []),  # goes on in the steps that follow
             "*END STEP",
         ]
     return "\n".join([*lines, ""])
 
 
-def _acting(twin: Twin, level: float, force_unit: float) -> Iterator[str]:
-    """Supports and loads at a level: amounts in full, which replace those of the step before."""
-    motion, force = twin.loading.motion(level), level * twin.loading.external_force / force_unit
+def _led_aside(twin: Twin) -> Iterator[str]:
+    """Boundary lines of a step before the first."""
+    yield "** Nodes that no spring holds at rest are led aside, along their load, and let go in the step that follows."
     yield "*BOUNDARY"
+    for node, axis in np.argwhere(twin.loading.held | (twin.aside != 0)).tolist():
+        yield f"{node + 1}, {axis + 1}, {axis + 1}, {real(twin.aside[node, axis])}"
+
+
+def _acting(twin: Twin, level: float, force_unit: float, anew: bool) -> Iterator[str]:
+    """Supports and loads at a level: amounts in full, which replace those of the step before; `anew` all of them."""
+    motion, force = twin.loading.motion(level), level * twin.loading.external_force / force_unit
+    yield "*BOUNDARY, OP=NEW" if anew else "*BOUNDARY"
+    yield from twin.for_good if anew else []
     for node, axis in np.argwhere(twin.loading.held).tolist():
         yield f"{node + 1}, {axis + 1}, {axis + 1}, {real(motion[node, axis])}"
     if force.any():
@@ -257,25 +287,56 @@ def spring_twin(problem: Problem, network: SpringNetwork, force_unit: float) -> 
         lines.append(f"*ELEMENT, TYPE=SPRINGA, ELSET=S{group}")
         lines += (f"{number + 1}, {joined((network.springs[number] + 1).tolist())}" for number in numbers)
         lines += [f"*SPRING, ELSET=S{group}", "", stiffness]  # the empty line stands for directions
-    if network.nodes.shape[1] == 2:  # these springs are in space: the plane is held in z
-        lines += ["*BOUNDARY", "NALL, 3, 3"]
-    return Twin(network.nodes, lines, problem.loading, [])
+    plane = ["NALL, 3, 3"] if network.nodes.shape[1] == 2 else []  # these springs are in space: it is held in z
+    lines += ["*BOUNDARY", *plane] if plane else []
+    aside = _aside(network, problem.loading)
+    return Twin(network.nodes, lines, problem.loading, aside=aside, for_good=plane)
 
 
-def check_springs(problem: Problem, potential: Potential) -> None:
-    """Raise ExportError where SPRINGA cannot say what a spring model is."""
-    if not isinstance(potential, SpringNetwork):
-        raise ExportError(
-            "SPRINGA elements are springs and nothing else: these springs have a volume term, or answer to each "
-            "other's lengths (rule biquadratic); take a rule without, and volume = false"
-        )
-    distance = np.linalg.norm(np.diff(potential.nodes[potential.springs], axis=1)[:, 0], axis=1)
-    tensed = np.abs(distance - potential.rest_length) > _AT_REST * distance
+def is_led_aside(problem: Problem, network: SpringNetwork) -> bool:
+    """Whether a deck of springs has a step before the first level."""
+    return bool(_aside(network, problem.loading).any())
+
+
+def _aside(network: SpringNetwork, loading: Loading) -> Floats:
+    """How far nodes are led aside that springs do not hold at rest in a free direction [m], shape (n_nodes, dim).
+
+    Such springs stiffen as the node moves, but Newton's method of a program that has no line search cannot begin.
+    """
+    n_nodes, dim = network.nodes.shape
+    ends = network.springs
+    along = np.diff(network.nodes[ends], axis=1)[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
+    stiffness, reach = np.zeros((n_nodes, dim, dim)), np.zeros(n_nodes)
+    for end in ends.T:
+        np.add.at(stiffness, end, network.stiffness[:, None, None] * along[:, :, None] * along[:, None, :])
+        np.maximum.at(reach, end, length)
+    largest = float(np.abs(stiffness).max())
+    free = ~loading.held
+    stiffness = stiffness * free[:, :, None] * free[:, None, :] + largest * np.eye(dim) * loading.held[:, None, :]
+    values, vectors = np.linalg.eigh(stiffness)
+    loose = np.abs(values) <= _LOOSE * largest
+    ways = np.where(loose[:, None, :], vectors, 0.0)  # as columns
+    pulled = np.einsum("nai,nbi,nb->na", ways, ways, loading.external_force)
+    size = np.linalg.norm(pulled, axis=1)
+    idle = loose.any(axis=1) & (size == 0)
+    pulled[idle] = ways[idle, :, :].sum(axis=2)
+    size = np.linalg.norm(pulled, axis=1)
+    share = np.divide(_ASIDE * reach, size, out=np.zeros(n_nodes), where=size > 0)
+    return np.asarray(share[:, None] * pulled)
+
+
+def check_springs(problem: Problem, network: SpringNetwork) -> None:
+    """Raise ExportError where SPRINGA elements cannot be these springs under these loads."""
+    distance = np.linalg.norm(np.diff(network.nodes[network.springs], axis=1)[:, 0], axis=1)
+    tensed = np.abs(distance - network.rest_length) > _AT_REST * distance
     if tensed.any():
         first = int(tensed.argmax())
         raise ExportError(
             f"a SPRINGA element has the length at rest that its nodes are apart: {int(tensed.sum())} springs have "
-            f"another, the first, number {first}, {potential.rest_length[first]:g} m instead of {distance[first]:g} m"
+            f"another, the first, number {first}, {network.rest_length[first]:g} m instead of {distance[first]:g} m; "
+            "other targets take them: mujoco, sofa, npz, json"
         )
     for load in problem.loads:
         if isinstance(load, Pressure | Moment):
@@ -285,25 +346,19 @@ def check_springs(problem: Problem, potential: Potential) -> None:
                 else ("moment", "the rotation of a support")
             )
             raise ExportError(
-                f"a {what} follows a face, and springs have none: take {instead} or the continuum's deck instead"
+                f"a {what} follows a face, and SPRINGA elements have none: take {instead} or finite elements instead"
             )
 
 
 # --- headers -------------------------------------------------------------------------------------
 
-# Sentences that hold for files of springs in SI units at full load, of which a deck says its own.
-_OTHERWISE = ("Units are SI", "Loads and prescribed motions stand")
-_OF_SPRINGS = ("Expect", "Another program need not", "Warning of truespring")
-
 
 def described(exported: Exported, what: str, springs: bool) -> list[str]:
-    """Return what every target says of the problem, without what a deck says otherwise, and what the deck is."""
-    left_out = _OTHERWISE if springs else _OTHERWISE + _OF_SPRINGS
-    title, written, *lines = (line for line in exported.header if not line.startswith(left_out))
+    """Return what a deck is, and what the problem asks; of springs also what to expect of them."""
+    (title,) = printable([exported.title])
     if springs:
-        return [title, f"{what}: {written}", *lines]
-    by_program = [line.replace(", as forces on nodes", "") for line in lines]
-    return [title, f"{what}, written by truespring {version('truespring')}.", *by_program]
+        return [title, f"{what}: {exported.written}", *exported.asked, *exported.told_of_springs]
+    return [title, f"{what}, written by truespring {version('truespring')}.", *exported.asked]
 
 
 def comments(header: Sequence[str]) -> list[str]:

@@ -1,6 +1,6 @@
 """What every target is given: the problem, the springs, and the equilibrium that the receiver should find."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -95,23 +95,42 @@ class Exported:
     @cached_property
     def header(self) -> tuple[str, ...]:
         """Title, units, material, supports, loads and what to expect, a sentence a line, for the head of a file."""
-        printable = ("".join(sign if sign.isprintable() else " " for sign in line) for line in self._header())
-        return tuple(" ".join(line.split()) for line in printable)
+        return printable(
+            [
+                self.title,
+                self.written,
+                "Units are SI: m, N, N/m, kg, s.",
+                *self.asked,
+                "Loads and prescribed motions stand at their full values.",
+                *self.told_of_springs,
+            ]
+        )
 
-    def _header(self) -> Iterator[str]:
+    @property
+    def written(self) -> str:
+        """What the springs are, and who wrote them."""
+        return f"{self.path.label}, written by truespring {version('truespring')}."
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Mesh, material, section, supports and loads, a sentence a line."""
+        return printable(self._asked())
+
+    @property
+    def told_of_springs(self) -> tuple[str, ...]:
+        """How springs bear weight, what to expect of them, and what is to be known, a sentence a line."""
+        heavy = any(isinstance(load, Gravity) for load in self.problem.loads)
+        weight = ["Gravity acts as forces on nodes."] if heavy else []
+        return printable([*weight, *self.expected, *self.notes])
+
+    def _asked(self) -> Iterator[str]:
         mesh = self.problem.mesh
-        yield self.title
-        yield f"{self.path.label}, written by truespring {version('truespring')}."
-        yield "Units are SI: m, N, N/m, kg, s."
         yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.element}."
         yield from self._body()
         for number, (support, held) in enumerate(zip(self.problem.supports, self.problem.held, strict=True), 1):
             yield f"Support {number}: {_support(support, held.directions)} ({_counted(len(held.nodes), 'node')})."
         for number, load in enumerate(self.problem.loads, 1):
             yield f"Load {number}: {_load(load)}."
-        yield "Loads and prescribed motions stand at their full values."
-        yield from self.expected
-        yield from self.notes
 
     def _body(self) -> Iterator[str]:
         for number, material in enumerate(self.problem.materials):
@@ -193,7 +212,7 @@ def solve_springs(
     """Solve springs up to full load, so that a file can tell what to expect of them.
 
     A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
-    programs put the load on. `probe` is by default the node that moves most.
+    programs put the load on. `probe` is by default the free node that moves most.
     """
     chosen, remarks = solver or Newton(), []
     steps = chosen.steps if isinstance(chosen, DisplacementControl) else chosen.load_steps
@@ -202,7 +221,9 @@ def solve_springs(
         remarks = ["The load is taken up in steps here, not followed past limit points as it was asked."]
     path = solve(problem, model, chosen, report)
     if probe is None:
-        probe = int(np.linalg.norm(path.states[-1].displacement, axis=1).argmax())
+        told = problem.loading.held.all(axis=1)  # such a node's motion tells nothing of the springs
+        moved = np.linalg.norm(path.states[-1].displacement, axis=1)
+        probe = int(np.where(told & ~told.all(), -1.0, moved).argmax())
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
@@ -223,6 +244,12 @@ def _support(support: Fixed, directions: Sequence[int]) -> str:
     return words
 
 
+def printable(sentences: Iterable[str]) -> tuple[str, ...]:
+    """Return sentences of a line each: whatever a title holds, it does not end the comment that it stands in."""
+    signs = ("".join(sign if sign.isprintable() else " " for sign in sentence) for sentence in sentences)
+    return tuple(" ".join(sentence.split()) for sentence in signs)
+
+
 def _load(load: Load) -> str:
     match load:
         case Force(on, total):
@@ -230,7 +257,7 @@ def _load(load: Load) -> str:
         case Traction(on, traction):
             return f"traction {_vector(traction)} Pa on {_where(on)}"
         case Gravity(acceleration):
-            return f"gravity {_vector(acceleration)} m/s^2, as forces on nodes"
+            return f"gravity {_vector(acceleration)} m/s^2"
         case Pressure(on, pressure):
             return f"pressure {pressure:g} Pa on {_where(on)}"
         case Moment(on, moment):

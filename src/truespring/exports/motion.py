@@ -28,7 +28,7 @@ _SETTLED, _SURELY = 1e-3, 1e-5
 # A critically damped oscillation is down to 1e-5 where (1 + w t) exp(-w t) is, at w t = 14.2.
 _USUAL = 15.0
 # A simulation takes at most so many times as long as that, and so many springs times steps.
-_LONGEST, _BUDGET = 100, 10**9
+_LONGEST, _BUDGET = 20, 10**9
 # Nodes that nothing pulls to a support start at rest; the others are pulled so many times more.
 _SLACK = 1e-9
 
@@ -172,12 +172,12 @@ def _settled(
     exported: Exported, network: SpringNetwork, motion: tuple[Floats, float, float, Floats], usual: int
 ) -> tuple[int, bool | None]:
     """The steps to come within 0.1 % of our equilibrium and stay, and whether that is so; by the motion itself."""
-    if exported.state is None:
+    longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
+    if exported.state is None or longest < usual:
         return usual, None
     mass, damping, step, start = motion
     goal = exported.state.positions
     largest = float(np.linalg.norm(exported.state.displacement, axis=1).max()) or 1.0
-    longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
     free = ~exported.held
     force, gain = exported.external_force, np.where(free, step / mass[:, None], 0.0)
     positions, velocity, last = start.copy(), np.zeros(start.shape), 0

@@ -84,7 +84,7 @@ def _of_elements(exported: Exported) -> Iterator[str]:
     """What the finite elements are there, which is not what they are here."""
     element = exported.problem.mesh.element
     if not exported.problem.materials:
-        yield "A network has no finite element twin."
+        yield "A network has no finite element twin. It starts from the first load level that truespring reached."
         return
     yield (
         f"The twin's elements are SOFA's {_ELEMENTS[element][1]}, method 'large': linear elasticity turned with each "
@@ -109,6 +109,7 @@ def _data(exported: Exported, network: SpringNetwork) -> Iterator[str]:
     yield from _named("PLUGINS", list(_PLUGINS), "SOFA's plugins that hold the components")
     yield from _named("LOAD_STEPS", exported.load_steps, "steps of the animation up to full load")
     yield from _named("NODES", nodes, "positions at rest [m]")
+    yield from _named("START", _start(exported), "positions to start from [m], None where that is at rest")
     yield from _named("SPRINGS", network.springs, "the two nodes of each spring")
     yield from _named("STIFFNESS", network.stiffness, "of each spring [N/m]")
     yield from _named("REST_LENGTH", network.rest_length, "of each spring [m]")
@@ -119,6 +120,12 @@ def _data(exported: Exported, network: SpringNetwork) -> Iterator[str]:
     yield from _named("MOTIONS", motions, "node, direction and prescribed displacement at full load [m]")
     yield from _named("PROBE", probe, "a node, and its displacement at full load [m]")
     yield from _named("FEM", _elements(exported), "the finite element twin, None where there is none")
+
+
+def _start(exported: Exported) -> Floats | None:
+    """Our first load level, of a network: at rest it may be a mechanism, of which Newton's method knows no way out."""
+    loaded = exported.path.states[1:]
+    return in_space(loaded[0].positions) if loaded and not exported.problem.materials else None
 
 
 def _named(name: str, value: Any, what: str) -> Iterator[str]:
@@ -216,7 +223,9 @@ def add_body(root, name):
     )
     body.addObject("StaticSolver", newtonSolver="@newton")
     body.addObject("SparseLDLSolver")
-    dofs = body.addObject("MechanicalObject", name="dofs", template="Vec3", position=NODES)
+    dofs = body.addObject(
+        "MechanicalObject", name="dofs", template="Vec3", position=START or NODES, rest_position=NODES
+    )
     for directions, nodes in HELD:
         if all(directions):
             body.addObject("FixedProjectiveConstraint", indices=nodes)

@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Protocol, runtime_checkable
@@ -13,9 +13,11 @@ from truespring.arrays import Floats
 from truespring.equilibrium import Path, Solver, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
-from truespring.exports.decks import check_fem, check_springs, fem_element
+from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside
+from truespring.exports.exported import plain_springs
+from truespring.loading import Pressure
+from truespring.material import PlaneStress
 from truespring.models import SpringNetwork, Springs
-from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
 from truespring.reference.dat import read_dat
@@ -79,45 +81,50 @@ class CalculiX:
         if not isinstance(solver, Newton):
             raise ModelError('CalculiX follows the load only: take control = "load", or leave this model out')
         find_ccx()
-        if self.springs is None:
+        if self._network(problem) is None:
             check_fem(problem, self.law)
-        else:
-            check_springs(problem, _potential(self.springs, problem))
 
-    def deck(self, problem: Problem, levels: Sequence[float]) -> str:
-        """Return the deck of a step for each load factor; see exports.calculix."""
+    def _network(self, problem: Problem) -> SpringNetwork | None:
+        """The springs; refused where they are more than SPRINGA elements can be."""
         if self.springs is None:
-            return fem_deck(problem, levels, self.law)
-        network = _potential(self.springs, problem)
+            return None
+        potential = self.springs if isinstance(self.springs, SpringNetwork) else self.springs.potential(problem)
+        network = plain_springs(potential, "CalculiX")
         check_springs(problem, network)
-        assert isinstance(network, SpringNetwork)  # else refused
-        return spring_deck(problem, network, levels)
+        return network
 
     def run(self, problem: Problem, solver: Solver, report: Reporter | None = None) -> Path:
         """Run ccx in a folder of its own and return the states that it reached, those at rest first.
 
         A run that does not converge is not an exception: the path ends at the last level reached. Raises ModelError
-        and ExportError as `check` does, ReferenceFileError where ccx refuses the deck or its result is damaged.
+        and ExportError as `check` does.
         """
         self.check(problem, solver)
         assert isinstance(solver, Newton)
         levels = [(number + 1) / solver.load_steps for number in range(solver.load_steps)]
+        network = self._network(problem)
+        deck = fem_deck(problem, levels, self.law) if network is None else spring_deck(problem, network, levels)
+        before = int(network is not None and is_led_aside(problem, network))  # steps that are no load level
 
         def reached(step: int, share: float) -> None:
-            if report:
-                before = levels[step - 2] if step > 1 else 0.0
-                report(before + share * (levels[step - 1] - before), 0, math.nan)
+            place = step - before - 1
+            if report and place >= 0:
+                last = levels[place - 1] if place else 0.0
+                report(last + share * (levels[place] - last), 0, math.nan)
 
         with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
             file = FilePath(folder) / "model.inp"
-            file.write_text(self.deck(problem, levels), encoding="utf-8")
+            file.write_text(deck, encoding="utf-8")
             finished = run_ccx(file, reached=reached)
-            found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
-        if not found and not finished.efforts:
-            raise ReferenceFileError(f"CalculiX took no step: {_said(finished)}")
-        states = [self._state(problem, 0.0, Level(0.0, np.zeros((problem.mesh.n_nodes, 3)), 0.0), None, finished)]
-        for load_factor, (level, force) in zip(levels, found, strict=False):
-            states.append(self._state(problem, load_factor, level, force, finished))
+            try:
+                found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
+            except ReferenceFileError as error:  # as where ccx was ended while it wrote
+                found, finished = [], replace(finished, errors=(*finished.errors, str(error)))
+        rest = Level(0.0, np.zeros((problem.mesh.n_nodes, 3)), 0.0)
+        states = [self._state(problem, 0.0, rest, np.zeros((problem.mesh.n_nodes, 3)), None, network)]
+        for place, (load_factor, (level, force)) in enumerate(zip(levels, found, strict=False)):
+            effort = finished.efforts.get(place + before + 1)
+            states.append(self._state(problem, load_factor, level, force, effort, network))
         return self._path(problem, states, levels, finished)
 
     def _path(self, problem: Problem, states: list[State], levels: list[float], finished: Finished) -> Path:
@@ -143,6 +150,12 @@ class CalculiX:
                 f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints that of the last "
                 "increment only, and took several to a level"
             )
+        pressed = any(isinstance(load, Pressure) for load in problem.loads)
+        if pressed and isinstance(problem.section, PlaneStress) and not self._linear:
+            warnings.append(
+                "the pressure acts on the thickness as it becomes, in truespring's own models on that at rest: plane "
+                "strain has no such difference"
+            )
         warnings.append("stability not proven: CalculiX does not tell it")
         return Path(
             problem=problem,
@@ -156,55 +169,43 @@ class CalculiX:
         )
 
     def _state(
-        self, problem: Problem, load_factor: float, level: Level, internal: Floats | None, finished: Finished
+        self,
+        problem: Problem,
+        load_factor: float,
+        level: Level,
+        internal: Floats,
+        effort: Effort | None,
+        network: SpringNetwork | None,
     ) -> State:
-        """A state of what was read: displacement, energy, and the force in each node [N]."""
+        """A state of what was read: displacement, energy, and the internal force in each node [N]."""
         mesh, loading = problem.mesh, problem.loading
         displacement = level.displacement[:, : mesh.dim]
         positions = mesh.nodes + displacement
         external = loading.force(mesh.nodes if self._linear else positions, load_factor)
-        effort = finished.efforts.get(round(level.time))
-        reaction = np.zeros(positions.shape)
-        if internal is not None:
-            reaction = np.where(loading.held, internal[:, : mesh.dim] - external, 0.0)
+        energy = math.nan if level.energy is None or (effort and effort.increments > 1) else level.energy
+        stretch = None if network is None else network.stretch(positions)
         return State(
             load_factor=load_factor,
             positions=positions,
             all_positions=positions,
             displacement=displacement,
-            reaction=reaction,
+            reaction=np.where(loading.held, internal[:, : mesh.dim] - external, 0.0),
             applied_force=external.sum(axis=0),
-            energy=self._energy(problem, positions, level, effort),
+            energy=energy if network is None else network.energy(positions),
             iterations=0 if effort is None else effort.iterations,
             residual=math.nan,
             negative_eigenvalues=None,
             branched=False,
             area_ratio=mesh.smallest_area_ratio(positions),
-            stretch=None if self.springs is None else _stretch(_potential(self.springs, problem), positions),
+            stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
             level=load_factor,
         )
 
-    def _energy(self, problem: Problem, positions: Floats, level: Level, effort: Effort | None) -> float:
-        """Stored energy [J]: of springs it is known from their lengths; ccx prints that of the last increment."""
-        if self.springs is not None:
-            return _potential(self.springs, problem).energy(positions)
-        whole = effort is None or effort.increments == 1
-        return level.energy if whole and level.energy is not None else math.nan
-
-
-def _potential(springs: Springs | SpringNetwork, problem: Problem) -> Potential:
-    return springs if isinstance(springs, SpringNetwork) else springs.potential(problem)
-
-
-def _stretch(potential: Potential, positions: Floats) -> tuple[float, float] | None:
-    if not isinstance(potential, Stretched):
-        return None
-    stretch = potential.stretch(positions)
-    return float(stretch.min()), float(stretch.max())
-
 
 def _said(finished: Finished) -> str:
-    return f"'{finished.errors[-1]}'" if finished.errors else f"nothing (exit code {finished.code})"
+    if finished.errors:
+        return f"'{finished.errors[-1]}'"
+    return f"nothing (exit code {finished.code}); are its equations singular at rest, a part of the body free to move?"
 
 
 def _results(file: FilePath, n_nodes: int) -> list[tuple[Level, Floats]]:

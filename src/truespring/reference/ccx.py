@@ -61,11 +61,12 @@ def find_ccx() -> str:
 def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = None) -> Finished:
     """Run ccx on a deck in its own folder, which gets what ccx writes.
 
-    `threads` are by default as many as truespring takes, or fewer where OMP_NUM_THREADS says so. Raises ModelError
-    where ccx is not installed.
+    `threads` are by default as many as truespring takes. Raises ModelError where ccx is not installed.
     """
+    from truespring.kernels.threads import n_threads
+
     program, said = find_ccx(), deck.with_suffix(".txt")
-    environment = os.environ | {"OMP_NUM_THREADS": str(threads or _threads())}
+    environment = os.environ | {"OMP_NUM_THREADS": str(threads or n_threads())}
     started = time.perf_counter()
     with said.open("wb") as stream:
         process = subprocess.Popen(
@@ -89,13 +90,6 @@ def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = No
         efforts[row.step] = Effort(before.increments + row.converged, before.iterations + row.iterations)
     errors = tuple(_errors(said.read_text(encoding="utf-8", errors="replace").splitlines()))
     return Finished(process.returncode, seconds, errors, efforts)
-
-
-def _threads() -> int:
-    from truespring.kernels.threads import n_threads
-
-    given = os.environ.get("OMP_NUM_THREADS", "")
-    return min(n_threads(), int(given)) if given.isdigit() and int(given) else n_threads()
 
 
 class _Increment(NamedTuple):

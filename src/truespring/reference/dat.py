@@ -56,7 +56,9 @@ def read_dat(file: Path, reading: Reading | None = None, mesh: Path | None = Non
 def _deck(file: Path, mesh: Path | None) -> Contents:
     deck = file.with_suffix(".inp") if mesh is None else mesh
     if mesh is None and not deck.is_file():
-        raise ReferenceFileError(f"{file} holds no nodes and elements: put the deck {deck.name} beside it, or give it")
+        raise ReferenceFileError(
+            f"{file} holds no nodes and elements: put the deck {deck.name} beside it, or give it (--mesh)"
+        )
     if deck.suffix.lower() != ".inp":
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)

@@ -269,4 +269,5 @@ class _Result:
             name, order = _TYPES[code]
             nodes = np.frombuffer(self._elements[code], np.int64).reshape(-1, len(order))
             cells[name] = rows_of(numbers, nodes[:, order], f"a {name}", file)
-        return Record(file, "frd", points, cells, levels, tuple(map(str, numbers.tolist())), notes)
+        names = tuple(map(str, numbers.tolist()))
+        return Record(file, "frd", points, cells, levels, names, notes, stopped=not self._is_whole)

@@ -38,7 +38,7 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
     if undeformed is None and not moved:
         raise ReferenceFileError(
             f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or give a second "
-            "file with the markers at rest (undeformed)"
+            "file with the markers at rest (--undeformed)"
         )
     if undeformed is not None and moved:
         raise ReferenceFileError(f"{file} has the displacement in column u{moved[0]}: leave undeformed out")

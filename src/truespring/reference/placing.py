@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from truespring.errors import MeshError, ReferenceFileError, TruespringError
 from truespring.mesh import Grid, Mesh, corner_mesh
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
-from truespring.reference.record import Level, Record
+from truespring.reference.record import Record
 from truespring.units import to_si
 
 # A body this thin lies in a plane, a share of its diameter; displacements out of it are as small beside the others.
@@ -28,12 +29,16 @@ class Placing:
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m], shape (3,).
         load_factor: of a file of one level; None takes full load.
+        full_time: the file's time of full load; None takes 1, or the last time where that is later.
+        force_unit: the file's unit of force, such as "N"; None leaves out energies of files that tell none.
     """
 
     unit: str = "m"
     axes: tuple[str, ...] = tuple(AXES)
     shift: tuple[float, ...] = (0.0, 0.0, 0.0)
     load_factor: float | None = None
+    force_unit: str | None = None
+    full_time: float | None = None
 
     def __post_init__(self) -> None:
         letters = [axis.removeprefix("-") for axis in self.axes]
@@ -43,20 +48,31 @@ class Placing:
             )
         if self.load_factor is not None and not 0 < self.load_factor <= 1:
             raise ReferenceFileError(f"load_factor = {self.load_factor:g} is not above 0 and at most 1")
-        _ = self.scale
+        if self.full_time is not None and not (math.isfinite(self.full_time) and self.full_time > 0):
+            raise ReferenceFileError(f"full_time = {self.full_time:g} is not above 0")
+        _ = self.scale, self.joules
 
     @property
     def scale(self) -> float:
         """The file's unit of length [m]."""
-        try:
-            size = to_si(self.unit if self.unit[:1].isdigit() else f"1 {self.unit}", "length")
-        except TruespringError:
-            size = 0.0
-        if size <= 0:
+        size = _unit(self.unit, "length")
+        if size is None:
             raise ReferenceFileError(
                 f"unit = '{self.unit}' is no unit of length; allowed are m, cm, mm, inch and others"
             )
         return size
+
+    @property
+    def joules(self) -> float:
+        """The file's unit of energy [J], not a number where that of force is not told."""
+        if self.force_unit is None:
+            return math.nan
+        size = _unit(self.force_unit, "force")
+        if size is None:
+            raise ReferenceFileError(
+                f"force_unit = '{self.force_unit}' is no unit of force; allowed are N, kN, uN and others"
+            )
+        return size * self.scale
 
     def turned(self, vectors: Floats) -> Floats:
         """Return vectors of the file, shape (n, 3), along our axes, in the file's unit."""
@@ -73,12 +89,22 @@ class Placing:
         return self.scale * self.turned(vectors)
 
 
+def _unit(text: str, dimension: Literal["length", "force"]) -> float | None:
+    """The size of a unit in SI, None where it is none of the dimension."""
+    try:
+        size = to_si(text if text[:1].isdigit() else f"1 {text}", dimension)
+    except TruespringError:
+        return None
+    return size if size > 0 else None
+
+
 def placed(record: Record, placing: Placing, label: str) -> Path:
     """Return a record as a path, its body a mesh of the corners of its cells; see mesh.corner_mesh.
 
     Stability, convergence, loads and supports are not known of it. Raises ReferenceFileError where its cells are no
     mesh, or its levels no load levels.
     """
+    record, left_out = _without_unknown(record)
     points = placing.places(record.points)
     factors, notes = _load_factors(record, placing)
     moves = [placing.displacement(level.displacement) for level in record.levels]
@@ -90,28 +116,51 @@ def placed(record: Record, placing: Placing, label: str) -> Path:
         raise ReferenceFileError(f"{record.file}: {error}") from None
     order = _mesh_first(whole, nodes)
     grid = _picked(whole, order)
+    # Energies in VTK files are truespring's own, in joules; others are in the file's units.
+    joules = 1.0 if record.kind in ("vtu", "pvd") else placing.joules
     states = [
-        _state(mesh, grid, move[order, :dim], level, factor)
+        told_state(
+            mesh, grid.points, move[order, :dim], factor, math.nan if level.energy is None else joules * level.energy
+        )
         for level, move, factor in zip(record.levels, moves, factors, strict=True)
     ]
     if len(states) > 1 and factors[0] > 0:
-        at_rest = Level(0.0, np.zeros(0), 0.0, np.zeros(3))
-        states.insert(0, _state(mesh, grid, np.zeros(grid.points.shape), at_rest, 0.0))
+        states.insert(0, told_state(mesh, grid.points, np.zeros(grid.points.shape), 0.0, energy=0.0))
     return Path(
         problem=Problem(mesh, stated=False),
         label=label,
         kind=record.kind,
         states=tuple(states),
-        status=Status.CONVERGED,
-        warnings=(*record.notes, *notes, unproven(label)),
+        status=Status.NOT_CONVERGED if record.stopped else Status.READ,
+        warnings=(*record.notes, *left_out, *notes, unproven(label)),
         grid=grid,
     )
+
+
+def _without_unknown(record: Record) -> tuple[Record, list[str]]:
+    """A record without the points whose displacement it does not tell, and without their cells; and a word on it."""
+    known = np.logical_and.reduce([np.isfinite(level.displacement).all(axis=1) for level in record.levels])
+    if known.all():
+        return record, []
+    cells = {kind: nodes[known[nodes].all(axis=1)] for kind, nodes in record.cells.items()}
+    n_left = sum(len(nodes) for nodes in record.cells.values()) - sum(len(nodes) for nodes in cells.values())
+    number = np.cumsum(known) - 1
+    return replace(
+        record,
+        points=record.points[known],
+        cells={kind: number[nodes] for kind, nodes in cells.items() if len(nodes)},
+        levels=tuple(replace(level, displacement=level.displacement[known]) for level in record.levels),
+        names=tuple(name for name, there in zip(record.names, known, strict=False) if there),
+    ), [
+        f"the displacement of {(~known).sum()} of {len(known)} points is not told: they are left out, and {n_left} "
+        "cells that have them"
+    ]
 
 
 def unproven(label: str) -> str:
     """Return the warning that what was read was not solved here."""
     return (
-        f"{label} was read, not solved: its convergence and stability are those of the program that wrote it; "
+        f"read from {label}, not solved here: its convergence and stability are those of the program that wrote it; "
         "stability not proven"
     )
 
@@ -119,20 +168,39 @@ def unproven(label: str) -> str:
 def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[str]]:
     """The load factor of each level, and what should be known of how they were found."""
     times = [level.time for level in record.levels]
-    if len(times) == 1:
-        factor = 1.0 if placing.load_factor is None else placing.load_factor
-        return [factor], []
     if placing.load_factor is not None:
-        raise ReferenceFileError(f"{record.file} has {len(times)} levels: load_factor is for a file of one")
+        if len(times) > 1:
+            raise ReferenceFileError(
+                f"{record.file} has {len(times)} levels, a load factor is for a file of one: say the time of full load "
+                "(--full-time) where its times are no load factors"
+            )
+        return [placing.load_factor], []
     if any(later <= earlier for earlier, later in itertools.pairwise(times)) or times[0] < 0:
         factors = [(number + 1) / len(times) for number in range(len(times))]
         return factors, [f"its {len(times)} levels have no ascending times and were taken as equal shares of the load"]
     last = times[-1]
-    if math.isclose(last, 1.0, rel_tol=1e-6):
-        return [*times[:-1], 1.0], []
-    return [time / last for time in times[:-1]] + [1.0], [
-        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1"
+    if placing.full_time is not None:
+        if last > placing.full_time * (1 + 1e-6):
+            raise ReferenceFileError(
+                f"{record.file} goes on to time {last:g}, beyond that of full load, {placing.full_time:g}"
+            )
+        return [_rounded(time / placing.full_time) for time in times], []
+    if last <= 1 + 1e-6:
+        short = (
+            [] if last >= 1 - 1e-6 else [f"it ends at time {last:.6g}, which was taken as load factor: full load is 1"]
+        )
+        return [_rounded(time) for time in times], short
+    if len(times) == 1:
+        return [1.0], [f"its only level, of time {last:.6g}, was taken as full load"]
+    return [_rounded(time / last) for time in times], [
+        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1, the last as "
+        "full load; --full-time tells another"
     ]
+
+
+def _rounded(load_factor: float) -> float:
+    """Full load exactly, where digits of a file fall short of it."""
+    return 1.0 if math.isclose(load_factor, 1.0, rel_tol=1e-6) else load_factor
 
 
 def _dim(record: Record, points: Floats, moves: list[Floats]) -> int:
@@ -159,18 +227,28 @@ def _picked(grid: Grid, order: Ints) -> Grid:
     return Grid(grid.points[order], {kind: number[cells] for kind, cells in grid.cells.items()})
 
 
-def _state(mesh: Mesh, grid: Grid, displacement: Floats, level: Level, load_factor: float) -> State:
-    """A state of which no more is known than how far each point has moved [m], shape (n_points, dim)."""
+def told_state(
+    mesh: Mesh,
+    points: Floats,
+    displacement: Floats,
+    load_factor: float,
+    energy: float = math.nan,
+    applied_force: Floats | None = None,
+) -> State:
+    """Return a state of which no more is known than how far each point has moved [m], shape (n_points, dim).
+
+    The mesh's nodes are the first of the points; energy [J] and the total applied force [N] where they are told.
+    """
     positions = mesh.nodes + displacement[: mesh.n_nodes]
-    force = np.full(mesh.dim, math.nan) if level.force is None else level.force[: mesh.dim]
+    unknown = np.full(mesh.dim, math.nan if load_factor else 0.0)
     return State(
         load_factor=load_factor,
         positions=positions,
-        all_positions=grid.points + displacement,
+        all_positions=points + displacement,
         displacement=displacement[: mesh.n_nodes],
         reaction=np.full(positions.shape, math.nan),
-        applied_force=force,
-        energy=math.nan if level.energy is None else level.energy,
+        applied_force=unknown if applied_force is None else applied_force,
+        energy=energy,
         iterations=0,
         residual=math.nan,
         negative_eigenvalues=None,

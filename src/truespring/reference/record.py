@@ -17,8 +17,8 @@ class Level:
     Attributes:
         time: what the file counts levels by: a time, a load factor or a number.
         displacement: of each point [the file's unit of length], shape (n_points, 3).
-        energy: stored elastic energy [J], None where the file tells none.
-        force: total of the loads [N], shape (3,), None where the file tells none.
+        energy: stored elastic energy [J, of CalculiX the deck's units], None where the file tells none.
+        force: total of the loads [N, of CalculiX the deck's unit], shape (3,), None where the file tells none.
     """
 
     time: float
@@ -39,6 +39,7 @@ class Record:
             nodes, each of shape (n_cells, k); empty for markers.
         levels: in the file's order, at least one; a state of rest is among them only if the file has it.
         names: the number or name that the file gives each point, of length n_points.
+        stopped: whether the file tells that the run did not get to its end.
         notes: what should be known of the file, in words.
     """
 
@@ -49,3 +50,4 @@ class Record:
     levels: tuple[Level, ...]
     names: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    stopped: bool = False

@@ -40,6 +40,8 @@ def read_result(
     axes: Sequence[str] = ("x", "y", "z"),
     shift: Sequence[float] = (0.0, 0.0, 0.0),
     load_factor: float | None = None,
+    force_unit: str | None = None,
+    full_time: float | None = None,
     field: str | None = None,
     undeformed: str | Path | None = None,
     mesh: str | Path | None = None,
@@ -54,12 +56,14 @@ def read_result(
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m].
         load_factor: of a file of one level; full load by default.
+        full_time: the file's time of full load; by default 1, or its last time where that is later.
+        force_unit: the file's unit of force, without which the energies of a .dat file are left out.
         field, undeformed, mesh, reading: see read_record.
 
     The path has a mesh of the corners of the file's cells, no loads and no supports; further nodes of its cells are
     in `all_positions` of its states. Raises ReferenceFileError where the file cannot be read or holds no body.
     """
-    placing = Placing(unit, tuple(axes), tuple(shift), load_factor)
+    placing = Placing(unit, tuple(axes), tuple(shift), load_factor, force_unit, full_time)
     record = read_record(file, field=field, undeformed=undeformed, mesh=mesh, reading=reading)
     return placed(record, placing, Path(file).name)
 

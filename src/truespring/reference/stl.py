@@ -1,7 +1,6 @@
 """Deformed bodies that another program wrote as STL: triangles without connectivity and without a unit."""
 
 import io
-import math
 import pathlib
 import re
 import warnings as python_warnings
@@ -14,7 +13,7 @@ from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
-from truespring.reference.placing import Placing, unproven
+from truespring.reference.placing import Placing, told_state, unproven
 
 # All shares of a body's diameter.
 _SAME_POINT = 1e-6  # vertices this near are one point: text files carry six digits or more
@@ -105,7 +104,7 @@ def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> 
         label=file.name,
         kind="stl",
         states=(),
-        status=Status.CONVERGED,
+        status=Status.READ,
         warnings=(unproven(file.name),),
         shell=Shell(points, triangles, factor),
     )
@@ -317,23 +316,9 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path
         )
     moved = (surface.points - rest.points)[rest.triangles[triangle]]
     displacement = (shares[:, :, None] * moved).sum(axis=1)
-    positions = mesh.nodes + displacement
-    return State(
-        load_factor=surface.load_factor,
-        positions=positions,
-        all_positions=positions,
-        displacement=displacement,
-        reaction=np.full_like(positions, math.nan),
-        applied_force=problem.loading.force(positions, surface.load_factor).sum(axis=0),
-        energy=math.nan,
-        iterations=0,
-        residual=math.nan,
-        negative_eigenvalues=None,
-        branched=False,
-        area_ratio=mesh.smallest_area_ratio(positions),
-        stretch=None,
-        level=surface.load_factor,
-    )
+    level = surface.load_factor
+    loads = problem.loading.force(mesh.nodes + displacement, level).sum(axis=0) if problem.stated else None
+    return told_state(mesh, mesh.nodes, displacement, level, applied_force=loads)
 
 
 def _unit_warnings(mesh: Mesh, surface: Surface, unit: str) -> list[str]:

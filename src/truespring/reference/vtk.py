@@ -124,7 +124,7 @@ def _values(grid: Grid, field: str | None, file: Path) -> tuple[Floats, float | 
     known = [name for name in vectors if name.lower() in _NAMES] if field is None else [field]
     if len(known) != 1:
         which = f"{' and '.join(known)} may all be the displacement" if known else "none is called displacement"
-        raise ReferenceFileError(f"{file}: {there}, {which}: name the right one by field")
+        raise ReferenceFileError(f"{file}: {there}, {which}: name the right one by field (--field)")
     displacement = np.zeros((len(grid.points), 3))
     displacement[:, : vectors[known[0]].shape[1]] = vectors[known[0]]
     return displacement, _energy(grid)

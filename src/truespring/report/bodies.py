@@ -39,8 +39,11 @@ def spring_word(path: Path) -> str:
 def path_lines(path: Path) -> Ints:
     """Return the pairs of nodes that a path is drawn by, shape (n, 2).
 
-    Its springs, with the edges of elements that have none beside them; of a path without springs those of all elements.
+    Its springs, with the edges of elements that have none beside them; of a path without springs those of all elements,
+    of points alone none.
     """
+    if path.is_cloud:
+        return np.zeros((0, 2), dtype=np.int64)
     if spring_lines(path) is None:
         return path.problem.mesh.edges
     assert isinstance(path.potential, Visible)  # as all that have springs are
@@ -157,6 +160,9 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         _lines(area, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
     _lines(area, points / scale.size, lines, INK, 1.3, 3, "reference")
     _lines(area, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
+    for path, places, color in ((reference, points, INK), (model, positions, BLUE)):
+        if path.is_cloud:
+            draw_loaded(area, places / scale.size, color)
     watched = comparison.model.at(level)
     if watched is not None:
         draw_dot(area, _magnified(comparison.model, watched, factor)[comparison.probe] / scale.size)
@@ -191,7 +197,8 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     if not np.isfinite(farthest) or farthest <= ROUNDING * size:
         return None
     factor = magnification(result)
-    reference = _drawn_on(comparison, 1)
+    framed = name if not comparison.known_on[1].is_cloud else result.model or ""  # markers have no outline
+    reference = _drawn_on(comparison, 1 if framed == name else 0)
     own = reference.at(level)
     positions = _magnified(comparison.model, mine, factor)
     others = positions if own is None else _magnified(reference, own, factor)
@@ -200,7 +207,7 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     margin = 0.04 * float((upper - lower).max())
     remarks = [f"displacements {times(factor)}"] if factor != 1 else []
     remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
-    legend = [Entry(f"outline of {full_name(result, name)}", INK), Entry("probe", RED, "o", "")]
+    legend = [Entry(f"outline of {full_name(result, framed)}", INK), Entry("probe", RED, "o", "")]
     legend += [Entry("outside", LOAD, "x", "")] if comparison.n_outside else []
     title = f"{level_name(result, level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
     area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks), bar)
@@ -245,6 +252,7 @@ def undeformed_figure(result: Result) -> Sheet:
     legend += [Entry(called, BLUE)] if springs is not None else []
     legend += [Entry("probe", RED, "o", "")]
     title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
+    title = f"At rest: {mesh.n_nodes} markers" if model.is_cloud else title
     title += f", {len(springs)} {called}" if springs is not None else ""
     area, scale = _body_figure(title, lower, upper, legend)
     if mesh.element != "line":

@@ -114,7 +114,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "mesh_notes": result.problem.mesh.notes,
         "drawing_notes": sorted({drawing.note for drawing in drawings.values()} - {""}),
         "in_space": in_space,
-        "coloured": in_space or result.in_detail,
+        "coloured": any(distance_name(result, name) in pictures for name in result.comparisons),
         "stated": result.problem.stated,
         "solved": any(path.potential is not None for path in result.paths.values()),
         "too_large": in_space and moving is None and any(len(path.states) > 1 for path in result.paths.values()),
@@ -278,7 +278,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
     """What a path cost and how sound it is; a dash where it was read, not solved."""
     solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
-    areas = [state.area_ratio for state in path.states]
+    areas = [] if path.is_cloud else [state.area_ratio for state in path.states]
     stretch = "–"
     if stretches:
         stretch = f"{min(low for low, _ in stretches):.3f} to {max(high for _, high in stretches):.3f}"
@@ -286,8 +286,8 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "name": name,
         "label": path.label,
         "status": str(path.status),
-        "sound": path.status is Status.CONVERGED,
-        "advice": _advice(path),
+        "sound": path.status in (Status.CONVERGED, Status.READ),
+        "advice": path.status.advice if solved else "read from a file, not solved here",
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "effort": _effort(path),
@@ -297,14 +297,6 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
         "stretch": stretch,
         "stability": _stability(path) if solved else "–",
     }
-
-
-def _advice(path: Path) -> str:
-    if not path.solved:
-        return "read from a file, not solved here"
-    if path.potential is None and path.status is Status.CONVERGED:
-        return "another program found balance at every load level; it does not tell whether that is stable"
-    return path.status.advice
 
 
 def _effort(path: Path) -> str | None:

@@ -64,5 +64,5 @@ class Result:
 
     @property
     def converged(self) -> bool:
-        """Whether every path reached full load through stable equilibria."""
-        return all(path.status is Status.CONVERGED for path in self.paths.values())
+        """Whether every path reached full load through stable equilibria, but for those that were read."""
+        return all(path.status in (Status.CONVERGED, Status.READ) for path in self.paths.values())

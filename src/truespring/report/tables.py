@@ -96,6 +96,7 @@ def difference_tables(result: Result) -> "Iterator[Table | str]":
     (one,) = result.comparisons.values()
     values = difference(result)
     table = _table(result.title, "", "")
+    table.show_header = False
     for key, what in _DIFFERENCES.items():
         if (value := values[key]) is not None:
             table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")

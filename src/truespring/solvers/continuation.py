@@ -30,6 +30,9 @@ _WANTED_ITERATIONS = 4
 _STRAIGHT = 0.5
 # A step is cut back to this share of the first one at least.
 _SHORTEST = 2.0**-12
+# A critical point where no balance is found is taken for a known state this near, as a share of the step.
+_NEAR = 1e-6
+
 # Along the step between two states a critical point is found to this share of it.
 _PLACE = 1e-12
 # A load whose part along the mode is below this share of it leaves a point a bifurcation.
@@ -291,9 +294,11 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
             factor = (1 - share) * last.state.load_factor + share * there.state.load_factor
             start = replace(last.state, positions=guess, load_factor=factor)
             one = _corrected(balance, start, _Constraint(weights, 0.0, (1 - share) * ends[0] + share * ends[1]))
-        found[share] = one
         if not one.state.converged:
-            raise ArithmeticError("the path is lost between two of its states")
+            if min(abs(share - known) for known in found) > _NEAR:
+                raise ArithmeticError("the path is lost between two of its states")
+            return 0.0  # so near that the way in which the body gives way drowns in rounding: exactly there
+        found[share] = one
         if one.state.negative_eigenvalues is None:  # the tangent is singular: exactly there
             return 0.0
         size = _nearest_to_zero(balance, one.state)[0]
@@ -305,7 +310,7 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
     except (ArithmeticError, SingularMatrixError, ValueError):
         balance.note(f"between load factors {last.state.load_factor:.6g} and {there.state.load_factor:.6g}: not found")
         return
-    state = found[share].state
+    state = found[min(found, key=lambda known: abs(known - share))].state
     mode = _nearest_to_zero(balance, state)[1]
     push = _push(balance, state.positions, state.load_factor)
     part = abs(float((mode * push).sum())) / max(norm(mode) * norm(push), np.finfo(float).tiny)

@@ -7,16 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from truespring.comparison import TOLERANCE, Comparison, compare
 from truespring.equilibrium import Path
-from truespring.errors import ReferenceFileError, StudyError, TruespringError
-from truespring.mesh.selections import AXES
-from truespring.misfit import Misfit, displacement_misfit, find_misfit
+from truespring.errors import StudyError, TruespringError
+from truespring.misfit import displacement_misfit, same_place
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
 from truespring.report.series import write_difference
 from truespring.report.summary import difference
-from truespring.study.sources import Progress, Source, Told, open_source, read_place
+from truespring.study.misfits import box_words, refuse_misfit
+from truespring.study.options import Given, read_place
+from truespring.study.sources import Progress, Source, open_source
 
 Probe = str | tuple[float, ...] | None
 
@@ -34,22 +37,45 @@ def compare_sources(
     """
     (first, *others), (reference, *models) = names(sources), _opened(sources, progress)
     for source, name, model in zip(sources[1:], others, models, strict=True):
-        _refuse_misfit(source, model, sources[0], reference)
+        refuse_misfit(source, model, sources[0], reference)
         study = source.study or sources[0].study
-        place = probe or source.probe or sources[0].probe
         accepted = tolerance or (TOLERANCE if study is None else study.tolerance)
-        yield _compared(name, model, first, reference, place, accepted)
+        found = _laid_over(model, reference, probe, accepted)
+        watched = source.probe or sources[0].probe
+        if probe is None and watched is not None:  # where the study looks, if the other body is there
+            there = _laid_over(model, reference, watched, accepted)
+            found = there if _off(watched, there) <= _FAR else found
+        elif isinstance(probe, tuple):
+            _refuse_far(probe, found)
+        yield _result(name, model, first, found, source.is_file or sources[0].is_file)
+
+
+def _laid_over(model: Path, reference: Path, place: Probe, tolerance: float) -> Comparison:
+    """Compare two paths; a surface alone has no levels to draw, so the body is drawn over it, whichever is which."""
+    turned = not model.states and bool(reference.states)
+    return compare(reference, model, place, tolerance) if turned else compare(model, reference, place, tolerance)
 
 
 def names(sources: Sequence[Source]) -> list[str]:
-    """Return a short name for each source: its file's, with the model of a study or folder; each once."""
-    found: list[str] = []
-    for source in sources:
-        stem = source.file.stem if source.study is not None else source.file.resolve().name
-        name = f"{stem}:{source.model}" if source.model else stem
-        count = sum(one == name or one.startswith(f"{name} (") for one in found)
-        found.append(f"{name} ({count + 1})" if count else name)
-    return found
+    """Return a short name for each source: its file's, with as many folders as tell it from others; each once."""
+    named = [_named(source, 0) for source in sources]
+    for folders in range(1, 4):
+        if len(set(named)) == len(named):
+            return named
+        named = [
+            _named(one, folders) if named.count(name) > 1 else name for one, name in zip(sources, named, strict=True)
+        ]
+    return [
+        f"{name} ({named[:place].count(name) + 1})" if name in named[:place] else name
+        for place, name in enumerate(named)
+    ]
+
+
+def _named(source: Source, folders: int) -> str:
+    place = source.file.resolve()
+    last = place.stem if source.study is not None else place.name
+    path = "/".join([*place.parts[max(len(place.parts) - 1 - folders, 1) : -1], last])
+    return f"{path}:{source.model}" if source.model else path
 
 
 def _opened(sources: Sequence[Source], progress: Progress | None) -> list[Path]:
@@ -61,62 +87,10 @@ def _opened(sources: Sequence[Source], progress: Progress | None) -> list[Path]:
     return [opened[number] for number in range(len(sources))]
 
 
-def _refuse_misfit(source: Source, model: Path, first: Source, reference: Path) -> None:
-    """Raise ReferenceFileError where a body would lie where the reference lies if it were told otherwise."""
-    pairs = [(source, model, first, reference), (first, reference, source, model)]
-    told = [pair for pair in pairs if pair[0].told.placed]  # who tells of one does not need to hear of the other
-    for mended, path, other, beside in told or pairs:
-        found = find_misfit(path, beside) if mended.is_file else None  # what is ours is in metres
-        if found is not None and not _meant(mended.told, found):
-            file = mended.file.name
-            raise ReferenceFileError(
-                f"{mended.text} {_box(path)}, {other.text} {_box(beside)}: the former would lie where the latter lies "
-                f"with {_options(mended, found)}; say so, or, where it lies as it should, --unit {file}=m "
-                f"--axes {file}=x,y,z --shift {file}=0,0,0"
-            )
-
-
-def _meant(told: Told, found: Misfit) -> bool:
-    """Whether all that would be changed was told."""
-    changes = (found.factor != 1, found.axes != tuple(AXES), any(found.shift))
-    said = (told.unit is not None, told.axes is not None, told.shift is not None)
-    return all(given for change, given in zip(changes, said, strict=True) if change)
-
-
-def _options(source: Source, found: Misfit) -> str:
-    file = source.file.name
-    options = []
-    if found.factor != 1:
-        options.append(f"--unit {file}={_unit(found.factor * source.told.placing.scale)}")
-    if found.axes != tuple(AXES):
-        options.append(f"--axes {file}={','.join(found.axes)}")
-    if any(found.shift):
-        options.append(f"--shift {file}={','.join(f'{part:g}' for part in found.shift)}")
-    return " ".join(options)
-
-
-_UNITS = {1e-6: "um", 1e-3: "mm", 1e-2: "cm", 0.0254: "inch", 0.3048: "ft", 1.0: "m", 1e3: "km"}
-
-
-def _unit(size: float) -> str:
-    """The name of a unit of length of a size [m]."""
-    return next((name for one, name in _UNITS.items() if abs(one - size) < 1e-9 * size), f"'{size:g} m'")
-
-
-def _box(path: Path) -> str:
-    only = path.surface or path.shell
-    points = path.whole.points if path.states or only is None else only.points
-    ends = (", ".join(f"{value:.4g}" for value in end) for end in (points.min(axis=0), points.max(axis=0)))
-    return "lies between ({}) and ({}) m".format(*ends)
-
-
-def _compared(name: str, model: Path, first: str, reference: Path, place: Probe, tolerance: float) -> Result:
-    # A surface alone has no levels to draw: the body is drawn over it, whichever of both is the reference.
-    turned = not model.states and bool(reference.states)
-    found = compare(reference, model, place, tolerance) if turned else compare(model, reference, place, tolerance)
-    drawn, other = (first, name) if turned else (name, first)
+def _result(name: str, model: Path, first: str, found: Comparison, from_file: bool) -> Result:
+    drawn, other = (name, first) if found.known_on[0] is model else (first, name)
     paths = {drawn: found.model, other: found.reference}
-    paths[name] = replace(paths[name], warnings=(*paths[name].warnings, *_notes(first, found)))
+    paths[name] = replace(paths[name], warnings=(*paths[name].warnings, *_notes(first, found, from_file)))
     return Result(
         title=f"{name} against {first}",
         file=FilePath(re.sub(r"[^\w.-]+", "-", name)),
@@ -131,18 +105,39 @@ def _compared(name: str, model: Path, first: str, reference: Path, place: Probe,
     )
 
 
-def _notes(first: str, found: Comparison) -> Iterator[str]:
+def _off(place: tuple[float, ...], found: Comparison) -> float:
+    """How far a place [m] is from the node that is watched for it, as a share of the diameter."""
+    mesh = found.model.problem.mesh
+    return float(np.linalg.norm(mesh.nodes[found.probe] - place[: mesh.dim])) / mesh.diameter
+
+
+def _refuse_far(place: tuple[float, ...], found: Comparison) -> None:
+    if (off := _off(place, found)) > _FAR:
+        at = ", ".join(f"{part:.4g}" for part in place)
+        away = f"{off * found.model.problem.mesh.diameter:.4g} m away from the nearest node"
+        raise StudyError(f"--probe ({at}) m is {away}: the body {box_words(found.model)}")
+
+
+# A probe farther off the body, as a share of its diameter, was not meant.
+_FAR = 0.1
+
+
+def _notes(first: str, found: Comparison, from_file: bool) -> Iterator[str]:
     """What a reader must know of how two bodies were laid over each other."""
-    n_nodes = len(found.outside)
+    model, reference = found.known_on
+    if not same_place(model, reference):
+        yield f"it {box_words(model)}, {first} {box_words(reference)}: they are not one body"
     if found.n_outside:
         yield (
-            f"{found.n_outside} of {n_nodes} nodes lie outside of the other body and are left out of all errors; "
-            "figures mark them by crosses"
+            f"{found.n_outside} of {len(found.outside)} nodes lie outside of the other body and are left out of all "
+            "errors; figures mark them by crosses"
         )
+    if found.n_reference_outside:
+        yield f"{found.n_reference_outside} nodes of {first} lie outside of it, where nothing is compared"
     if found.model.states and found.reference.states and not found.load_factors.size:
         mine, theirs = (", ".join(f"{level:g}" for level in path.load_factors[:12]) for path in found.known_on)
         yield f"it has the load levels {mine}, {first} has {theirs}: none in common"
-    better = displacement_misfit(found)
+    better = displacement_misfit(found) if from_file else None
     if better is not None and better.factor != 1:
         yield (
             f"its displacement would be near that of {first} if it were {better.factor:g} times as large, where its "
@@ -163,14 +158,12 @@ def read_probe(text: str | None) -> Probe:
         raise StudyError(f"--probe {text}: {error}") from None
 
 
-def write_comparisons(
-    results: Sequence[Result], out: FilePath, texts: Sequence[str], options: Sequence[tuple[str, Sequence[str]]]
-) -> FilePath:
+def write_comparisons(results: Sequence[Result], out: FilePath, texts: Sequence[str], given: Given) -> FilePath:
     """Write what each result leaves behind into out, or where there are several into folders of it; return the report.
 
-    `texts` and `options` are what was compared and what was told of it; they make the command that the report names.
+    `texts` and `given` are what was compared and what was told of it; they make the command that the report names.
     """
-    told = [part for name, values in options for value in values for part in (f"--{name.replace('_', '-')}", value)]
+    told = [part for name, values in given for value in values for part in (f"--{name.replace('_', '-')}", value)]
     command = shlex.join(["truespring", "compare", *texts, *told, "--out", str(out)])
     for result in results:
         write_comparison(result, out if len(results) == 1 else out / result.file, command)

@@ -16,7 +16,7 @@ from truespring.study.run import Progress
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class Exports:
     """What `export_study` wrote for one target.
 
     Attributes:
@@ -92,7 +92,7 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
 
 def export_study(
     study: Study, targets: Collection[str], out: FilePath, name: str | None = None, progress: Progress | None = None
-) -> list[Carried]:
+) -> list[Exports]:
     """Solve the springs of a study and write them for each target into out/STEM; return what was written.
 
     Raises ExportError for what a target cannot express, and where two targets would write the same file.
@@ -110,7 +110,7 @@ def export_study(
         exported = replace(exported, probe=most_moved(exported.path))
     with _named(study, name):
         found = target_files(exported, known_targets(targets))
-    return [Carried(target, name, exported, write_files(files, out / study.stem)) for target, files in found.items()]
+    return [Exports(target, name, exported, write_files(files, out / study.stem)) for target, files in found.items()]
 
 
 @contextmanager

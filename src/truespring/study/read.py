@@ -420,7 +420,7 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
 
 def _without_tag(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Drop the kind that pydantic puts behind a model's name, and its mark of a faulty key."""
-    key = loc[:2] + loc[3:] if loc[0] == "models" and len(loc) > 3 else loc
+    key = loc[:2] + loc[3:] if loc[0] == "models" and len(loc) > 2 else loc
     key = key[:1] + key[2:] if key[0] == "mesh" and len(key) > 2 else key
     return tuple(part for part in key if part != "[key]")
 

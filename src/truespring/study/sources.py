@@ -16,47 +16,11 @@ from truespring.errors import ReferenceFileError, StudyError, TruespringError, n
 from truespring.mesh import read_mesh
 from truespring.problem import Problem
 from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
+from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
-from truespring.units import to_si
 
 #: Called with what is read or solved and the share that is done, for a progress bar.
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Told:
-    """What is told of a result file that it does not tell itself.
-
-    Attributes:
-        unit, axes, shift, load_factor: see Placing; None where nothing is told, which takes m, x,y,z, no shift, 1.
-        field: the name of the displacement among a VTK file's arrays.
-        undeformed: the body at rest, of STL or marker files that hold no more than where it went.
-        mesh: the deck with the nodes of a .dat file.
-    """
-
-    unit: str | None = None
-    axes: tuple[str, ...] | None = None
-    shift: tuple[float, ...] | None = None
-    load_factor: float | None = None
-    field: str | None = None
-    undeformed: FilePath | None = None
-    mesh: FilePath | None = None
-
-    @property
-    def placing(self) -> Placing:
-        """Where the file's body lies."""
-        plain = Placing()
-        return Placing(
-            unit=self.unit or plain.unit,
-            axes=self.axes or plain.axes,
-            shift=self.shift or plain.shift,
-            load_factor=self.load_factor,
-        )
-
-    @property
-    def placed(self) -> bool:
-        """Whether it is told where the body lies."""
-        return self.unit is not None or self.axes is not None or self.shift is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +31,14 @@ class Source:
         text: as it was given.
         file: the study, the folder or the file.
         model: which model of a study or folder, None for its compared one.
-        told: what is told of a file.
+        options: what is told of a file.
         study: the study, checked, where it is one.
     """
 
     text: str
     file: FilePath
     model: str | None
-    told: Told
+    options: FileOptions
     study: Study | None = None
 
     @property
@@ -98,8 +62,8 @@ class Source:
         return self.file.suffix.lower() == ".stl"
 
 
-def find_sources(texts: Sequence[str], options: Sequence[tuple[str, Sequence[str]]]) -> list[Source]:
-    """Return what several texts name, checked before anything is read whole or solved; see find_source and told_of.
+def find_sources(texts: Sequence[str], given: Given) -> list[Source]:
+    """Return what several texts name, checked before anything is read whole or solved; see find_source and options_of.
 
     Raises StudyError with the faults of all of them.
     """
@@ -108,7 +72,7 @@ def find_sources(texts: Sequence[str], options: Sequence[tuple[str, Sequence[str
     found, faults = [], []
     for text in texts:
         try:
-            found.append(find_source(text, told_of(text, options, texts)))
+            found.append(find_source(text, options_of(text, given, texts)))
         except TruespringError as error:
             faults += [line for line in str(error).splitlines() if line not in faults]
     if faults:
@@ -116,7 +80,7 @@ def find_sources(texts: Sequence[str], options: Sequence[tuple[str, Sequence[str
     return found
 
 
-def find_source(text: str, told: Told) -> Source:
+def find_source(text: str, options: FileOptions) -> Source:
     """Return what FILE, FOLDER[:MODEL] or STUDY[:MODEL] names; raise StudyError for what is not there."""
     file, model = FilePath(text), None
     if not file.exists() and ":" in text:
@@ -132,10 +96,12 @@ def find_source(text: str, told: Told) -> Source:
         file = _folder(text, file)
         summary = _json(file / "summary.json")
         names = list(summary["models"])
+        if not (model or summary.get("model") or len(names) == 1):
+            raise StudyError(f"{text}: which model? Add one of {', '.join(f':{name}' for name in names)}")
         model = _known(text, model or summary.get("model") or names[0], names)
     elif model is not None:
         raise StudyError(f"{text}: a result file holds one model; leave out ':{model}'")
-    return Source(text, file, model, told, study)
+    return Source(text, file, model, options, study)
 
 
 def open_source(source: Source, beside: Problem | None, progress: Progress | None) -> Path:
@@ -145,25 +111,25 @@ def open_source(source: Source, beside: Problem | None, progress: Progress | Non
         if progress:
             progress(source.text, share)
 
-    told = source.told
+    options = source.options
     if source.study is not None:
         path = _solved(source.study, str(source.model), report)
     elif source.file.is_dir():
         path = _of_folder(source, report)
     elif source.is_stl and beside is not None and beside.mesh.dim == 2 and beside.mesh.element != "line":
-        at = told.placing
+        at = options.placing
         factor = 1.0 if at.load_factor is None else at.load_factor
-        path = read_stl(beside, source.file, factor, told.undeformed, at.unit, at.axes, at.shift)
-    elif source.is_stl and told.undeformed is None:
-        path = read_shell(source.file, told.placing, beside)
+        path = read_stl(beside, source.file, factor, options.undeformed, at.unit, at.axes, at.shift)
+    elif source.is_stl and options.undeformed is None:
+        path = read_shell(source.file, options.placing, beside)
     else:
-        path = placed(_record(source.file, told, report), told.placing, source.file.name)
+        path = placed(_record(source.file, options, report), options.placing, source.file.name)
     report(1.0)
     return path
 
 
-def _record(file: FilePath, told: Told, report: Callable[[float], None]) -> Any:
-    return read_record(file, field=told.field, undeformed=told.undeformed, mesh=told.mesh, reading=report)
+def _record(file: FilePath, options: FileOptions, report: Callable[[float], None]) -> Any:
+    return read_record(file, field=options.field, undeformed=options.undeformed, mesh=options.mesh, reading=report)
 
 
 def _known(text: str, model: str, names: Sequence[str]) -> str:
@@ -188,13 +154,18 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
     series, elements = folder / f"{name}.pvd", folder / "mesh.vtu"
     if not series.is_file():
         raise ReferenceFileError(f"{series} does not exist: of '{name}' no level was written")
-    record = _record(series, Told(), report)
+    record = _record(series, FileOptions(), report)
     if elements.is_file():  # a series of springs holds lines; the body has elements
         mesh = read_mesh(elements)
         record = replace(record, cells={mesh.kind.vtk: mesh.elements}) if mesh.n_nodes == len(record.points) else record
     path = placed(record, Placing(), f"{told['label']} of {folder.name}")
-    states = _with_forces(path, folder / "curves.csv", name)
-    return replace(path, kind=told["kind"], status=Status(told["status"]), states=states)
+    energies = {float(level): float(energy) for level, energy in told.get("energies", [])}
+    states = [
+        replace(state, energy=energies.get(state.load_factor, state.energy))
+        for state in _with_forces(path, folder / "curves.csv", name)
+    ]
+    warnings = (*(str(text) for text in told["warnings"]), f"solved before: read from {folder}")
+    return replace(path, kind=told["kind"], status=Status(told["status"]), states=tuple(states), warnings=warnings)
 
 
 def _folder(text: str, file: FilePath) -> FilePath:
@@ -211,8 +182,14 @@ def _folder(text: str, file: FilePath) -> FilePath:
 def _json(file: FilePath) -> dict[str, Any]:
     try:
         read = json.loads(file.read_text(encoding="utf-8"))
-        if not isinstance(read["models"], dict) or not read["models"]:
+        models = read["models"]
+        if not isinstance(models, dict) or not models:
             raise ValueError("it names no models")
+        for name, model in models.items():
+            for key in ("label", "kind", "status", "warnings"):
+                if key not in model:
+                    raise ValueError(f"models.{name}.{key} is missing")
+            Status(model["status"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ReferenceFileError(f"{file} is no summary of truespring, or damaged: {error}") from None
     return dict(read)
@@ -234,67 +211,3 @@ def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[Any, ...]:
         force = np.array(list(forces.values())[int(near[0])]) if near.size else state.applied_force
         states.append(replace(state, applied_force=force))
     return tuple(states)
-
-
-def told_of(text: str, options: Sequence[tuple[str, Sequence[str]]], texts: Sequence[str]) -> Told:
-    """Return what options tell of one of the things that are compared.
-
-    Each option is a name of Told and its values: VALUE for all files, or FILE=VALUE for one, by what was given, its
-    file's name or stem. Raises StudyError for a FILE that is none of them and a VALUE that cannot be read.
-    """
-    found: dict[str, Any] = {}
-    for name, values in options:
-        for value in values:
-            file, equals, rest = value.rpartition("=")
-            if equals and not any(_names(one, file) for one in texts):
-                raise StudyError(f"--{name.replace('_', '-')} {value}: '{file}' is none of {', '.join(texts)}")
-            if not equals or _names(text, file):
-                found[name] = _value(name, rest, value)
-    return Told(**found)
-
-
-def _names(text: str, file: str) -> bool:
-    place = FilePath(text)
-    return file in (text, place.name, place.stem)
-
-
-def _value(name: str, text: str, given: str) -> Any:
-    option = f"--{name.replace('_', '-')} {given}"
-    parts = tuple(part.strip() for part in text.split(","))
-    try:
-        match name:
-            case "axes":
-                Placing(axes=parts)
-                return parts
-            case "shift":
-                place = read_place(text)
-                return (*place, *[0.0] * (3 - len(place)))
-            case "load_factor":
-                factor = float(text)
-                Placing(load_factor=factor)
-                return factor
-            case "unit":
-                Placing(unit=text)
-                return text
-            case "undeformed" | "mesh":
-                return FilePath(text)
-            case _:
-                return text
-    except (TruespringError, ValueError) as error:
-        raise StudyError(f"{option}: {error}") from None
-
-
-def read_place(text: str) -> tuple[float, ...]:
-    """Return a place or a way [m] of two or three lengths: "0.16, 0.02", or "160 mm, 20 mm"."""
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) not in (2, 3):
-        raise StudyError(f"'{text}' is no place: two or three lengths are wanted, such as 160 mm, 20 mm")
-    return tuple(to_si(float(part) if _is_number(part) else part, "length") for part in parts)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -29,7 +29,7 @@ _CODES = {
 _T = TypeVar("_T")
 _ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _HEADERS = {"UInt32": "u4", "UInt64": "u8"}
-_DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
+_DECOMPRESS: dict[str, Callable[[bytes | memoryview], bytes]] = {
     "vtkZLibDataCompressor": zlib.decompress,
     "vtkLZMADataCompressor": lzma.decompress,
 }
@@ -63,19 +63,24 @@ def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
         raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
     if root.tag != "VTKFile" or root.find(kind) is None:
         raise MeshError(f"a VTKFile of type {kind} is wanted, not {root.tag[:40]} of type {root.get('type')}")
-    return root, Reader(root, data[tag.end() : end] if tag else b"")
+    if tag is None:
+        return root, Reader(root, memoryview(b""))
+    begin = tag.end() + 1  # it begins with an underscore, maybe behind blanks
+    while data[begin - 1 : begin].isspace():
+        begin += 1
+    return root, Reader(root, memoryview(data)[begin:end])  # no copy: it is nearly the file
 
 
 class Reader:
     """Reads the arrays of a file, which are written in one way."""
 
-    def __init__(self, root: ElementTree.Element, appended: bytes) -> None:
+    def __init__(self, root: ElementTree.Element, appended: memoryview) -> None:
         self._order = _choice(root, "byte_order", _ORDERS, "LittleEndian")
         self._header = np.dtype(self._order + _choice(root, "header_type", _HEADERS, "UInt32"))
         self._decompress = _choice(root, "compressor", _DECOMPRESS) if "compressor" in root.attrib else None
         section = root.find("AppendedData")
         self._is_raw = section is not None and section.get("encoding") == "raw"
-        self._appended = appended.lstrip()[1:]  # it begins with an underscore
+        self._appended = appended
 
     def grid(self, piece: ElementTree.Element) -> Grid:
         """Return what a piece holds."""
@@ -122,20 +127,20 @@ class Reader:
             case "ascii":
                 return np.array([int(word) for word in text], dtype=np.int64)
             case "binary":
-                data = self._bytes("".join(text).encode(), is_raw=False)
+                data = self._bytes(memoryview("".join(text).encode()), is_raw=False)
             case "appended":
                 data = self._bytes(self._appended[int(element.get("offset", "")) :], self._is_raw)
             case other:
                 raise ValueError(f"format {other[:40]} is not read")
         return np.frombuffer(data, np.dtype(self._order + code))
 
-    def _bytes(self, coded: bytes, is_raw: bool) -> bytes:
+    def _bytes(self, coded: memoryview, is_raw: bool) -> bytes | memoryview:
         """Return the data that `coded` begins with: behind a header, base64 or raw, in compressed blocks or not."""
         size = self._header.itemsize
         (count,) = self._sizes(coded, 1, is_raw)
         if self._decompress is None:
             head_alone, rest = _split(coded, size, is_raw)
-            if is_raw or coded[: _length(size)].endswith(b"="):
+            if is_raw or coded[: _length(size)].tobytes().endswith(b"="):
                 return _split(rest, count, is_raw)[0]
             return _split(coded, size + count, is_raw)[0][len(head_alone) :]  # header and data are coded as one
         if count == 0:
@@ -145,13 +150,13 @@ class Reader:
         ends = np.cumsum([0, *compressed]).tolist()
         return b"".join(self._decompress(data[begin:end]) for begin, end in itertools.pairwise(ends))
 
-    def _sizes(self, coded: bytes, count: int, is_raw: bool) -> list[int]:
+    def _sizes(self, coded: memoryview, count: int, is_raw: bool) -> list[int]:
         """Return the first words of a header."""
         sizes: list[int] = np.frombuffer(_split(coded, count * self._header.itemsize, is_raw)[0], self._header).tolist()
         return sizes
 
 
-def _split(coded: bytes, size: int, is_raw: bool) -> tuple[bytes, bytes]:
+def _split(coded: memoryview, size: int, is_raw: bool) -> tuple[bytes | memoryview, memoryview]:
     """Return the first `size` bytes, decoded, and what is coded behind them; raise ValueError where there are fewer."""
     length = size if is_raw else _length(size)
     data = coded[:length] if is_raw else base64.b64decode(coded[:length], validate=True)

@@ -1,0 +1,152 @@
+"""What the options of `truespring compare` tell of files that do not tell it themselves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truespring.errors import StudyError, TruespringError
+from truespring.reference import READERS, Placing
+from truespring.units import to_si
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """What is told of a result file that it does not tell itself.
+
+    Attributes:
+        unit, axes, shift, load_factor, force_unit, full_time: see Placing; None where nothing is told, which takes m,
+            x,y,z, no shift, 1, no energies, and what the file's times say.
+        field: the name of the displacement among a VTK file's arrays.
+        undeformed: the body at rest, of STL or marker files that hold no more than where it went.
+        mesh: the deck with the nodes of a .dat file.
+    """
+
+    unit: str | None = None
+    axes: tuple[str, ...] | None = None
+    shift: tuple[float, ...] | None = None
+    load_factor: float | None = None
+    force_unit: str | None = None
+    full_time: float | None = None
+    field: str | None = None
+    undeformed: Path | None = None
+    mesh: Path | None = None
+
+    @property
+    def placing(self) -> Placing:
+        """Where the file's body lies."""
+        plain = Placing()
+        return Placing(
+            unit=self.unit or plain.unit,
+            axes=self.axes or plain.axes,
+            shift=self.shift or plain.shift,
+            load_factor=self.load_factor,
+            force_unit=self.force_unit,
+            full_time=self.full_time,
+        )
+
+    @property
+    def placed(self) -> bool:
+        """Whether it is told where the body lies."""
+        return self.unit is not None or self.axes is not None or self.shift is not None
+
+
+#: An option's name, and each value that it was given.
+Given = Sequence[tuple[str, Sequence[str]]]
+
+# Options that some formats take only.
+_BY_FORMAT = ("field", "undeformed", "mesh")
+
+
+def options_of(text: str, given: Given, texts: Sequence[str]) -> FileOptions:
+    """Return what options tell of one of `texts`, the things that are compared.
+
+    VALUE is for all files that can take it, FILE=VALUE for one, by what was given, its file's name or its stem. Raises
+    StudyError for a FILE that is none of them or several, an option that no file takes, a VALUE that cannot be read.
+    """
+    found: dict[str, Any] = {}
+    for name, values in given:
+        for value in values:
+            file, rest = _parts(name, value, texts)
+            known = _value(name, rest, value)
+            takers = [one for one in texts if _takes(one, name)]
+            if not takers:
+                suffixes = ", ".join(suffix for suffix in READERS if _takes(f"any{suffix}", name))
+                raise StudyError(f"{_option(name)} {value}: nothing that is compared takes it; {suffixes} files do")
+            if text in takers if file is None else text == file or _names(text, file):
+                found[name] = known
+    return FileOptions(**found)
+
+
+def _parts(name: str, value: str, texts: Sequence[str]) -> tuple[str | None, str]:
+    """The FILE, None for all, and the VALUE of an option."""
+    file, equals, rest = value.partition("=")
+    if not equals:
+        return None, value
+    named = sorted({one for one in texts if _names(one, file)})
+    if not named:
+        if Path(value).exists():  # a path may hold the sign
+            return None, value
+        raise StudyError(f"{_option(name)} {value}: '{file}' is none of {', '.join(texts)}")
+    taking = [one for one in named if _takes(one, name)]
+    if len(taking) > 1 and file not in taking:
+        raise StudyError(f"{_option(name)} {value}: '{file}' names {' and '.join(taking)}: write one as it was given")
+    return file, rest
+
+
+def _names(text: str, file: str) -> bool:
+    place = Path(text)
+    return file in (text, place.name, place.stem)
+
+
+def _takes(text: str, name: str) -> bool:
+    """Whether a source can take an option: of files some by their format, others all."""
+    suffix = Path(text).suffix.lower()
+    if name in _BY_FORMAT:
+        return suffix in READERS and name in READERS[suffix][1]
+    return suffix in READERS
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _value(name: str, text: str, given: str) -> Any:
+    parts = tuple(part.strip() for part in text.split(","))
+    try:
+        match name:
+            case "axes":
+                return Placing(axes=parts).axes
+            case "shift":
+                place = read_place(text)
+                return (*place, *[0.0] * (3 - len(place)))
+            case "load_factor":
+                return Placing(load_factor=float(text)).load_factor
+            case "full_time":
+                return Placing(full_time=float(text)).full_time
+            case "unit":
+                return Placing(unit=text).unit
+            case "force_unit":
+                return Placing(force_unit=text).force_unit
+            case "undeformed" | "mesh":
+                return Path(text)
+            case _:
+                return text
+    except (TruespringError, ValueError) as error:
+        raise StudyError(f"{_option(name)} {given}: {error}") from None
+
+
+def read_place(text: str) -> tuple[float, ...]:
+    """Return a place or a way [m] of two or three lengths: "0.16, 0.02", or "160 mm, 20 mm"."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) not in (2, 3):
+        raise StudyError(f"'{text}' is no place: two or three lengths are wanted, such as 160 mm, 20 mm")
+    return tuple(to_si(float(part) if _is_number(part) else part, "length") for part in parts)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
