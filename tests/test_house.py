@@ -12,7 +12,8 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"study", "report"},
+    "cli": {"sweeping", "study", "report"},
+    "sweeping": {"study", "report", "units"},
     "study": {
         "report",
         "comparison",
@@ -89,6 +90,9 @@ HEAVY = {
     "jinja2",
     "mujoco",
     "ansys",
+    "dask",
+    "distributed",
+    "polars",
 }
 
 
