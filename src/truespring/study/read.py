@@ -32,6 +32,7 @@ from truespring.problem import Load, Problem, Region
 from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
 from truespring.study import schema
+from truespring.study.changes import changed
 from truespring.study.network import read_network
 from truespring.units import to_si
 
@@ -70,11 +71,35 @@ class Study:
         return self.file.stem
 
 
-def read_study(file: str | FilePath, halvings: int = 0) -> Study:
-    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+@dataclass(frozen=True)
+class StudyText:
+    """A study file as it stands: what studies are made of, as it is or with other values.
 
-    With `halvings` its mesh is that many times finer: elements of half the size, each time.
+    Attributes:
+        file, source: the file as it was named, and its text.
+        tables: the text as TOML has it, not yet checked.
     """
+
+    file: FilePath
+    source: str
+    tables: Mapping[str, Any]
+
+    def table(self, changes: Mapping[str, Any] | None = None) -> schema.StudyTable:
+        """Return the tables, checked; raise StudyError. Changes are values by key, such as {"load.1.force": [0, 1]}."""
+        try:
+            return schema.StudyTable.model_validate(changed(self.tables, changes) if changes else self.tables)
+        except ValidationError as error:
+            raise StudyError("\n".join(_messages(self.file, error, _line_numbers(self.source)))) from None
+        except StudyError as error:
+            raise StudyError(f"{self.file}: {error}") from None
+
+    def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0) -> Study:
+        """Return the study, checked as far as can be without solving; raise StudyError."""
+        return _Builder(self.file, self.source, self.table(changes), halvings).study()
+
+
+def read_text(file: str | FilePath) -> StudyText:
+    """Read a study file; raise StudyError where it cannot be read or is no TOML."""
     place = FilePath(file)
     try:
         source = place.read_text(encoding="utf-8-sig")
@@ -86,11 +111,16 @@ def read_study(file: str | FilePath, halvings: int = 0) -> Study:
         tables = tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{place}: is not valid TOML: {error}") from None
-    try:
-        table = schema.StudyTable.model_validate(tables)
-    except ValidationError as error:
-        raise StudyError("\n".join(_messages(place, error, _line_numbers(source)))) from None
-    return _Builder(place, source, table, halvings).study()
+    return StudyText(place, source, tables)
+
+
+def read_study(file: str | FilePath, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
+    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+
+    With `halvings` its mesh is that many times finer: elements of half the size, each time. With `changes` some keys
+    have other values: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
+    """
+    return read_text(file).study(changes, halvings)
 
 
 class _Builder:
