@@ -1,5 +1,9 @@
 """The public names, each once; imported when they are used."""
 
+from .calibration import Calibration as Calibration
+from .calibration import LoadCase as LoadCase
+from .calibration import calibrate as calibrate
+from .calibration import read_curve as read_curve
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .equilibrium import Path as Path
@@ -31,6 +35,7 @@ from .models import LAWS as LAWS
 from .models import RULES as RULES
 from .models import Fem as Fem
 from .models import Fitness as Fitness
+from .models import GivenSprings as GivenSprings
 from .models import Moduli as Moduli
 from .models import SpringNetwork as SpringNetwork
 from .models import Springs as Springs

@@ -14,7 +14,8 @@ from truespring.table import Table
 from truespring.units import Dimension
 
 _COLUMNS: dict[str, Dimension | None] = {"load_factor": None}
-_COLUMNS |= {f"u{axis}": "length" for axis in AXES} | {f"f{axis}": "force" for axis in AXES}
+_COLUMNS.update(dict.fromkeys([f"u{axis}" for axis in AXES], "length"))
+_COLUMNS.update(dict.fromkeys([f"f{axis}" for axis in AXES], "force"))
 
 
 @dataclass(frozen=True, eq=False)

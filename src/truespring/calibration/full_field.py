@@ -85,7 +85,7 @@ def fit_full_field(system: Equations, regularisation: float) -> Floats:
     if system.matrix.shape[0] * n <= _DENSE:
         dense = np.concatenate([system.matrix.toarray(), weight * np.eye(n)])
         right = np.concatenate([system.right, np.full(n, weight)])
-        reduced = np.linalg.qr(np.column_stack([dense, right]), mode="r")
+        reduced: Floats = np.linalg.qr(np.column_stack([dense, right]), mode="r")
         return np.asarray(nnls(reduced[:, :n], reduced[:, n])[0])
     stacked = sparse.vstack([system.matrix, weight * sparse.eye_array(n)]).tocsr()
     right = np.concatenate([system.right, np.full(n, weight)])

@@ -1,5 +1,6 @@
 """How far springs are from what is known, and how that changes with the unknowns: by equilibria that are solved."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -31,7 +32,7 @@ class _Seen(NamedTuple):
 class Objective:
     """J(c) = 1/2 mean of the squared relative errors + regularisation^2 / 2 mean of (c - 1)^2.
 
-    The mean is over all observations of all cases, each error |B x(c) - y| / |y| with x(c) the equilibrium at its level.
+    The mean is over all observations of all cases, each error |B x(c) - y| / |y|, x(c) the equilibrium at its level.
     """
 
     unknowns: Unknowns
@@ -43,7 +44,7 @@ class Objective:
     @property
     def _weights(self) -> float:
         """What each relative error is multiplied by, so that their squares sum to the mean."""
-        return 1 / np.sqrt(sum(len(case.observations) for case in self.cases))
+        return 1 / math.sqrt(sum(len(case.observations) for case in self.cases))
 
     def paths(self, values: Floats) -> list[Path] | None:
         """Return the springs' path of each case; None where one does not reach full load."""
@@ -77,7 +78,7 @@ class Objective:
         return found
 
     def residuals(self, values: Floats) -> Floats:
-        """Return what J is half the square of, shape (n_data + n_unknowns,); not numbers where there is no equilibrium."""
+        """Return what J is half the square of, shape (n_data + n,); infinite where there is no equilibrium."""
         seen = self._seen(values)
         pull = self.regularisation * (values - 1) / np.sqrt(len(values))
         if seen is None:
@@ -94,9 +95,9 @@ class Objective:
     def gradient(self, values: Floats) -> Floats:
         """Return dJ/dc by the adjoint, one linear system a level whatever the number of unknowns, shape (n,).
 
-        With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements K lam = B^T r
-        gives dJ/dc = -lam . df/dc; of forces of supports r = G (f - F) - y, which depends on c by itself too:
-        K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
+        With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
+        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces of supports r = G (f - F) - y, which depends on c by itself
+        too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
         """
         seen = self._seen(values)
         if seen is None:
@@ -169,7 +170,7 @@ class _At:
             self._ready: Tangent = balance.ready(self._matrix, state.positions)
         except SingularMatrixError:
             raise ModelError(
-                f"{case.name}: at load factor {state.load_factor:g} the tangent is singular: the gradient is not defined"
+                f"{case.name}: at load factor {state.load_factor:g} the tangent is singular: there is no gradient"
             ) from None
         self.forces = objective.unknowns.forces(state.positions)
 
@@ -192,4 +193,3 @@ def relative_errors(case: LoadCase, path: Path, quantity: str = "displacement") 
         off, size = found.get(one.level, (0.0, 0.0))
         found[one.level] = off + float((_misfit(_Seen(0, one, state)) ** 2).sum()), size + one.size**2
     return {level: float(np.sqrt(off / size)) for level, (off, size) in found.items()}
-

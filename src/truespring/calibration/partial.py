@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import Bounds, least_squares, minimize
 
 from truespring.arrays import Floats
 from truespring.calibration.objective import Objective
@@ -33,7 +33,7 @@ def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit
         found = least_squares(
             objective.residuals,
             start,
-            jac=objective.jacobian,  # type: ignore[arg-type]
+            jac=objective.jacobian,
             bounds=(0.0, np.inf),
             xtol=_SETTLED,
             ftol=_SETTLED,
@@ -50,8 +50,13 @@ def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit
         def gradient(values: Floats) -> Floats:
             return objective.gradient(values) if objective.paths(values) is not None else np.zeros(len(values))
 
-        bounds = [(0.0, None)] * len(start)
-        options = {"maxfun": evaluations, "ftol": 1e-9, "gtol": 1e-12}
-        found = minimize(value, start, jac=gradient, method="L-BFGS-B", bounds=bounds, options=options)
-        values, method = np.asarray(found.x), "L-BFGS-B, adjoint gradient"
+        searched = minimize(
+            value,
+            start,
+            jac=gradient,
+            method="L-BFGS-B",
+            bounds=Bounds(0.0, np.inf),
+            options={"maxfun": evaluations, "ftol": 1e-9, "gtol": 1e-12},
+        )
+        values, method = np.asarray(searched.x), "L-BFGS-B, adjoint gradient"
     return Fit(values, objective.value(values), method)

@@ -179,7 +179,10 @@ def _regions(problem: Problem, pairs: Ints, place: Ints) -> Groups:
     n_links = len(problem.mesh.kind.links)
     material = np.repeat(problem.material_numbers, n_links)
     return _numbered(
-        np.array([f"{names[g]}, {_material(m)}" for g, m in zip(group, material, strict=True)], dtype=object)
+        np.array(
+            [f"{names[g]}, {_material(m)}" for g, m in zip(group.tolist(), material.tolist(), strict=True)],
+            dtype=object,
+        )
     )
 
 

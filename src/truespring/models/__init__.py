@@ -25,6 +25,9 @@ from truespring.models.volume import VolumeTerm as VolumeTerm
 from truespring.potential import Potential
 from truespring.problem import Problem
 
+#: What may be solved, compared and exported as springs.
+SpringModel = Springs | GivenSprings | SpringNetwork
+
 
 class Model(Protocol):
     """How matter is idealised: what `solve` takes beside a bare potential."""

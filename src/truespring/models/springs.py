@@ -167,4 +167,6 @@ def shared_springs(mesh: Mesh) -> tuple[Ints, Ints]:
     from truespring.kernels.sparsity import unique_pairs
     from truespring.kernels.threads import writable
 
-    return unique_pairs(writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2)), mesh.n_nodes)
+    pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
+    springs, place = unique_pairs(pairs, mesh.n_nodes)
+    return springs, place

@@ -14,7 +14,7 @@ from truespring.equilibrium import Path, Solver, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, check_springs, fem_element
-from truespring.models import SpringNetwork, Springs
+from truespring.models import SpringModel, SpringNetwork
 from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
@@ -56,7 +56,7 @@ class CalculiX:
     """
 
     law: str = "saint-venant-kirchhoff"
-    springs: Springs | SpringNetwork | None = None
+    springs: SpringModel | None = None
 
     kind = "calculix"
 
@@ -192,7 +192,7 @@ class CalculiX:
         return level.energy if whole and level.energy is not None else math.nan
 
 
-def _potential(springs: Springs | SpringNetwork, problem: Problem) -> Potential:
+def _potential(springs: SpringModel, problem: Problem) -> Potential:
     return springs if isinstance(springs, SpringNetwork) else springs.potential(problem)
 
 

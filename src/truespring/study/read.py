@@ -27,12 +27,23 @@ from truespring.mesh import (
     select,
     select_elements,
 )
-from truespring.models import Fem, Model, SpringNetwork, Springs, UserStiffness, moduli, refuse_mechanism
+from truespring.models import (
+    Fem,
+    GivenSprings,
+    Model,
+    SpringModel,
+    SpringNetwork,
+    Springs,
+    UserStiffness,
+    moduli,
+    refuse_mechanism,
+)
 from truespring.problem import Load, Problem, Region
 from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
 from truespring.study import schema
 from truespring.study.changes import changed
+from truespring.study.given import read_given
 from truespring.study.network import read_network
 from truespring.units import to_si
 
@@ -295,20 +306,28 @@ class _Builder:
                     refuse_mechanism(self.network, problem.loading.held)
                     return self.network
                 case schema.CalculixTable():
-                    springs = None if table.springs is None else self.springs_of(name, table.springs)
+                    springs = None if table.springs is None else self.springs_of(problem, name, table.springs)
                     program = CalculiX(springs=springs) if table.law is None else CalculiX(table.law, springs)
                     program.check(problem, solver)
                     return program
                 case schema.FemTable():
                     model: Model = Fem(table.law, table.element)
                 case _:
-                    model = _springs(table)
+                    model = self.springs(problem, table)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
                 moduli(problem.homogeneous[0], model)
             return model
 
-    def springs_of(self, name: str, other: str) -> Springs | SpringNetwork:
+    def springs(self, problem: Problem, table: schema.SpringsTable) -> Springs | GivenSprings:
+        """Return springs by rule, by numbers, or as they are read spring by spring."""
+        own = table.stiffness
+        if own is None or own.file is None:
+            return _springs(table)
+        volume = None if own.volume is None else self.file.parent / own.volume
+        return read_given(problem, self.file.parent / own.file, volume, table.allow_negative)
+
+    def springs_of(self, problem: Problem, name: str, other: str) -> SpringModel:
         """Return the springs of another model of the study, which `name` is to be a twin of."""
         tables = self.table.models
         kinds = (schema.SpringsTable, schema.NetworkTable)
@@ -316,7 +335,7 @@ class _Builder:
         with self.at("models", name, "springs"):
             match tables.get(other):
                 case schema.SpringsTable() as table:
-                    return _springs(table)
+                    return self.springs(problem, table)
                 case schema.NetworkTable() if self.network is not None:
                     return self.network
             told = f"there are {', '.join(known)}" if known else "there are none"
@@ -325,7 +344,7 @@ class _Builder:
     def compared(self, entries: Mapping[str, Entry]) -> tuple[str, tuple[str, ...]]:
         """Return the model that is compared, by default the first springs, and its references, by default the rest."""
         compare = self.table.compare
-        springs = [name for name, entry in entries.items() if isinstance(entry, Springs)]
+        springs = [name for name, entry in entries.items() if isinstance(entry, Springs | GivenSprings)]
         model = compare.model or (springs or list(entries))[0]
         self._known("model", model, entries)
         if compare.references is None:
@@ -354,7 +373,9 @@ def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
 
 
 def _springs(table: schema.SpringsTable) -> Springs:
-    own = UserStiffness(**table.stiffness.model_dump()) if table.stiffness else None
+    own = None
+    if table.stiffness is not None and table.stiffness.edge is not None:
+        own = UserStiffness(table.stiffness.edge, table.stiffness.diagonal, table.stiffness.body)
     return Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
 
 
