@@ -51,3 +51,4 @@ from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
 from .study import converge as converge
 from .study import read_network as read_network
+from .sweeping import sweep as sweep

@@ -4,6 +4,7 @@ import argparse
 import gc
 import importlib
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -99,10 +100,31 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--model", metavar="NAME", help="default: the compared model, or the first springs")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    _add_sweep(add("sweep", _sweep, "solve a study with many values of its keys, on all cores or a cluster", False))
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
+
+
+def _add_sweep(verb: argparse.ArgumentParser) -> None:
+    """What is varied, who solves it, and where it is kept."""
+    verb.add_argument("study", help="a study file (TOML)")
+    verb.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help='"material.young=4 kPa,8 kPa", "mesh.elements=[8,2],[16,4]", "material.poisson=0:0.45:10"; lists count '
+        "from 1: load.1.force; may be given again: all combinations",
+    )
+    verb.add_argument("--lhs", type=_positive, metavar="N", help="instead N points of a Latin hypercube over them")
+    verb.add_argument("--seed", type=int, default=0, metavar="S", help="of the Latin hypercube, default: 0")
+    verb.add_argument("--points", type=Path, metavar="FILE", help="instead a CSV file: keys first, then a row a point")
+    verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: all cores")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
+    verb.add_argument("--retry-failed", action="store_true", help="try points again that have failed before")
+    verb.add_argument("--out", type=Path, default=Path("out/sweep"), metavar="DIR", help="default: out/sweep")
 
 
 def _add_sources(verb: argparse.ArgumentParser) -> None:
@@ -319,6 +341,65 @@ def _export(options: argparse.Namespace) -> int:
     return CONVERGED if converged else NOT_CONVERGED
 
 
+def _sweep(options: argparse.Namespace) -> int:
+    from truespring.report.sweeps import sweep_table
+    from truespring.sweeping import plan_sweep, read_vary, run_sweep, write_sweep
+
+    vary = dict[str, Any]()
+    for key, values in map(read_vary, options.vary):
+        if key in vary:
+            raise TruespringError(f"--vary {key}: is given twice: give all of its values at once")
+        vary[key] = values
+    plan = plan_sweep(options.study, vary, options.lhs, options.seed, options.points)
+    with _writing(options.out):
+        options.out.mkdir(parents=True, exist_ok=True)
+    console = _console(options)
+    try:
+        with _counting(options, "points") as (advance, say), _writing(options.out):
+            done = run_sweep(
+                plan,
+                options.out,
+                options.workers,
+                options.scheduler,
+                threads=options.threads or 1,
+                retry_failed=options.retry_failed,
+                progress=advance,
+                report=say,
+            )
+    except KeyboardInterrupt:
+        print("truespring: interrupted; the same command goes on where it stopped", file=sys.stderr)
+        raise
+    with _writing(options.out):
+        table = write_sweep(done, options.out, _as_typed(options))
+    console.print(sweep_table(plan.keys, done.rows))
+    console.print(f"table: {table}\nreport: {options.out / 'report.html'}", soft_wrap=True)
+    if options.json:
+        counts = {"n_points": len(done.rows), "n_failed": done.n_failed, "n_before": done.n_before}
+        _print_json({**counts, "table": str(table), "rows": done.rows})
+    if not done.converged:
+        _say_failed_points(done.rows, plan.keys)
+    return CONVERGED if done.converged else NOT_CONVERGED
+
+
+def _as_typed(options: argparse.Namespace) -> str:
+    """The command line that does the same."""
+    told = ["truespring", "sweep", options.study]
+    for name in ("vary", "lhs", "seed", "points", "workers", "scheduler", "threads", "out"):
+        value = getattr(options, name)
+        for one in value if isinstance(value, list) else [value]:
+            if one is not None and (name != "seed" or options.lhs):
+                told += [f"--{name}", str(one)]
+    return shlex.join(told)
+
+
+def _say_failed_points(rows: "Sequence[dict[str, Any]]", keys: Sequence[str], most: int = 10) -> None:
+    failed = [row for row in rows if row["status"] == "failed"]
+    for row in failed[:most]:
+        print(f"truespring: {', '.join(f'{key} = {row[key]}' for key in keys)}: {row['reason']}", file=sys.stderr)
+    if len(failed) > most:
+        print(f"truespring: and {len(failed) - most} more points failed: the table has all reasons", file=sys.stderr)
+
+
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:
     """What springs realise beside each material, and whether they are fit for all of them."""
     from truespring.report.tables import moduli_table
@@ -390,6 +471,39 @@ def _progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float
             bars.update(tasks[model], completed=load_factor)
 
         yield advance
+
+
+@contextmanager
+def _counting(
+    options: argparse.Namespace, what: str
+) -> Iterator[tuple[Callable[[int, int, int], None] | None, Callable[[str], None] | None]]:
+    """A bar with the time left, on standard error where that is a terminal, and a way to say something above it."""
+    if options.quiet:
+        yield None, None
+        return
+    if not sys.stderr.isatty():
+        yield None, lambda text: print(f"truespring: {text}", file=sys.stderr)
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    with Progress(*columns, TextColumn("left:"), TimeRemainingColumn(), console=console, transient=True) as bars:
+        task = bars.add_task(what, total=None)
+
+        def advance(done: int, failed: int, total: int) -> None:
+            told = f"{what}, {failed} failed" if failed else what
+            bars.update(task, completed=done, total=total, description=told)
+
+        yield advance, lambda text: console.print(f"truespring: {text}", soft_wrap=True)
 
 
 def _print_plan(console: "Console", plan: dict[str, Any]) -> None:

@@ -215,17 +215,23 @@ def _notes(plan: Plan, found: Mapping[str, Mapping[str, Any]], records: Mapping[
     if plan.n_twice:
         notes.append(f"{plan.n_twice} points were given more than once, and are solved once")
     others = [record for name, record in found.items() if name not in plan.points]
-    elsewhere = [record for record in others if record.get("study") != plan.frame]
-    if others and not records and elsewhere:
+    former = [record for record in others if _is_of(record, plan) and record["study"] != plan.frame]
+    if former:
         notes.append(
-            f"the study, a file that it names, what is varied or truespring has changed: all is solved anew; "
-            f"{len(others)} former results stay in points/"
+            f"the study, a file that it names, or truespring has changed since {len(former)} results in points/ were "
+            "made: they stay there, and are not taken"
         )
-    elif others:
-        notes.append(f"{len(others)} results of other values stay in points/, and are not in the table")
+    if len(others) > len(former):
+        told = f"{len(others) - len(former)} results of other values"
+        notes.append(f"{told} stay in points/, and are not in the table")
     if records:
         notes.append(f"{len(records)} of {len(plan.points)} points were solved before")
     return notes
+
+
+def _is_of(record: Mapping[str, Any], plan: Plan) -> bool:
+    """Whether a record is of a sweep that varied the same."""
+    return set(record["values"]) == set(plan.keys)
 
 
 def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:
