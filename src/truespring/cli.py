@@ -101,6 +101,9 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--model", metavar="NAME", help="default: the compared model, or the first springs")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     _add_sweep(add("sweep", _sweep, "solve a study with many values of its keys, on all cores or a cluster", False))
+    _add_calibrate(
+        add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
+    )
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
@@ -125,6 +128,21 @@ def _add_sweep(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
     verb.add_argument("--retry-failed", action="store_true", help="try points again that have failed before")
     verb.add_argument("--out", type=Path, default=Path("out/sweep"), metavar="DIR", help="default: out/sweep")
+
+
+def _add_calibrate(verb: argparse.ArgumentParser) -> None:
+    """What `calibrate` takes."""
+    verb.add_argument("study", help="the study whose springs are fitted, under its load")
+    verb.add_argument("case", nargs="*", help="further studies of the same body, whose loads are fitted too")
+    verb.add_argument("--held-out", nargs="+", default=[], metavar="CASE", help="studies whose loads only test")
+    verb.add_argument("--unknowns", default="class", metavar="KIND", help="class, region, direction-row or spring")
+    verb.add_argument("--to", metavar="NAME", help="the reference in the studies; default: neo-Hookean FEM, if there")
+    verb.add_argument("--markers", type=Path, metavar="FILE", help="markers (.csv) measured under the study's load")
+    verb.add_argument("--curve", type=Path, metavar="FILE", help="a force-displacement curve (.csv) likewise")
+    verb.add_argument(
+        "--regularisation", type=float, metavar="R", help="weight of the pull toward the rule, default: 0.01"
+    )
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
 
 
 def _add_sources(verb: argparse.ArgumentParser) -> None:
@@ -398,6 +416,47 @@ def _say_failed_points(rows: "Sequence[dict[str, Any]]", keys: Sequence[str], mo
         print(f"truespring: {', '.join(f'{key} = {row[key]}' for key in keys)}: {row['reason']}", file=sys.stderr)
     if len(failed) > most:
         print(f"truespring: and {len(failed) - most} more points failed: the table has all reasons", file=sys.stderr)
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from truespring.report.calibration import calibration_table
+    from truespring.study import read_studies
+    from truespring.study.calibrate import calibrate_study
+    from truespring.study.calibrated import calibrated_values, write_calibrated
+
+    study, *others = read_studies([options.study, *options.case, *options.held_out])
+    cases, held_out = others[: len(options.case)], others[len(options.case) :]
+    _make_folders(options.out, [study])
+    weight = {} if options.regularisation is None else {"regularisation": options.regularisation}
+    with _progress(options) as progress:
+        advance = None if progress is None else lambda text, share: progress(study.stem, "calibration", share)
+        found = calibrate_study(
+            study,
+            cases,
+            held_out,
+            options.unknowns,
+            options.to,
+            options.markers,
+            options.curve,
+            progress=advance,
+            **weight,
+        )
+    told = ["truespring", "calibrate", options.study, *options.case, "--unknowns", options.unknowns]
+    for name in ("to", "markers", "curve", "regularisation"):
+        value = getattr(options, name)
+        told += [] if value is None else [f"--{name}", str(value)]
+    told += ["--out", str(options.out), *(["--held-out", *options.held_out] if options.held_out else [])]
+    with _writing(options.out):
+        files = write_calibrated(found, options.out, shlex.join(told))
+    console = _console(options)
+    console.print(calibration_table(f"{study.stem}: springs fitted to {found.reference}", found.calibration))
+    console.print(found.calibration.headline, found.calibration.identifiability.sentence, sep="\n", soft_wrap=True)
+    for text in found.calibration.warnings:
+        console.print(f"warning: {text}", soft_wrap=True)
+    console.print(f"study: {files[0]}\nreport: {files[-1]}", soft_wrap=True)
+    if options.json:
+        _print_json(calibrated_values(found))
+    return CONVERGED if found.calibration.converged else NOT_CONVERGED
 
 
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:

@@ -109,6 +109,11 @@ class Calibration:
         return None if not found or None in found else max(error for error in found if error is not None)
 
     @property
+    def converged(self) -> bool:
+        """Whether the calibrated springs converge under every load, those held out too."""
+        return all(one.after.status is Status.CONVERGED for one in self.cases)
+
+    @property
     def headline(self) -> str:
         """What calibration gave on loads that it has not seen, in a sentence."""
         if not self.held_out:
@@ -177,7 +182,7 @@ def calibrate(
     if evaluations < 1:
         raise ProblemError(f"evaluations = {evaluations}: at least 1 is wanted")
     body = fitted[0].problem
-    require_one_body([*fitted, *apart], body)
+    require_one_body([(case.name, case.problem) for case in (*fitted, *apart)], body)
     found = make_unknowns(body, springs, unknowns)
     say = report or (lambda text, share: None)
     say("equilibrium of full fields", 0.0)
@@ -255,6 +260,9 @@ def _identified(objective: Objective, values: Floats, system: Equations | None) 
 
 def _warnings(unknowns: Unknowns, values: Floats, results: Sequence[CaseResult]) -> Iterator[str]:
     for one in results:
+        reference = one.case.reference
+        if reference is not None and reference.status is not Status.CONVERGED:
+            yield f"{one.case.name}: the reference is {reference.status}: {reference.status.advice}"
         for path, what in ((one.before, "the rule's springs"), (one.after, "the calibrated springs")):
             if path.status is not Status.CONVERGED:
                 yield f"{one.case.name}: {what} are {path.status} at load factor {path.load_factor:.6g}"

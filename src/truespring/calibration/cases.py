@@ -1,6 +1,6 @@
 """Load cases of a calibration: a problem, and what is known of how its body answers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -178,10 +178,9 @@ class LoadCase:
         return sparse.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), size))
 
 
-def require_one_body(cases: list[LoadCase], problem: Problem) -> None:
-    """Raise ProblemError where a case has another mesh, material or section than the body that is calibrated."""
-    for case in cases:
-        own = case.problem
+def require_one_body(cases: Iterable[tuple[str, Problem]], problem: Problem) -> None:
+    """Raise ProblemError where a case, by name and problem, has another body than the one that is calibrated."""
+    for case, own in cases:
         what = next(
             (
                 name
@@ -197,7 +196,7 @@ def require_one_body(cases: list[LoadCase], problem: Problem) -> None:
         )
         if what is not None:
             raise ProblemError(
-                f"{case.name}: its {what} is another than that of the body that is calibrated; load cases differ in "
+                f"{case}: its {what} is another than that of the body that is calibrated; load cases differ in "
                 "supports and loads only"
             )
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import lsq_linear, nnls
 
 from truespring.arrays import Floats
 from truespring.calibration.cases import LoadCase
@@ -80,12 +79,14 @@ def fit_full_field(system: Equations, regularisation: float) -> Floats:
 
     Non-negative least squares (Lawson and Hanson 1974) with Tikhonov's term toward the rule.
     """
+    from scipy.optimize import lsq_linear, nnls
+
     n = system.matrix.shape[1]
     weight = regularisation * system.size / np.sqrt(n)
     if system.matrix.shape[0] * n <= _DENSE:
         dense = np.concatenate([system.matrix.toarray(), weight * np.eye(n)])
         right = np.concatenate([system.right, np.full(n, weight)])
-        reduced: Floats = np.linalg.qr(np.column_stack([dense, right]), mode="r")
+        reduced = np.asarray(np.linalg.qr(np.column_stack([dense, right]), mode="r"))
         return np.asarray(nnls(reduced[:, :n], reduced[:, n])[0])
     stacked = sparse.vstack([system.matrix, weight * sparse.eye_array(n)]).tocsr()
     right = np.concatenate([system.right, np.full(n, weight)])

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import Bounds, least_squares, minimize
 
 from truespring.arrays import Floats
 from truespring.calibration.objective import Objective
@@ -29,6 +28,8 @@ def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit
     Few unknowns by Gauss and Newton's method in a trust region (Branch, Coleman, Li 1999), many by L-BFGS-B (Byrd et
     al. 1995) with the adjoint gradient. Where no equilibrium is found a step is taken back.
     """
+    from scipy.optimize import Bounds, least_squares, minimize
+
     if len(start) <= GAUSS_NEWTON:
         found = least_squares(
             objective.residuals,

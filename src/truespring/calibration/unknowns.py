@@ -208,7 +208,7 @@ def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
     for name in set(names):
         own = names == name
         row[own] = np.unique(heights[own], return_inverse=True)[1] + 1
-    return _numbered(np.array([f"{name}, row {r}" for name, r in zip(names, row, strict=True)], dtype=object))
+    return _numbered(np.array([f"{name} in row {r}" for name, r in zip(names, row, strict=True)], dtype=object))
 
 
 def _springs(problem: Problem, pairs: Ints, place: Ints) -> Groups:

@@ -103,9 +103,9 @@ class Exported:
     def _header(self) -> Iterator[str]:
         mesh = self.problem.mesh
         yield self.title
+        yield f"{self.path.label}, written by truespring {version('truespring')}."
         if self.note:
             yield self.note
-        yield f"{self.path.label}, written by truespring {version('truespring')}."
         yield "Units are SI: m, N, N/m, kg, s."
         yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.element}."
         yield from self._body()
