@@ -12,7 +12,21 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"sweeping", "study", "report"},
+    "cli": {"validity", "sweeping", "study", "report"},
+    "validity": {
+        "sweeping",
+        "study",
+        "report",
+        "comparison",
+        "equilibrium",
+        "settling",
+        "models",
+        "solvers",
+        "potential",
+        "problem",
+        "loading",
+        "mesh",
+    },
     "sweeping": {"study", "report", "units"},
     "study": {
         "calibration",
