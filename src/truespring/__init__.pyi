@@ -52,3 +52,4 @@ from .solvers import Newton as Newton
 from .study import converge as converge
 from .study import read_network as read_network
 from .sweeping import sweep as sweep
+from .validity import map_validity as map_validity

@@ -104,6 +104,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(
         add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
     )
+    _add_map(
+        add("map", _map, "map up to which load, on which meshes, the springs of a study are within 5 % of FEM", False)
+    )
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
@@ -142,6 +145,42 @@ def _add_calibrate(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--regularisation", type=float, metavar="R", help="weight of the pull toward the rule, default: 0.01"
     )
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+
+
+def _add_map(verb: argparse.ArgumentParser) -> None:
+    """What is mapped, along what, and who solves it."""
+    verb.add_argument("study", help="a study file (TOML)")
+    verb.add_argument("--law", default="neo-hookean", metavar="L", help="of the reference, default: neo-hookean")
+    verb.add_argument(
+        "--load",
+        action="append",
+        metavar="TYPE",
+        help="own (the study's), stretch, compress, bend, shear, twist (in space) or all; may be given again; "
+        "default: own",
+    )
+    verb.add_argument(
+        "--rule",
+        action="append",
+        metavar="R",
+        help="a springs model of the study, a rule, RULE+volume, or all that are for its mesh; may be given again; "
+        "default: the springs of the study",
+    )
+    verb.add_argument("--x", default="load", metavar="A", help="load (default), depth, aspect or poisson")
+    verb.add_argument(
+        "--y", metavar="B", help="another of them, rule, load-type or none; default: depth, if x is the load"
+    )
+    verb.add_argument(
+        "--range",
+        action="append",
+        default=[],
+        metavar="A=FIRST:LAST[:COUNT]",
+        help="of an axis: depth=1:8, load=0:0.4 (a strain, a share of the length, an angle), poisson=0:0.45:16 (in so "
+        "many intervals at the finest); may be given again",
+    )
+    verb.add_argument("--whole", action="store_true", help="solve the whole grid, not only where lines pass")
+    verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: this one")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
 
 
@@ -457,6 +496,49 @@ def _calibrate(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(calibrated_values(found))
     return CONVERGED if found.calibration.converged else NOT_CONVERGED
+
+
+def _map(options: argparse.Namespace) -> int:
+    from truespring.study import read_studies
+    from truespring.validity import map_validity, read_range, validity_values, write_validity
+
+    (study,) = read_studies([options.study])
+    _make_folders(options.out, [study])
+    y = options.y or ("depth" if options.x == "load" else "none")
+    with _counting(options, "paths") as (advance, _):
+        found = map_validity(
+            study,
+            law=options.law,
+            loads=options.load,
+            rules=options.rule,
+            x=options.x,
+            y=None if y == "none" else y,
+            ranges=dict(map(read_range, options.range)),
+            adaptive=not options.whole,
+            workers=None if options.scheduler else options.workers or 1,
+            scheduler=options.scheduler,
+            progress=None if advance is None else lambda what, done, wanted: advance(done, 0, wanted),
+        )
+    with _writing(options.out):
+        files = write_validity(found, options.out, _map_as_typed(options))
+    console = _console(options)
+    for sentence in found.verdicts:
+        console.print(f"{sentence}\n", soft_wrap=True)
+    console.print(f"report: {files['report.html']}", soft_wrap=True)
+    if options.json:
+        _print_json(validity_values(found))
+    return CONVERGED if found.converged else NOT_CONVERGED
+
+
+def _map_as_typed(options: argparse.Namespace) -> str:
+    """The command line that does the same."""
+    told = ["truespring", "map", options.study]
+    for name in ("law", "load", "rule", "x", "y", "range", "workers", "scheduler", "out"):
+        value = getattr(options, name)
+        for one in value if isinstance(value, list) else [value]:
+            if one is not None and (name, one) not in (("law", "neo-hookean"), ("x", "load")):
+                told += [f"--{name}", str(one)]
+    return shlex.join(told + (["--whole"] if options.whole else []))
 
 
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:

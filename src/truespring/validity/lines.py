@@ -9,14 +9,19 @@ from truespring.validity.refine import LINES, crossings
 
 def polylines(one: Map) -> dict[float, list[Floats]]:
     """Return the lines of a map by error: each a list of polylines of (x, y), shape (n, 2); of one row, of points."""
-    from contourpy import contour_generator
-
     if len(one.y) < 2:
         span = one.x[-1] - one.x[0]
         row = np.nan if not len(one.y) else float(one.y[0])
         places = {line: one.x[0] + span * crossings(one.errors[0], line) for line in LINES}
         return {line: [np.array([[x, row]]) for x in found] for line, found in places.items()}
-    made = contour_generator(one.x, one.y, np.ma.masked_invalid(one.errors))
+    return contours(one.x, one.y, one.errors)
+
+
+def contours(x: Floats, y: Floats, errors: Floats) -> dict[float, list[Floats]]:
+    """Return the lines of errors, shape (n_y, n_x), by error: each a list of polylines of (x, y), shape (n, 2)."""
+    from contourpy import contour_generator
+
+    made = contour_generator(x, y, np.ma.masked_invalid(errors))
     return {line: [np.asarray(part) for part in made.lines(line) if len(part) > 1] for line in LINES}
 
 

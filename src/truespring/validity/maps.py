@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from truespring.arrays import Floats
 from truespring.validity.axes import Axis
@@ -11,6 +12,11 @@ from truespring.validity.curve import Curve
 from truespring.validity.loads import LoadType
 from truespring.validity.reference import Reference
 from truespring.validity.rules import Chosen
+
+if TYPE_CHECKING:
+    import polars
+
+    from truespring.report.sheet import Sheet
 
 
 class Key(NamedTuple):
@@ -82,3 +88,42 @@ class Validity:
     full: int
     seconds: float
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def converged(self) -> bool:
+        """Whether every reference is, and there is a map of all that was asked for."""
+        return all(one.converged for one in self.references) and not any(one.refused for one in self.maps)
+
+    @property
+    def verdicts(self) -> list[str]:
+        """A sentence or two a map: up to where which springs may be trusted."""
+        from truespring.validity.sentences import verdict
+
+        return [verdict(self, one) for one in self.maps]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each load level of each path of springs, as in validity.csv."""
+        from truespring.validity.writing import rows
+
+        return list(rows(self))
+
+    def table(self) -> "polars.DataFrame":
+        """Return `rows` as a table of polars."""
+        from truespring.sweeping.table import table_of
+
+        return table_of(self.rows)
+
+    def figures(self) -> "dict[str, Sheet]":
+        """Return the pictures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
+        from truespring.report.style import figure_style
+        from truespring.validity.picture import figures
+
+        with figure_style():
+            return dict(figures(self))
+
+    def write(self, out: str | FilePath) -> dict[str, FilePath]:
+        """Write validity.json, validity.csv, figures and report.html into out/STEM; return where each is."""
+        from truespring.validity.writing import write_validity
+
+        return write_validity(self, FilePath(out))

@@ -73,6 +73,11 @@ class Reference:
         return float(self.sizes[-1])
 
     @property
+    def driven(self) -> bool:
+        """Whether supports that move drive the body, not loads."""
+        return self.solved.path.problem.loading.driven_by_motion
+
+    @property
     def end(self) -> str:
         """Why it ends before the size that was asked for, empty where it does not."""
         return self.solved.end if self.reached < (1 - _NEAR) * self.asked else ""

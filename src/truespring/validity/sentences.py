@@ -249,3 +249,19 @@ def _grouped(
         else:
             groups.append(({row}, found))
     return groups
+
+
+def headline(validity: Validity, one: Map) -> str:
+    """Return the verdict in short, for the head of a picture."""
+    if one.refused:
+        return one.refused
+    first = (_by_load if validity.x == "load" else _by_mesh)(validity, one).removesuffix(".")
+    first = first.partition(f"{one.rule.words} are ")[2].partition(";")[0]
+    return f"{first[0].upper()}{first[1:]}."
+
+
+def row_words(validity: Validity, one: Map, with_range: bool) -> str:
+    """Return what a row of an axis of names is called, with the range of its load where loads differ."""
+    if validity.y == "load-type":
+        return f"{one.load.name}, to {one.load.told(float(one.x[-1]))}" if with_range else one.load.name
+    return one.rule.name if validity.y == "rule" else ""
