@@ -49,6 +49,8 @@ class GivenSprings:
     def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
         """Return the springs on the problem's mesh; raise ModelError where they leave nodes free to move."""
         network = SpringNetwork(problem.mesh.nodes, self.springs, self.stiffness)
+        if not (self.stiffness > 0).any():
+            raise ModelError("no spring has a positive stiffness: these springs carry nothing")
         if not self.kappa.size:
             refuse_mechanism(network, problem.loading.held)
             return network

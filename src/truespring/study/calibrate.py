@@ -97,8 +97,12 @@ def calibrate_study(
 
 
 def springs_of(study: Study) -> str:
-    """Return the name of the springs to calibrate: the compared model where it is springs of a rule, else the first."""
+    """Return the name of the springs to calibrate: the compared model where it is springs of a rule, else the first.
+
+    Springs that answer to each other's lengths are passed over where there are others.
+    """
     springs = [name for name, entry in study.entries.items() if isinstance(entry, Springs)]
+    springs = [name for name in springs if not getattr(study.entries[name], "coupled", False)] or springs
     if not springs:
         raise StudyError(
             f"{study.file}: there are no springs of a rule or of numbers to start from among "
