@@ -14,7 +14,7 @@ from truespring.report.plots import Curve, plot
 from truespring.report.quantity import natural_scale
 from truespring.report.shades import draw_shaded, draw_shaded_dots
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import FAINT, POINT, SPRING_STYLES, error_colors
+from truespring.report.style import BLUE, FAINT, POINT, error_colors
 from truespring.report.words import draw_words, text_width
 
 Row = Mapping[str, Any]
@@ -29,11 +29,14 @@ _UNITS = {
     **dict.fromkeys(("moment",), "N m"),
 }
 _STYLES = (
-    *SPRING_STYLES,
-    ("#000000", "-", "s"),
-    ("#b84a00", "--", "^"),
-    ("#00795a", "-.", "D"),
-    ("#7a4f9c", ":", "v"),
+    (BLUE, "-", "o"),
+    ("#000000", (0, (6, 2)), "s"),
+    ("#b84a00", (0, (3, 1.5, 1, 1.5)), "^"),
+    ("#00795a", (0, (1.2, 1.6)), "D"),
+    ("#7a4f9c", "-", "v"),
+    ("#3a9bdc", (0, (6, 2)), "P"),
+    ("#70777e", (0, (3, 1.5, 1, 1.5)), "X"),
+    ("#8a5a00", (0, (1.2, 1.6)), "<"),
 )
 
 
@@ -53,10 +56,13 @@ class Measured:
 
 
 def measured(rows: Sequence[Row]) -> Measured:
-    """Return the rms error against each reference [%]; where there is none, how far the probe of each model moves."""
+    """Return the rms error against each reference [%]; where there is none, how far the probe of each model moves.
+
+    Of a point that failed nothing is drawn: what it reached is no result.
+    """
     errors = [column for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")]
     if errors:
-        names = {column.split(".")[1]: [_times(row[column], 100) for row in rows] for column in errors}
+        names = {column.split(".")[1]: [_times(_known(row, column), 100) for row in rows] for column in errors}
         return Measured("Rms error", "rms error [%]", names)
     models = dict.fromkeys(
         column.split(".")[1] for column in rows[0] if column.startswith("models.") and ".probe_displacement." in column
@@ -72,8 +78,12 @@ def _times(value: float | None, factor: float) -> float | None:
     return None if value is None else factor * value
 
 
+def _known(row: Row, column: str) -> float | None:
+    return row[column] if row["status"] == "converged" else None
+
+
 def _length(row: Row, prefix: str) -> float | None:
-    parts = [value for column, value in row.items() if column.startswith(prefix) and value is not None]
+    parts = [value for column in row if column.startswith(prefix) and (value := _known(row, column)) is not None]
     return float(np.linalg.norm(parts)) if parts else None
 
 

@@ -43,14 +43,14 @@ def _error_of(reference: str) -> str:
 
 
 def _extremes(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
-    """The rows of the smallest and of the largest rms error, by reference."""
+    """The rows of the smallest and of the largest rms error, by reference, of points that converged."""
     references = [
         column.split(".")[1] for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")
     ]
     found = {}
     for reference in references:
         column = _error_of(reference)
-        known = [row for row in rows if row[column] is not None]
+        known = [row for row in rows if row["status"] == "converged" and row[column] is not None]
         if known:
             by_error = sorted(known, key=lambda row: float(row[column]))
             found[reference] = {"smallest": by_error[0], "largest": by_error[-1]}

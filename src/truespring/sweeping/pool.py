@@ -23,6 +23,9 @@ Report = Callable[[str], None]
 # How often it is looked whether the scheduler still lives, while no point comes in [s].
 _LOOK = 0.5
 
+#: How long a scheduler may take to answer for the first time [s].
+FIRST_PATIENCE = 10.0
+
 # So many clusters of this machine in a row may die without one point solved.
 _MOST_STARTS = 5
 
@@ -90,7 +93,7 @@ class Pool:
         self._waiting = False
         self._rounds = itertools.count()
         self._quiet = _Quiet()
-        self._connect(10.0 if scheduler else patience)
+        self._connect(FIRST_PATIENCE if scheduler else patience)
 
     def __enter__(self) -> "Pool":
         """Return the pool."""
@@ -183,9 +186,9 @@ class Pool:
                 except queue.Empty:
                     self._look()
                     continue
-                outcome = _outcome(future)
-                del held[future.key]
-                yield futures[future.key], outcome
+                key, outcome = future.key, _outcome(future)
+                del held[key], future  # a worker may forget its result
+                yield futures[key], outcome
         finally:
             with suppress(Exception):
                 client.cancel(list(held.values()))

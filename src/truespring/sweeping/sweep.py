@@ -202,7 +202,6 @@ def _outcome(outcome: dict[str, Any] | Failure) -> dict[str, Any]:
         return {"status": FAILED, "reason": f"{told}: install the same on both", "summary": None}
     stopped = [
         f"{name} is {model['status']} at load factor {model['load_factor']:.6g}"
-        + "".join(f": {warning}" for warning in model["warnings"][-1:])
         for name, model in outcome["models"].items()
         if model["status"] != CONVERGED
     ]
