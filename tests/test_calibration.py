@@ -52,6 +52,19 @@ def test_three_classes_are_recovered_from_one_large_deflection_field() -> None:
     assert system.residual(wanted) < 1e-10 < 1e-2 < system.residual(unknowns.start)
 
 
+def test_stiffness_is_recovered_from_a_motion_and_the_force_that_makes_it() -> None:
+    """Beside a weight; without the force of the moved side the springs of a motion alone have no scale."""
+    wanted = np.array([1.3, 0.7, 1.1])
+    for loads in ((), (ts.Gravity((0.0, -2.0)),)):
+        problem = cantilever(loads=loads, displacement=(0.02, -0.05))
+        unknowns = make_unknowns(problem, ts.Springs("lloyd"))
+        case = case_of(problem, unknowns.model(wanted), 2)
+        system = equations(unknowns, [case])
+        assert system is not None
+        assert fit_full_field(system, 0.0) == pytest.approx(wanted, abs=1e-9)
+        assert fit_full_field(system, 1e6) == pytest.approx(np.ones(3), abs=1e-6)  # nothing but the rule
+
+
 @pytest.mark.parametrize("sharing", ["summed", "single"])
 def test_unknowns_of_one_are_the_rule(sharing: str) -> None:
     problem = cantilever((12, 3))
@@ -106,6 +119,9 @@ def test_a_combination_that_no_datum_sees_is_named() -> None:
     told = identifiability(np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]]), ("a", "b", "c"), 0.01, "")
     assert told.rank == 2 and told.loose == ("a", "b")
     assert told.undetermined == pytest.approx([0.5, 0.5, 0.0])
+    random = np.random.default_rng(4)
+    product = random.normal(size=(20, 5)) @ random.normal(size=(5, 8))
+    assert identifiability(product, tuple("abcdefgh"), 0.01, "").rank == 5
     weak = identifiability(np.diag([1.0, 1e-5]), ("a", "b"), 0.01, "")
     assert weak.determined and weak.weak == ("b",) and "regularisation" in weak.sentence
 
@@ -194,6 +210,28 @@ def test_sensitivities_and_the_adjoint_are_one_derivative(kind: str) -> None:
     values = 1 + 0.1 * np.random.default_rng(6).normal(size=len(objective.unknowns))
     residuals, jacobian = objective.residuals(values), objective.jacobian(values)
     assert objective.gradient(values) == pytest.approx(jacobian.T @ residuals, rel=1e-8, abs=1e-12)
+
+
+def test_the_gradient_of_an_iterative_solver_is_that_of_a_factorisation() -> None:
+    directly = objectives()["fields and reactions"]
+    (case,) = directly.cases
+    iterative = replace(case, solver=replace(case.solver, linear="multigrid", tolerance=1e-9))
+    other = Objective(directly.unknowns, [iterative], directly.regularisation)
+    values = 1 + 0.1 * np.random.default_rng(7).normal(size=len(directly.unknowns))
+    wanted = directly.gradient(values)
+    assert other.gradient(values) == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
+
+
+def test_forces_that_are_nothing_beside_the_load_count_little() -> None:
+    """The force of a support that moves where a load does nearly all: its error is told over that load."""
+    problem = cantilever(
+        loads=(ts.Force("right-top", (0.0, -0.05)), ts.Gravity((0.0, -1.0))), displacement=(0.0, -1e-4)
+    )
+    case = case_of(problem, ts.Fem("neo-hookean"), 2)
+    total = np.linalg.norm(problem.loading.external_force.sum(axis=0))
+    assert [one.scale for one in case.observations if one.quantity == "force"] == pytest.approx([total, total])
+    moved = [one for one in case.observations if one.quantity == "displacement"]
+    assert [one.scale for one in moved] == pytest.approx([moved[-1].size] * 2) and moved[0].size < 0.7 * moved[1].size
 
 
 # --- Fits to what is known in part ------------------------------------------------------------------------------------

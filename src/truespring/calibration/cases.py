@@ -1,7 +1,7 @@
 """Load cases of a calibration: a problem, and what is known of how its body answers."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,7 +31,9 @@ class Observation:
         level: the load factor.
         quantity: "displacement" [m] or "force" [N].
         rows: sparse, shape (m, n_dof).
-        data: shape (m,); `size` is its norm, by which errors are divided.
+        data: shape (m,).
+        scale: by which the objective divides errors: the norm of the like data at the last level that is known, so that
+            what is small at first counts little; of forces no less than the total load.
         whole: whether it is the displacement of all nodes, of which equilibrium itself may be asked.
     """
 
@@ -40,6 +42,7 @@ class Observation:
     rows: Rows
     data: Floats
     whole: bool = False
+    scale: float = 1.0
 
     @property
     def size(self) -> float:
@@ -98,12 +101,19 @@ class LoadCase:
     @cached_property
     def observations(self) -> tuple[Observation, ...]:
         """All that is known, level by level."""
-        return tuple(
-            one
-            for level in self.levels
-            for one in (*self._of_field(level), *self._of_markers(level), *self._of_curve(level))
-            if one.size
-        )
+        known: list[Observation] = []
+        for source in (self._of_field, self._of_markers, self._of_curve):
+            found = [one for level in self.levels for one in source(level)]
+            for quantity in ("displacement", "force"):
+                like = [one for one in found if one.quantity == quantity and one.size]
+                least = self._load if quantity == "force" else 0.0
+                known += [replace(one, scale=max(like[-1].size, least)) for one in like]
+        return tuple(sorted(known, key=lambda one: one.level))
+
+    @property
+    def _load(self) -> float:
+        """The total of the loads at full load [N]."""
+        return float(np.linalg.norm(self.problem.loading.force(self.problem.mesh.nodes).sum(axis=0)))
 
     @cached_property
     def free(self) -> Ints:
