@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -492,6 +493,48 @@ def test_a_machine_that_fails_loses_nothing(tmp_path: Path) -> None:
     found = finished(started(*told, "--out", tmp_path / "out", "--json"))
     wanted = finished(started(*told, "--out", tmp_path / "undisturbed", "--json"))
     assert 0 < found["n_before"] == len(before) < 40 and unclocked(found["rows"]) == unclocked(wanted["rows"])
+
+
+@pytest.mark.verification
+def test_a_scheduler_of_others_is_waited_for(tmp_path: Path) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    running: list[subprocess.Popen[bytes]] = []
+
+    def start() -> None:
+        dask = [sys.executable, "-m", "dask"]
+        listening = ["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+        running.append(subprocess.Popen([*dask, *listening], **quiet))
+        working = ["worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]
+        running.append(subprocess.Popen([*dask, *working], **quiet))
+
+    def end() -> None:
+        for process in running:
+            process.kill()
+            process.wait()
+        running.clear()
+
+    said: list[str] = []
+    start()
+    try:
+        with Pool(scheduler=address, report=said.append) as pool:
+            done = []
+            for key, _ in pool.run({number: number for number in range(60)}, who):
+                done.append(key)
+                if len(done) == 5:
+                    end()
+                    start()
+            assert sorted(done) == list(range(60)) and "is lost: waiting for it" in said[-1]
+            pool.patience = 1.0
+            with pytest.raises(TruespringError, match="what was solved is kept"):
+                for number, _ in enumerate(pool.run({number: number for number in range(60)}, who)):
+                    if number == 5:
+                        end()
+    finally:
+        end()
 
 
 @pytest.mark.verification

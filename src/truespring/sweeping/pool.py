@@ -206,16 +206,18 @@ class Pool:
 
     def _again(self, starts: int) -> None:
         """Find a way back to a scheduler."""
-        if self.scheduler is not None:
-            self._report(f"the scheduler {self.scheduler} is lost: waiting for it, {self.patience:g} s at most")
-        elif starts > _MOST_STARTS:
-            raise TruespringError(
-                f"the scheduler died {starts} times without one point solved; what was solved is kept"
-            )
-        else:
-            self._report("the scheduler died: another is started, what was solved is kept")
         self.close()
-        self._connect(self.patience)
+        if self.scheduler is None:
+            if starts > _MOST_STARTS:
+                raise TruespringError(f"the scheduler died {starts} times without a point solved: {_KEPT}")
+            self._report("the scheduler died: another is started, what was solved is kept")
+            self._connect(self.patience)
+            return
+        self._report(f"the scheduler {self.scheduler} is lost: waiting for it, {self.patience:g} s at most")
+        try:
+            self._connect(self.patience)
+        except TruespringError as error:
+            raise TruespringError(f"{error}; {_KEPT}") from None
 
     def _connect(self, patience: float) -> None:
         from distributed import Client
@@ -247,6 +249,7 @@ class Pool:
                 ) from None
 
 
+_KEPT = "what was solved is kept, and the same command goes on with it"
 _KILLED = "every worker that tried it was killed: perhaps it needs more memory than there is, or a library crashed"
 
 
