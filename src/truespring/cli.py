@@ -105,7 +105,7 @@ def _parser() -> argparse.ArgumentParser:
         add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
     )
     _add_map(
-        add("map", _map, "map up to which load, on which meshes, the springs of a study are within 5 % of FEM", False)
+        add("map", _map, "map up to which load, on which meshes, the springs of a study are within 5 percent of FEM", False)
     )
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)

@@ -1,5 +1,6 @@
 """A sweep: one study with many values, every point of it solved once."""
 
+import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -182,7 +183,8 @@ def solve_point(asked: tuple[StudyText, Point]) -> dict[str, Any]:
     result = run(text.study(point.changes))
     found = summary(result)
     for name, path in result.paths.items():
-        found["models"][name]["energy"] = path.states[-1].energy if path.states else None
+        energy = path.states[-1].energy if path.states else math.nan
+        found["models"][name]["energy"] = energy if math.isfinite(energy) else None
     return found
 
 
