@@ -67,6 +67,15 @@ def read_range(text: str) -> tuple[str, Range]:
     return name, checked(name, Range(first, last, count))
 
 
+def range_of(name: str, given: Range | Sequence[float]) -> Range:
+    """Return first, last and if wanted the number of intervals as a range; raise StudyError where they are none."""
+    if isinstance(given, Range):
+        return checked(name, given)
+    if len(given) not in (2, 3):
+        raise StudyError(f"range of {name} = {list(given)}: first, last and if wanted the number of intervals")
+    return checked(name, Range(float(given[0]), float(given[1]), int(given[2]) if len(given) == 3 else None))
+
+
 def checked(name: str, given: Range) -> Range:
     """Return a range; raise StudyError where it is not for its axis."""
     place = f"range of {name} = {given.first:g}:{given.last:g}"

@@ -57,7 +57,7 @@ LOADS: dict[str, LoadType] = {
             "the study's own supports and loads; its size is how far the probe moves in the reference, over the "
             "largest extent of the body",
             "movement of the probe over the length of the body",
-            "% of the body's length",
+            "% of the length",
             100.0,
             None,
         ),

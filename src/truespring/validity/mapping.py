@@ -13,12 +13,12 @@ from truespring.errors import StudyError, TruespringError, nearest
 from truespring.models import LAWS
 from truespring.study import Study, read_study
 from truespring.sweeping import Failure, Pool
-from truespring.validity.axes import NAMES, Range, axis_of, checked, chosen, known, sizes_to
+from truespring.validity.axes import NAMES, Range, axis_of, chosen, known, range_of, sizes_to
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.curve import Curve, curve
 from truespring.validity.loads import LOADS, LoadType
 from truespring.validity.maps import Key, Map, Validity
-from truespring.validity.reference import TOLERANCE, Reference, solve_reference
+from truespring.validity.reference import Reference, solve_reference
 from truespring.validity.refine import Cells, Rows
 from truespring.validity.rules import Chosen, choose
 from truespring.validity.solving import Solved, Task, run_task
@@ -40,7 +40,7 @@ def map_validity(
     rules: Sequence[str] | None = None,
     x: str = "load",
     y: str | None = "depth",
-    ranges: Mapping[str, Range] | None = None,
+    ranges: Mapping[str, Range | Sequence[float]] | None = None,
     adaptive: bool = True,
     workers: int | None = 1,
     scheduler: str | None = None,
@@ -106,7 +106,7 @@ class _Wanted:
 def _solve(job: Task | _Wanted) -> Solved | Reference:
     if isinstance(job, Task):
         return run_task(job)
-    return solve_reference(job.body, job.load, job.law, job.poisson, job.last, job.steps, TOLERANCE)
+    return solve_reference(job.body, job.load, job.law, job.poisson, job.last, job.steps)
 
 
 class _Run:
@@ -120,7 +120,7 @@ class _Run:
         rules: Sequence[str] | None,
         x: str,
         y: str | None,
-        ranges: Mapping[str, Range],
+        ranges: Mapping[str, Range | Sequence[float]],
         adaptive: bool,
         pool: Pool | None,
         progress: Progress | None,
@@ -131,7 +131,7 @@ class _Run:
         chosen([x, y])
         self.x, self.y, self.law, self.pool = x, y, law, pool
         given = {known(name, {"load": 0, "depth": 0, "aspect": 0, "poisson": 0}): one for name, one in ranges.items()}
-        self.ranges = {name: checked(name, one) for name, one in given.items()}
+        self.ranges = {name: range_of(name, one) for name, one in given.items()}
         numbers = [name for name in (x, y) if name not in (None, "load", *NAMES)]
         if idle := [name for name in self.ranges if name not in (*numbers, "load")]:
             raise StudyError(f"a range of {idle[0]} is given, which is no axis of this map: x = {x}, y = {y}")

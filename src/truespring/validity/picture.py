@@ -61,14 +61,16 @@ def map_figure(validity: Validity, one: Map) -> Sheet:
     x, (y, errors) = scale * one.x, _rows(validity, one)
     area = Area(sheet, _LEFT, _BOTTOM, _WIDTH, _HEIGHT, (x[0], x[-1]), (y[0], y[-1]))
     _draw_title(validity, one, sheet, title)
-    _draw_background(area)
+    missing = bool(np.isnan(errors).any())
+    if missing:
+        _draw_background(area)
     for low, high, color in _bands():
         for path in _filled(x, y, errors, low, high):
             _add_filled(area, path, color)
     _draw_solved(area, validity, one)
     draw_frame(area, _x_label(validity, one), validity.axes[str(validity.y)].label)
     _draw_lines(area, contours(x, y, errors))
-    _draw_legend(sheet, validity, one, _LEFT + _WIDTH + 0.16, _BOTTOM + _HEIGHT, bool(np.isnan(one.errors).any()))
+    _draw_legend(sheet, validity, one, _LEFT + _WIDTH + 0.16, _BOTTOM + _HEIGHT, missing)
     return sheet
 
 
@@ -93,13 +95,14 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
     end = scale * first.x[-1]
     bottom = _BOTTOM + room - height
     area = Area(sheet, left, bottom, _WIDTH, height, (scale * first.x[0], end), (0.0, float(len(maps))))
-    _draw_background(area)
+    missing = any(bool(np.isnan(one.errors).any()) for one in maps)
+    if missing:
+        _draw_background(area)
     for row, one in enumerate(reversed(maps)):
         x = one.x * (100.0 / one.x[-1] if shared else scale)
         _draw_strip(area, x, one, float(row))
         draw_words(sheet, left - 0.1, bottom + _STRIP * (row + 0.5), names[::-1][row], SIZE, align=1.0)
     _draw_x(area, "size of the load [% of each range]" if shared else _x_label(validity, first))
-    missing = any(np.isnan(one.errors).any() for one in maps)
     _draw_legend(sheet, validity, first, left + _WIDTH + 0.16, _BOTTOM + room, missing)
     return sheet
 

@@ -14,13 +14,15 @@ from truespring.validity.bodies import Body
 from truespring.validity.loads import LoadType, sizes
 from truespring.validity.solving import Solved, Task, conjugate_force, run_task
 
-#: What the reference may still be off, relative: a fifth of the smallest line of a map.
-TOLERANCE = 0.002
+#: What the reference may still be off, relative, in the plane and in space: a fifth, and half of the smallest line.
+TOLERANCE = {2: 0.002, 3: 0.005}
 
 # A mesh of more unknowns is not solved for a reference, in the plane and in space.
-_MOST_UNKNOWNS = {2: 60_000, 3: 45_000}
+_MOST_UNKNOWNS = {2: 60_000, 3: 60_000}
 # Orders of convergence between these are believed.
 _ORDERS = (0.3, 6.0)
+# What Richardson's estimate is multiplied by: Roache's factor for three meshes.
+_SAFETY = 1.25
 # Loads are scaled until the reference reaches the size that is asked to this share of it; so often at most.
 _NEAR, _MOST_TRIALS = 0.02, 8
 
@@ -90,13 +92,12 @@ def solve_reference(
     poisson: float | None = None,
     last: float | None = None,
     steps: int = 12,
-    tolerance: float = TOLERANCE,
 ) -> Reference:
-    """Return the reference up to the size `last`, by default as far as the load goes.
+    """Return the reference up to the size `last`, by default as far as the load goes, refined to TOLERANCE.
 
     Raises StudyError where it has no equilibrium even under a small load.
     """
-    search = _Search(body, load, law, poisson, steps)
+    search, tolerance = _Search(body, load, law, poisson, steps), TOLERANCE[body.dim]
     asked = load.last if last is None else last
     factor, asked = search.factor(asked)
     meshes: list[Solved] = []
@@ -218,7 +219,7 @@ def _estimate(changes: list[float], settling: Settling) -> tuple[float, float | 
     if len(changes) > 1 and changes[-1] > 0:
         found = math.log2(changes[-2] / changes[-1])
         if _ORDERS[0] <= found <= _ORDERS[1]:
-            order, error = found, changes[-1] / (2**found - 1)
+            order, error = found, _SAFETY * changes[-1] / (2**found - 1)
     return max(error, settling.error or 0.0), order
 
 

@@ -31,7 +31,7 @@ def _by_load(validity: Validity, one: Map) -> str:
     """Up to which size on which rows."""
     law, line = LAWS[validity.law].label, validity.tolerance
     rows = [spans(one.x, errors, line) for errors in one.errors]
-    begin = f"{one.load.did}, {one.rule.words} are"
+    begin = f"{one.load.did}{_moving(one)}, {one.rule.words} are"
     if not any(rows):
         best = float(np.nanmin(one.errors))
         row, place = np.argwhere(one.errors == best)[0]
@@ -43,6 +43,11 @@ def _by_load(validity: Validity, one: Map) -> str:
         found = [spans(one.x, errors, other) for errors in one.errors]
         clauses.append(f"within {tolerance_percent(other)} {_where(validity, one, found, False)}")
     return f"{begin} {'; '.join(clauses)}."
+
+
+def _moving(one: Map) -> str:
+    """Of the study's own load, what its size is."""
+    return f", which moves the probe by up to {one.load.told(float(one.x[-1]))}" if one.load.name == "own" else ""
 
 
 def _others(one: Map, line: float) -> list[float]:
@@ -64,8 +69,9 @@ def _where(validity: Validity, one: Map, rows: Sequence[list[tuple[float, float]
     if all(_alike(rows[0], found, span) for found in rows[1:]):
         return f"{_stretches(one, rows[0])}{_every(validity, one, first)}"
     best = max(range(len(rows)), key=lambda row: sum(end - begin for begin, end in rows[row]))
-    on = _rows(validity, one, [row == best for row in range(len(rows))], first)
-    return f"at best {_stretches(one, rows[best])}, {on}"
+    near = [_alike(rows[best], found, span) for found in rows]
+    less = "" if all(near) or not first else ", less on others" if validity.y == "depth" else ", less elsewhere"
+    return f"{_stretches(one, rows[best])} {_rows(validity, one, near, first)}{less}"
 
 
 def _alike(one: list[tuple[float, float]], other: list[tuple[float, float]], span: float) -> bool:

@@ -1,7 +1,7 @@
 """What is solved for a map: a path to the whole load, and one to a small share of it, where theory is linear."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,13 +10,36 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.equilibrium import Path, State, solve
 from truespring.models import Model
-from truespring.potential import Refined
+from truespring.potential import Loading, Potential, Refined
 from truespring.problem import Problem
-from truespring.solvers import Newton
+from truespring.solvers import Equilibrium, Newton, Reporter
 from truespring.validity.loads import scaled
 
 #: The share of the load at which a body answers as linear theory has it, to this share itself.
 SMALL = 0.01
+
+# Iterations for one level, and how often a step is halved where they are not enough: a map need not know to a hair
+# where a path ends.
+_ITERATIONS, _CUTBACKS = 20, 3
+
+
+class _UpToTheEnd(Newton):
+    """Newton's method that goes no further than a body goes by itself: not along a branch that it has to choose."""
+
+    __slots__ = ()
+
+    def follow(
+        self,
+        potential: Potential,
+        loading: Loading,
+        report: Reporter | None = None,
+        admissible: Callable[[Floats], bool] = lambda positions: True,
+    ) -> Iterator[Equilibrium]:
+        """Yield the equilibria in order, the last one where the body buckles or is unstable."""
+        for found in Newton.follow(self, potential, loading, report, admissible):
+            yield found
+            if found.branched or found.negative_eigenvalues:
+                return
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +65,7 @@ class Solved:
         first = self.small.at(1.0)
         found = [] if first is None else [first]
         for state in self.path.states:
-            if state.negative_eigenvalues or not (state.area_ratio > 0 or self._is_linear):
+            if state.negative_eigenvalues or state.branched or not (state.area_ratio > 0 or self._is_linear):
                 break
             found += [state] if state.level > 0 else []
         return tuple(found)
@@ -63,6 +86,8 @@ class Solved:
         states = self.states
         if states and states[-1].level == 1.0 and len(states) > 1:
             return ""
+        if any(state.branched for state in self.path.states):
+            return "buckling"  # to which side is arbitrary: there is nothing to compare
         status = str(self.path.status)
         return "not converged" if status == "converged" else status.replace("-", " ")
 
@@ -71,7 +96,7 @@ def run_task(task: Task) -> Solved:
     """Solve a task."""
     started = time.perf_counter()
     small = solve(scaled(task.problem, SMALL), task.model, Newton(load_steps=1))
-    path = solve(task.problem, task.model, Newton(load_steps=task.steps))
+    path = solve(task.problem, task.model, _UpToTheEnd(task.steps, max_iterations=_ITERATIONS, max_cutbacks=_CUTBACKS))
     return Solved(_alone(path), _alone(small), time.perf_counter() - started)
 
 

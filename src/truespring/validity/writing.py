@@ -208,6 +208,7 @@ def _page(validity: Validity, drawings: Mapping[str, Drawing], command: str | No
         law=LAWS[validity.law].label,
         groups=list(_groups(validity, drawings)),
         several=len(validity.maps) > 1,
+        converged=all(one.converged for one in validity.references),
         warnings=[*_warnings(validity), *validity.notes],
         references=[_reference_row(one) for one in validity.references],
         by_load=validity.x == "load",
@@ -231,7 +232,7 @@ def _groups(validity: Validity, drawings: Mapping[str, Drawing]) -> Iterator[dic
         yield {
             "title": maps[0].rule.words.capitalize() if by_rule else maps[0].load.did,
             "how": "" if by_rule else maps[0].load.how,
-            "verdicts": [verdict(validity, one) for one in maps],
+            "verdicts": [verdict(validity, one).partition(one.rule.words) for one in maps],
             "same": [
                 f"{', '.join(one.rule.same)}: the same springs here as {one.rule.name}" for one in maps if one.rule.same
             ],
