@@ -10,8 +10,9 @@ from truespring.calibration.objective import Objective
 #: Up to so many unknowns their sensitivities are found one by one, for Gauss and Newton's method.
 GAUSS_NEWTON = 300
 
-# Steps of an unknown, and gains of the objective, below this share end the search.
-_SETTLED = 1e-6
+# Steps of the unknowns below this share end the search, and gains of the objective below that one: so small a gain
+# changes an error of 1 % by a two-thousandth of itself.
+_SETTLED, _GAIN = 1e-6, 1e-3
 
 
 class Fit(NamedTuple):
@@ -37,7 +38,7 @@ def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit
             jac=objective.jacobian,
             bounds=(0.0, np.inf),
             xtol=_SETTLED,
-            ftol=_SETTLED,
+            ftol=_GAIN,
             gtol=1e-12,
             max_nfev=evaluations,
         )
