@@ -14,7 +14,7 @@ def polylines(one: Map) -> dict[float, list[Floats]]:
         row = np.nan if not len(one.y) else float(one.y[0])
         places = {line: one.x[0] + span * crossings(one.errors[0], line) for line in LINES}
         return {line: [np.array([[x, row]]) for x in found] for line, found in places.items()}
-    return contours(one.x, one.y, one.errors)
+    return contours(one.x, *one.smooth)
 
 
 def contours(x: Floats, y: Floats, errors: Floats) -> dict[float, list[Floats]]:

@@ -109,6 +109,10 @@ def _solve(job: Task | _Wanted) -> Solved | Reference:
     return solve_reference(job.body, job.load, job.law, job.poisson, job.last, job.steps)
 
 
+# Rows that are drawn for each of the grid where y is no whole number.
+_PARTS = 4
+
+
 class _Run:
     """One map on its way."""
 
@@ -195,10 +199,13 @@ class _Run:
         )
 
     def _errors(self, key: Key) -> Any:
+        """The errors, with what has a sign of them as the real part: see Rows."""
         found = self.found[key]
         if isinstance(found, Failure):
             return np.full(len(sizes_to(1.0)), np.nan) if self.x == "load" else np.nan
-        return found.errors if self.x == "load" else float(found.errors[-1])
+        signed = np.clip(found.stiffness_on_grid, -found.errors, found.errors)
+        errors = signed + 1j * np.sqrt(found.errors**2 - signed**2)
+        return errors if self.x == "load" else complex(errors[-1])
 
     def _solve_all(self, keys: list[Key]) -> None:
         """Solve references, then springs, then both once more in more steps where levels lie too far apart."""
@@ -278,12 +285,18 @@ class _Run:
         else:
             x = self.axes[self.x].values
             full = grid.shape[0] * grid.shape[1]
+        errors, along = grid.filled(), np.zeros(0) if y is None else y.values
+        smooth = along, errors
+        if self.x == "load" and y is not None and y.name != "depth":
+            places = np.arange((len(along) - 1) * _PARTS + 1) / _PARTS
+            smooth = np.interp(places, np.arange(len(along)), along), grid.filled(_PARTS)
         return Map(
             load=load,
             rule=rule,
             x=x,
-            y=np.zeros(0) if y is None else y.values,
-            errors=grid.filled(),
+            y=along,
+            errors=errors,
+            smooth=smooth,
             curves={spot: one for spot, one in here.items() if isinstance(one, Curve)},
             failures={spot: one.reason for spot, one in here.items() if isinstance(one, Failure)},
             references=references,

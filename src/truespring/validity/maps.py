@@ -35,6 +35,7 @@ class Map:
         load, rule: of what.
         x, y: the values along both axes, shapes (n_x,) and (n_y,); y is (0,) where there is one row only.
         errors: relative, shape (n_y, n_x); not a number where springs or reference do not reach.
+        smooth: values along y, and errors there, between those of the grid too, for lines and pictures.
         curves: what was solved, by its place along y, or along x and y where x is not the load.
         failures: where springs cannot be had, and why.
         references: by Poisson's ratio.
@@ -46,6 +47,7 @@ class Map:
     x: Floats
     y: Floats
     errors: Floats
+    smooth: tuple[Floats, Floats]
     curves: Mapping[Spot, Curve]
     failures: Mapping[Spot, str]
     references: Mapping[float | None, Reference]

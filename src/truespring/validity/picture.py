@@ -110,7 +110,7 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
 def _rows(validity: Validity, one: Map) -> tuple[Floats, Floats]:
     """The values along y and the errors there; a whole number is drawn as a row of its own, from middle to middle."""
     if validity.y != "depth":
-        return one.y, one.errors
+        return one.smooth
     middles = (one.y[:-1] + one.y[1:]) / 2
     lower = np.concatenate([[one.y[0] - 0.5], middles])
     upper = np.concatenate([middles, [one.y[-1] + 0.5]])

@@ -4,8 +4,11 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truespring.arrays import Floats, Ints
+
+Values = NDArray[np.float64] | NDArray[np.complex128]
 
 #: The errors along which the lines of a map run.
 LINES = (0.01, 0.02, 0.05, 0.1)
@@ -17,13 +20,16 @@ TOLERANCE = 0.01
 class Rows:
     """A map whose rows come whole: errors at all sizes of the load for one value along y.
 
+    Errors may be complex: their size is the error, and between rows the numbers themselves are interpolated. With what
+    changes sign where springs cross the reference as the real part, the valley there is found between two rows too.
+
     Rows at `start` are solved first; between two in which a line passes at different places, or one ends, the middle
     one is; unless the middle one of their parents was where the two had told. `rows` is the number of all.
     """
 
     def __init__(self, rows: int, start: Sequence[int], tolerance: float = TOLERANCE) -> None:
         self.rows, self.tolerance = rows, tolerance
-        self.known: dict[int, Floats] = {}
+        self.known: dict[int, Values] = {}
         self._start = tuple(start)
         self._straight: set[tuple[int, int]] = set()
 
@@ -33,7 +39,7 @@ class Rows:
             return missing
         return [(a + b) // 2 for a, b in pairwise(sorted(self.known)) if b - a > 1 and not self._settled(a, b)]
 
-    def add(self, found: Mapping[int, Floats]) -> None:
+    def add(self, found: Mapping[int, Values]) -> None:
         """Take the errors of rows, shape (n_sizes,) each, not a number where there are none."""
         known = sorted(self.known)
         for row, errors in found.items():
@@ -41,8 +47,8 @@ class Rows:
             self.known[row] = errors
             for a, b in around:
                 share = (row - a) / (b - a)
-                ends = [_passes(self.known[one]) for one in (a, b)]
-                if _told(ends[0], ends[1], share, _passes(errors), self.tolerance):
+                told = (1 - share) * self.known[a] + share * self.known[b]
+                if _alike(_passes(told), _passes(errors), self.tolerance):
                     self._straight |= {(a, row), (row, b)}
 
     def _settled(self, a: int, b: int) -> bool:
@@ -50,16 +56,19 @@ class Rows:
         places = [_passes(one) for one in (first, last)]
         if not any(len(one) for line in places for one in line.values()):
             return _band(first) == _band(last)
-        return (a, b) in self._straight or _told(places[0], places[0], 0.0, places[1], self.tolerance)
+        return (a, b) in self._straight or _alike(places[0], places[1], self.tolerance)
 
-    def filled(self) -> Floats:
-        """Errors of all rows, shape (rows, n_sizes), those not solved told from the two beside them."""
+    def filled(self, parts: int = 1) -> Floats:
+        """Errors of all rows, shape (n, n_sizes), those not solved told from the two beside them.
+
+        With `parts` also those between two of the grid: that many a row.
+        """
         solved = np.array(sorted(self.known))
         values = np.array([self.known[row] for row in solved])
-        return np.array([_between(solved, values, row) for row in range(self.rows)])
+        return np.abs([_between(solved, values, row) for row in np.arange((self.rows - 1) * parts + 1) / parts])
 
 
-def _between(solved: Ints, values: Floats, row: int) -> Floats:
+def _between(solved: Ints, values: Values, row: float) -> Values:
     above = int(np.clip(np.searchsorted(solved, row), 1, max(len(solved) - 1, 1)))
     if len(solved) == 1 or row == solved[above - 1]:
         return np.asarray(values[above - 1])
@@ -79,34 +88,31 @@ def crossings(errors: Floats, line: float) -> Floats:
     return np.asarray(place[:-1][passed] + share * (place[1:] - place[:-1])[passed])
 
 
-def _passes(errors: Floats) -> dict[float, Floats]:
+def _passes(values: Values) -> dict[float, Floats]:
     """Where each line is passed, and under 0 where the errors end."""
+    errors = np.abs(values)
     found = {line: crossings(errors, line) for line in LINES}
     finite = np.flatnonzero(np.isfinite(errors))
     last = finite[-1] / max(len(errors) - 1, 1) if finite.size else 0.0
     return found | {0.0: np.array([last] if last < 1 else [])}
 
 
-def _told(
-    one: dict[float, Floats], other: dict[float, Floats], share: float, found: dict[float, Floats], hair: float
-) -> bool:
-    """Whether what was found between two rows is where they tell."""
-    for line, places in found.items():
-        if not len(one[line]) == len(other[line]) == len(places):
-            return False
-        expected = (1 - share) * one[line] + share * other[line]
-        if len(places) and np.abs(expected - places).max() > hair:
-            return False
-    return True
+def _alike(one: dict[float, Floats], other: dict[float, Floats], hair: float) -> bool:
+    """Whether lines pass two rows at the same places."""
+    return all(
+        len(places) == len(other[line]) and (not len(places) or np.abs(places - other[line]).max() <= hair)
+        for line, places in one.items()
+    )
 
 
-def _band(errors: Floats) -> int:
+def _band(values: Values) -> int:
+    errors = np.abs(values)
     finite = errors[np.isfinite(errors)]
     return int(np.searchsorted(LINES, finite[0])) if finite.size else -1
 
 
 class Cells:
-    """A map of single points over two grids, or over one where the second has a single value.
+    """A map of single points over two grids, or over one where the second has a single value; as of Rows, complex too.
 
     Cells between the values of `start` are solved at their corners; one whose corners lie on both sides of a line is
     divided, down to the grid itself.
@@ -114,7 +120,7 @@ class Cells:
 
     def __init__(self, shape: tuple[int, int], start: tuple[Sequence[int], Sequence[int]]) -> None:
         self.shape = shape
-        self.known: dict[tuple[int, int], float] = {}
+        self.known: dict[tuple[int, int], complex] = {}
         x, y = (list(pairwise(one)) or [(0, 0)] for one in start)
         self._cells = [(*i, *j) for i in x for j in y]
 
@@ -129,7 +135,7 @@ class Cells:
                 return []
             self._cells = divided
 
-    def add(self, found: Mapping[tuple[int, int], float]) -> None:
+    def add(self, found: Mapping[tuple[int, int], complex]) -> None:
         """Take the errors of points."""
         self.known.update(found)
 
@@ -142,12 +148,12 @@ class Cells:
         return [(*one, *other) for one in x for other in y]
 
     def _band(self, at: tuple[int, int]) -> int:
-        error = self.known[at]
+        error = abs(self.known[at])
         return int(np.searchsorted(LINES, error)) if np.isfinite(error) else -1
 
     def filled(self) -> Floats:
         """Errors of all points, shape (n_y, n_x), those not solved told from the corners of their cell."""
-        errors = np.full(self.shape[::-1], np.nan)
+        errors = np.full(self.shape[::-1], np.nan + 0j)
         for i, j, k, l in self._cells:  # noqa: E741
             x = np.linspace(0, 1, j - i + 1)[None] if j > i else np.zeros((1, 1))
             y = np.linspace(0, 1, l - k + 1)[:, None] if l > k else np.zeros((1, 1))
@@ -155,7 +161,7 @@ class Cells:
             errors[k : l + 1, i : j + 1] = (1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)
         for (i, j), error in self.known.items():
             errors[j, i] = error
-        return errors
+        return np.abs(errors)
 
 
 def _corners(cell: tuple[int, int, int, int]) -> list[tuple[int, int]]:

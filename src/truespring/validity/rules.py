@@ -55,7 +55,10 @@ def choose(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> l
     own = {name: entry for name, entry in study.entries.items() if isinstance(entry, Springs)}
     problem = study.problem
     if asked is None and own:
-        return _once(own, problem, study, varies_poisson)
+        names = {name: _rule_name(springs) or name for name, springs in own.items()}
+        alone = {name: list(names.values()).count(called) == 1 for name, called in names.items()}
+        given = {names[name] if alone[name] else name: springs for name, springs in own.items()}
+        return _once(given, problem, study, varies_poisson)
     found: dict[str, Springs] = {}
     for name in asked or ["all"]:
         if name == "all":
@@ -63,6 +66,12 @@ def choose(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> l
         else:
             found[name] = _named(name, own, study)
     return _once(found, problem, study, varies_poisson)
+
+
+def _rule_name(springs: Springs) -> str:
+    """How a rule is asked for that gives just these springs, empty where none does."""
+    plain = springs.rule is not None and springs == Springs(springs.rule, volume=springs.volume)
+    return f"{springs.rule}{'+volume' if springs.volume else ''}" if plain else ""
 
 
 def _named(name: str, own: dict[str, Springs], study: Study) -> Springs:
