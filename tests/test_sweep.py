@@ -277,10 +277,6 @@ def test_whatever_dies_no_point_is_lost() -> None:
         assert found.pop("4") == Failure("ValueError: four") and found.pop("5") == Failure("five")
         assert found == {str(number): number**2 for number in (0, 1, 2, 6, 7, 8)}
         wait_until(lambda: len(pool.pids) == 2)
-        os.kill(pool.pids[1], signal.SIGKILL)
-        wait_until(lambda: bool(workers_of(os.getpid())))
-        workers_of(os.getpid())[0].kill()  # while it starts
-        wait_until(lambda: len(pool.pids) == 2)
         scheduler, worker = pool.pids
         done = []
         for key, pid in pool.run({number: number for number in range(40)}, who):
@@ -493,6 +489,17 @@ def test_a_machine_that_fails_loses_nothing(tmp_path: Path) -> None:
     found = finished(started(*told, "--out", tmp_path / "out", "--json"))
     wanted = finished(started(*told, "--out", tmp_path / "undisturbed", "--json"))
     assert 0 < found["n_before"] == len(before) < 40 and unclocked(found["rows"]) == unclocked(wanted["rows"])
+
+
+@pytest.mark.verification
+def test_a_worker_that_dies_as_it_starts_is_started_again() -> None:
+    with Pool(1) as pool:
+        for _ in range(3):
+            wait_until(lambda: bool(workers_of(os.getpid())))
+            worker = workers_of(os.getpid())[0]
+            worker.kill()
+            wait_until(lambda gone=worker: not gone.is_running())  # type: ignore[misc]
+        assert dict(pool.run({2: 2}, square)) == {2: 4}
 
 
 @pytest.mark.verification
