@@ -12,8 +12,10 @@ from tests.test_examples import EXAMPLES
 from truespring.calibration import turned
 from truespring.cli import main
 from truespring.errors import MeshError, StudyError
+from truespring.mesh import rectangle
 from truespring.models import GivenSprings, Springs
 from truespring.report.result import head_note
+from truespring.report.series import write_mesh
 from truespring.study import export_study, read_study, run
 from truespring.study.calibrate import calibrate_study
 from truespring.study.calibrated import write_calibrated
@@ -155,13 +157,14 @@ def test_a_volume_term_is_calibrated_and_read_again(tmp_path: Path) -> None:
 
 
 def test_files_of_a_study_are_found_from_where_the_calibrated_one_stands(tmp_path: Path) -> None:
-    text = (EXAMPLES / "tissue.toml").read_text(encoding="utf-8")
     (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "tissue.msh").write_bytes((EXAMPLES / "tissue.msh").read_bytes())
-    study = read_study(written(tmp_path / "there", text, "tissue.toml"))
-    found = calibrate_study(study, to="saint-venant-kirchhoff", regularisation=1.0)
+    write_mesh(rectangle((0.04, 0.01), (8, 2)), tmp_path / "there" / "body.vtu")
+    shape = 'shape = "rectangle"\nsize = ["40 mm", "10 mm"]\nelements = [8, 2]'
+    text = changed(REFERENCE, (shape, 'file = "body.vtu"'))
+    study = read_study(written(tmp_path / "there", text))
+    found = calibrate_study(study)
     files = write_calibrated(found, tmp_path / "elsewhere", "")
-    assert tomllib.loads(files[0].read_text(encoding="utf-8"))["mesh"]["file"] == "../../there/tissue.msh"
+    assert tomllib.loads(files[0].read_text(encoding="utf-8"))["mesh"]["file"] == "../../there/body.vtu"
     assert len(read_study(files[0]).problem.mesh.nodes) == len(study.problem.mesh.nodes)
 
 

@@ -46,6 +46,7 @@ from .problem import Problem as Problem
 from .problem import Region as Region
 from .reference import read_result as read_result
 from .reference import read_stl as read_stl
+from .report.calibration import draw_calibration as draw_calibration
 from .solvers import ArcLength as ArcLength
 from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton

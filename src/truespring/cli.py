@@ -495,6 +495,9 @@ def _calibrate(options: argparse.Namespace) -> int:
     console.print(f"study: {files[0]}\nreport: {files[-1]}", soft_wrap=True)
     if options.json:
         _print_json(calibrated_values(found))
+    if not found.calibration.converged:
+        for text in found.calibration.warnings:
+            print(f"truespring: {study.stem}: {text}", file=sys.stderr)
     return CONVERGED if found.calibration.converged else NOT_CONVERGED
 
 

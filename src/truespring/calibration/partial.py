@@ -12,7 +12,7 @@ GAUSS_NEWTON = 300
 
 # Steps of the unknowns below this share end the search, and gains of the objective below that one: so small a gain
 # changes an error of 1 % by a two-thousandth of itself.
-_SETTLED, _GAIN = 1e-6, 1e-3
+_SETTLED, _GAIN = 1e-3, 1e-3
 
 
 class Fit(NamedTuple):
