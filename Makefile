@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test verification bench viewer clean
+.PHONY: demo test verification validity bench viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -19,6 +19,10 @@ verification: .venv/test
 	$(BIN)/python -m pytest -q -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
+
+# The validity maps of all rules, solved anew: rebuilds docs/validity.md and its pictures, in a quarter of an hour.
+validity: .venv/test
+	$(BIN)/python docs/build_validity.py
 
 # truespring beside CalculiX (ccx on the path), FElupe and scikit-fem: rebuilds docs/performance.md, in an hour or two.
 # What was run is kept in benchmarks/.cache, and goes on where it broke off; SIZES=small is for trying it out.

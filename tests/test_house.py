@@ -12,7 +12,7 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"study", "report", "table1"},
+    "cli": {"validity", "sweeping", "study", "report", "table1"},
     "table1": {
         "report",
         "comparison",
@@ -25,7 +25,23 @@ ALLOWED = {
         "mesh",
         "material",
     },
+    "validity": {
+        "sweeping",
+        "study",
+        "report",
+        "comparison",
+        "equilibrium",
+        "settling",
+        "models",
+        "solvers",
+        "potential",
+        "problem",
+        "loading",
+        "mesh",
+    },
+    "sweeping": {"study", "report", "units"},
     "study": {
+        "calibration",
         "report",
         "comparison",
         "misfit",
@@ -43,6 +59,7 @@ ALLOWED = {
         "units",
     },
     "report": {
+        "calibration",
         "comparison",
         "equilibrium",
         "settling",
@@ -52,6 +69,18 @@ ALLOWED = {
         "loading",
         "mesh",
         "material",
+    },
+    "calibration": {
+        "carrying",
+        "equilibrium",
+        "models",
+        "solvers",
+        "linear",
+        "problem",
+        "loading",
+        "mesh",
+        "table",
+        "units",
     },
     "comparison": {"carrying", "equilibrium", "problem", "mesh"},
     "carrying": {"equilibrium", "problem", "mesh"},
@@ -101,6 +130,9 @@ HEAVY = {
     "jinja2",
     "mujoco",
     "ansys",
+    "dask",
+    "distributed",
+    "polars",
 }
 
 

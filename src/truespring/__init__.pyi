@@ -1,5 +1,9 @@
 """The public names, each once; imported when they are used."""
 
+from .calibration import Calibration as Calibration
+from .calibration import LoadCase as LoadCase
+from .calibration import calibrate as calibrate
+from .calibration import read_curve as read_curve
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .equilibrium import Path as Path
@@ -32,6 +36,7 @@ from .models import RULES as RULES
 from .models import BemSprings as BemSprings
 from .models import Fem as Fem
 from .models import Fitness as Fitness
+from .models import GivenSprings as GivenSprings
 from .models import Heml as Heml
 from .models import MassTensor as MassTensor
 from .models import Moduli as Moduli
@@ -46,8 +51,11 @@ from .problem import Region as Region
 from .reference import CalculiX as CalculiX
 from .reference import read_result as read_result
 from .reference import read_stl as read_stl
+from .report.calibration import draw_calibration as draw_calibration
 from .solvers import ArcLength as ArcLength
 from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
 from .study import converge as converge
 from .study import read_network as read_network
+from .sweeping import sweep as sweep
+from .validity import map_validity as map_validity

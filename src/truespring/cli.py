@@ -4,6 +4,7 @@ import argparse
 import gc
 import importlib
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -99,6 +100,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--model", metavar="NAME", help="default: the compared model, or the first springs")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    _add_sweep(add("sweep", _sweep, "solve a study with many values of its keys, on all cores or a cluster", False))
+    _add_calibrate(
+        add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
+    )
+    _add_map(
+        add(
+            "map",
+            _map,
+            "map up to which load, on which meshes, the springs of a study are within 5 percent of FEM",
+            False,
+        )
+    )
     add("check", _check, "check a study and show what would be run, solving nothing")
     verb = add(
         "table1", _table1, "measure the paper's Table 1: six methods on one body, beside its signs", studies=False
@@ -108,6 +121,77 @@ def _parser() -> argparse.ArgumentParser:
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
+
+
+def _add_sweep(verb: argparse.ArgumentParser) -> None:
+    """What is varied, who solves it, and where it is kept."""
+    verb.add_argument("study", help="a study file (TOML)")
+    verb.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help='"material.young=4 kPa,8 kPa", "mesh.elements=[8,2],[16,4]", "material.poisson=0:0.45:10"; lists count '
+        "from 1: load.1.force; may be given again: all combinations",
+    )
+    verb.add_argument("--lhs", type=_positive, metavar="N", help="instead N points of a Latin hypercube over them")
+    verb.add_argument("--seed", type=int, default=0, metavar="S", help="of the Latin hypercube, default: 0")
+    verb.add_argument("--points", type=Path, metavar="FILE", help="instead a CSV file: keys first, then a row a point")
+    verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: all cores")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
+    verb.add_argument("--retry-failed", action="store_true", help="try points again that have failed before")
+    verb.add_argument("--out", type=Path, default=Path("out/sweep"), metavar="DIR", help="default: out/sweep")
+
+
+def _add_calibrate(verb: argparse.ArgumentParser) -> None:
+    """What `calibrate` takes."""
+    verb.add_argument("study", help="the study whose springs are fitted, under its load")
+    verb.add_argument("case", nargs="*", help="further studies of the same body, whose loads are fitted too")
+    verb.add_argument("--held-out", nargs="+", default=[], metavar="CASE", help="studies whose loads only test")
+    verb.add_argument("--unknowns", default="class", metavar="KIND", help="class, region, direction-row or spring")
+    verb.add_argument("--to", metavar="NAME", help="the reference in the studies; default: neo-Hookean FEM, if there")
+    verb.add_argument("--markers", type=Path, metavar="FILE", help="markers (.csv) measured under the study's load")
+    verb.add_argument("--curve", type=Path, metavar="FILE", help="a force-displacement curve (.csv) likewise")
+    verb.add_argument(
+        "--regularisation", type=float, metavar="R", help="weight of the pull toward the rule, default: 0.01"
+    )
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+
+
+def _add_map(verb: argparse.ArgumentParser) -> None:
+    """What is mapped, along what, and who solves it."""
+    verb.add_argument("study", help="a study file (TOML)")
+    verb.add_argument("--law", default="neo-hookean", metavar="L", help="of the reference, default: neo-hookean")
+    verb.add_argument(
+        "--load",
+        action="append",
+        metavar="TYPE",
+        help="own (the study's), stretch, compress, bend, shear, twist (in space) or all; may be given again; "
+        "default: own",
+    )
+    verb.add_argument(
+        "--rule",
+        action="append",
+        metavar="R",
+        help="a springs model of the study, a rule, RULE+volume, or all that are for its mesh; may be given again; "
+        "default: the springs of the study",
+    )
+    verb.add_argument("--x", default="load", metavar="A", help="load (default), depth, aspect or poisson")
+    verb.add_argument(
+        "--y", metavar="B", help="another of them, rule, load-type or none; default: depth, if x is the load"
+    )
+    verb.add_argument(
+        "--range",
+        action="append",
+        default=[],
+        metavar="A=FIRST:LAST[:COUNT]",
+        help="of an axis: depth=1:8, load=0:0.4 (a strain, a share of the length, an angle), poisson=0:0.45:16 (in so "
+        "many intervals at the finest); may be given again",
+    )
+    verb.add_argument("--whole", action="store_true", help="solve the whole grid, not only where lines pass")
+    verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: this one")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
+    verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
 
 
 def _add_sources(verb: argparse.ArgumentParser) -> None:
@@ -328,6 +412,152 @@ def _export(options: argparse.Namespace) -> int:
     return CONVERGED if converged else NOT_CONVERGED
 
 
+def _sweep(options: argparse.Namespace) -> int:
+    from truespring.report.sweeps import sweep_table
+    from truespring.sweeping import plan_sweep, read_vary, run_sweep, write_sweep
+
+    vary = dict[str, Any]()
+    for key, values in map(read_vary, options.vary):
+        if key in vary:
+            raise TruespringError(f"--vary {key}: is given twice: give all of its values at once")
+        vary[key] = values
+    plan = plan_sweep(options.study, vary, options.lhs, options.seed, options.points)
+    with _writing(options.out):
+        options.out.mkdir(parents=True, exist_ok=True)
+    console = _console(options)
+    try:
+        with _counting(options, "points") as (advance, say), _writing(options.out):
+            done = run_sweep(
+                plan,
+                options.out,
+                options.workers,
+                options.scheduler,
+                threads=options.threads or 1,
+                retry_failed=options.retry_failed,
+                progress=advance,
+                report=say,
+            )
+    except KeyboardInterrupt:
+        print("truespring: interrupted; the same command goes on where it stopped", file=sys.stderr)
+        raise
+    with _writing(options.out):
+        table = write_sweep(done, options.out, _as_typed(options))
+    console.print(sweep_table(plan.keys, done.rows))
+    console.print(f"table: {table}\nreport: {options.out / 'report.html'}", soft_wrap=True)
+    if options.json:
+        counts = {"n_points": len(done.rows), "n_failed": done.n_failed, "n_before": done.n_before}
+        _print_json({**counts, "table": str(table), "rows": done.rows})
+    if not done.converged:
+        _say_failed_points(done.rows, plan.keys)
+    return CONVERGED if done.converged else NOT_CONVERGED
+
+
+def _as_typed(options: argparse.Namespace) -> str:
+    """The command line that does the same."""
+    told = ["truespring", "sweep", options.study]
+    for name in ("vary", "lhs", "seed", "points", "workers", "scheduler", "threads", "out"):
+        value = getattr(options, name)
+        for one in value if isinstance(value, list) else [value]:
+            if one is not None and (name != "seed" or options.lhs):
+                told += [f"--{name}", str(one)]
+    return shlex.join(told)
+
+
+def _say_failed_points(rows: "Sequence[dict[str, Any]]", keys: Sequence[str], most: int = 10) -> None:
+    failed = [row for row in rows if row["status"] == "failed"]
+    for row in failed[:most]:
+        print(f"truespring: {', '.join(f'{key} = {row[key]}' for key in keys)}: {row['reason']}", file=sys.stderr)
+    if len(failed) > most:
+        print(f"truespring: and {len(failed) - most} more points failed: the table has all reasons", file=sys.stderr)
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from truespring.report.calibration import calibration_table
+    from truespring.study import read_studies
+    from truespring.study.calibrate import calibrate_study
+    from truespring.study.calibrated import calibrated_values, write_calibrated
+
+    study, *others = read_studies([options.study, *options.case, *options.held_out])
+    cases, held_out = others[: len(options.case)], others[len(options.case) :]
+    _make_folders(options.out, [study])
+    weight = {} if options.regularisation is None else {"regularisation": options.regularisation}
+    with _progress(options) as progress:
+        advance = None if progress is None else lambda text, share: progress(study.stem, "calibration", share)
+        found = calibrate_study(
+            study,
+            cases,
+            held_out,
+            options.unknowns,
+            options.to,
+            options.markers,
+            options.curve,
+            progress=advance,
+            **weight,
+        )
+    told = ["truespring", "calibrate", options.study, *options.case, "--unknowns", options.unknowns]
+    for name in ("to", "markers", "curve", "regularisation"):
+        value = getattr(options, name)
+        told += [] if value is None else [f"--{name}", str(value)]
+    told += ["--out", str(options.out), *(["--held-out", *options.held_out] if options.held_out else [])]
+    with _writing(options.out):
+        files = write_calibrated(found, options.out, shlex.join(told))
+    console = _console(options)
+    console.print(calibration_table(f"{study.stem}: springs fitted to {found.reference}", found.calibration))
+    console.print(found.calibration.headline, found.calibration.identifiability.sentence, sep="\n", soft_wrap=True)
+    for text in found.calibration.warnings:
+        console.print(f"warning: {text}", soft_wrap=True)
+    console.print(f"study: {files[0]}\nreport: {files[-1]}", soft_wrap=True)
+    if options.json:
+        _print_json(calibrated_values(found))
+    if not found.calibration.converged:
+        for text in found.calibration.warnings:
+            print(f"truespring: {study.stem}: {text}", file=sys.stderr)
+    return CONVERGED if found.calibration.converged else NOT_CONVERGED
+
+
+def _map(options: argparse.Namespace) -> int:
+    from truespring.study import read_studies
+    from truespring.validity import map_validity, read_range, validity_values, write_validity
+
+    (study,) = read_studies([options.study])
+    _make_folders(options.out, [study])
+    y = options.y or ("depth" if options.x == "load" else "none")
+    with _counting(options, "paths") as (advance, _):
+        found = map_validity(
+            study,
+            law=options.law,
+            loads=options.load,
+            rules=options.rule,
+            x=options.x,
+            y=None if y == "none" else y,
+            ranges=dict(map(read_range, options.range)),
+            adaptive=not options.whole,
+            workers=None if options.scheduler else options.workers or 1,
+            scheduler=options.scheduler,
+            progress=None if advance is None else lambda what, done, wanted: advance(done, 0, wanted),
+        )
+    with _writing(options.out):
+        files = write_validity(found, options.out, _map_as_typed(options))
+    console = _console(options)
+    for sentence in found.verdicts:
+        console.print(f"{sentence}\n", soft_wrap=True)
+    console.print(f"report: {files['report.html']}", soft_wrap=True)
+    if options.json:
+        _print_json(validity_values(found))
+    return CONVERGED if found.converged else NOT_CONVERGED
+
+
+def _map_as_typed(options: argparse.Namespace) -> str:
+    """The command line that does the same."""
+    told = ["truespring", "map", options.study]
+    for name in ("law", "load", "rule", "x", "y", "range", "workers", "scheduler", "out"):
+        value = getattr(options, name)
+        for one in value if isinstance(value, list) else [value]:
+            if one is not None and (name, one) not in (("law", "neo-hookean"), ("x", "load")):
+                told += [f"--{name}", str(one)]
+    return shlex.join(told + (["--whole"] if options.whole else []))
+
+
 def _print_realised(console: "Console", stem: str, several: "Iterable[Realised]") -> None:
     """What springs realise beside each material, and whether they are fit for all of them."""
     from truespring.report.tables import moduli_table
@@ -416,6 +646,39 @@ def _progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float
             bars.update(tasks[model], completed=load_factor)
 
         yield advance
+
+
+@contextmanager
+def _counting(
+    options: argparse.Namespace, what: str
+) -> Iterator[tuple[Callable[[int, int, int], None] | None, Callable[[str], None] | None]]:
+    """A bar with the time left, on standard error where that is a terminal, and a way to say something above it."""
+    if options.quiet:
+        yield None, None
+        return
+    if not sys.stderr.isatty():
+        yield None, lambda text: print(f"truespring: {text}", file=sys.stderr)
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    with Progress(*columns, TextColumn("left:"), TimeRemainingColumn(), console=console, transient=True) as bars:
+        task = bars.add_task(what, total=None)
+
+        def advance(done: int, failed: int, total: int) -> None:
+            told = f"{what}, {failed} failed" if failed else what
+            bars.update(task, completed=done, total=total, description=told)
+
+        yield advance, lambda text: console.print(f"truespring: {text}", soft_wrap=True)
 
 
 def _print_plan(console: "Console", plan: dict[str, Any]) -> None:

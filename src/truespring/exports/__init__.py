@@ -16,7 +16,7 @@ from truespring.exports.exported import plain_springs
 from truespring.exports.exported import solve_springs as solve_springs
 from truespring.exports.mujoco import mujoco
 from truespring.exports.sofa import sofa
-from truespring.models import SpringNetwork, Springs
+from truespring.models import SpringModel, SpringNetwork
 from truespring.problem import Problem
 
 #: The content of each file by its name: text, or bytes.
@@ -74,7 +74,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
 
 def export(
     problem: Problem,
-    model: Springs | SpringNetwork,
+    model: SpringModel,
     target: str,
     folder: str | FilePath,
     solver: Solver | None = None,
@@ -102,9 +102,9 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
     return several
 
 
-def check_targets(names: Collection[str], problem: Problem, model: Springs | SpringNetwork) -> None:
+def check_targets(names: Collection[str], problem: Problem, model: SpringModel) -> None:
     """Raise ExportError for what a target cannot take, and for two that write one file; solve nothing."""
-    if not isinstance(model, Springs | SpringNetwork):
+    if not isinstance(model, SpringModel):
         raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
     springs = model if isinstance(model, SpringNetwork) else model.potential(problem)
     written: dict[str, str] = {}

@@ -355,9 +355,15 @@ def check_springs(problem: Problem, network: SpringNetwork) -> None:
 
 def described(exported: Exported, what: str, springs: bool) -> list[str]:
     """Return what a deck is, and what the problem asks; of springs also what to expect of them."""
-    (title,) = printable([exported.title])
+    title, note = printable([exported.title, exported.note])
     if springs:
-        return [title, f"{what}: {exported.written}", *exported.asked, *exported.told_of_springs]
+        return [
+            title,
+            f"{what}: {exported.written}",
+            *([note] if note else []),
+            *exported.asked,
+            *exported.told_of_springs,
+        ]
     return [title, f"{what}, written by truespring {version('truespring')}.", *exported.asked]
 
 

@@ -14,7 +14,7 @@ from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import PlaneStrain, PlaneStress
 from truespring.mesh import Box, Near, Plane, Selection
 from truespring.mesh.selections import AXES
-from truespring.models import SpringNetwork, Springs, VolumeSprings
+from truespring.models import SpringModel, SpringNetwork, VolumeSprings
 from truespring.potential import Potential
 from truespring.problem import Load, Problem
 from truespring.solvers import DisplacementControl, Newton, Reporter
@@ -32,6 +32,7 @@ class Exported:
         probe: number of the node that is watched.
         load_steps: load levels that the study asks for.
         remarks: what else the reader of the file should know, in sentences.
+        note: what the study says of itself at its head, such as how its springs were found; empty for nothing.
     """
 
     title: str
@@ -40,6 +41,7 @@ class Exported:
     probe: int
     load_steps: int
     remarks: tuple[str, ...] = ()
+    note: str = ""
 
     @cached_property
     def state(self) -> State | None:
@@ -99,6 +101,7 @@ class Exported:
             [
                 self.title,
                 self.written,
+                *([self.note] if self.note else []),
                 "Units are SI: m, N, N/m, kg, s.",
                 *self.asked,
                 "Loads and prescribed motions stand at their full values.",
@@ -203,7 +206,7 @@ def plain_springs(springs: Potential | None, program: str, negative: bool = True
 
 def solve_springs(
     problem: Problem,
-    model: Springs | SpringNetwork,
+    model: SpringModel,
     solver: Solver | None = None,
     title: str = "Springs",
     probe: int | None = None,

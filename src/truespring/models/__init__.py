@@ -11,6 +11,7 @@ from truespring.models.fem import FemPotential as FemPotential
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
+from truespring.models.given import GivenSprings as GivenSprings
 from truespring.models.heml import Heml as Heml
 from truespring.models.laws import LAWS as LAWS
 from truespring.models.mass_tensor import MassTensor as MassTensor
@@ -21,10 +22,15 @@ from truespring.models.network import SpringNetwork as SpringNetwork
 from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness
 from truespring.models.springs import Springs as Springs
+from truespring.models.springs import shared_springs as shared_springs
 from truespring.models.terzopoulos import Terzopoulos as Terzopoulos
 from truespring.models.volume import VolumeSprings as VolumeSprings
+from truespring.models.volume import VolumeTerm as VolumeTerm
 from truespring.potential import Potential
 from truespring.problem import Problem
+
+#: What may be solved, compared and exported as springs.
+SpringModel = Springs | GivenSprings | SpringNetwork
 
 
 class Model(Protocol):

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
+from truespring.mesh import Mesh
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.network import SpringNetwork
@@ -140,13 +141,8 @@ class Springs:
 
     def network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
         """Return the springs of the given stiffness of each element's links [N/m], shape (n_elements, links)."""
-        from truespring.kernels.sparsity import unique_pairs
-        from truespring.kernels.threads import writable
-
         mesh = problem.mesh
-        pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
-        springs, place = unique_pairs(pairs, mesh.n_nodes)
-        del pairs
+        springs, place = shared_springs(mesh)
         stiffness = np.bincount(place, per_element.ravel()).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)
@@ -162,3 +158,16 @@ class Springs:
                 "another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)
+
+
+def shared_springs(mesh: Mesh) -> tuple[Ints, Ints]:
+    """Return the pairs of nodes that links join, each once, and the number of the pair of each element's each link.
+
+    Shapes (n_springs, 2) and (n_elements * links,).
+    """
+    from truespring.kernels.sparsity import unique_pairs
+    from truespring.kernels.threads import writable
+
+    pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
+    springs, place = unique_pairs(pairs, mesh.n_nodes)
+    return springs, place

@@ -70,8 +70,8 @@ class VolumeTerm:
         run(volumes.growths, len(growth), *known, growth, self.pattern.zero)
         return self.pressure(positions) + self.kappa * growth / self._at_rest
 
-    def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+    def element_forces(self, positions: Floats) -> Floats:
+        """Internal force on the nodes of each element [N], shape (n_elements, nodes * dim)."""
         from truespring.kernels import volumes
         from truespring.kernels.threads import run, writable
 
@@ -79,7 +79,11 @@ class VolumeTerm:
         force = np.empty((len(pressure), pattern.elements.shape[1] * pattern.dim))
         known = (writable(positions), pattern.elements, *self._form, pressure)
         run(volumes.forces, len(force), *known, force, pattern.zero)
-        return pattern.vector(force)
+        return force
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        return self.pattern.vector(self.element_forces(positions))
 
     def add_hessian(self, positions: Floats, pressure: Floats, values: Floats) -> None:
         """Add the tangent stiffness [N/m], the curvature of the volumes weighted by `pressure` [Pa], to a matrix."""

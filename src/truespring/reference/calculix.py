@@ -17,7 +17,7 @@ from truespring.exports.decks import check_fem, check_springs, fem_element, is_l
 from truespring.exports.exported import plain_springs
 from truespring.loading import Pressure
 from truespring.material import PlaneStress
-from truespring.models import SpringNetwork, Springs
+from truespring.models import SpringModel, SpringNetwork
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
 from truespring.reference.dat import read_dat
@@ -58,7 +58,7 @@ class CalculiX:
     """
 
     law: str = "saint-venant-kirchhoff"
-    springs: Springs | SpringNetwork | None = None
+    springs: SpringModel | None = None
 
     kind = "calculix"
 

@@ -66,7 +66,7 @@ def render_page(results: Sequence[Result], command: str) -> str:
         title=results[0].title if len(results) == 1 else f"{len(results)} {several}",
         what=what,
         studies=studies,
-        versions=_versions(),
+        versions=versions(),
         command=command,
         scripts=[(folder / script).read_text(encoding="utf-8") for script in scripts],
     )
@@ -78,16 +78,17 @@ def _template() -> "Template":
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = _close
+    environment.filters["close"] = close
     return environment.from_string((files("truespring.report") / "page.html.j2").read_text(encoding="utf-8"))
 
 
-def _close(text: str) -> str:
+def close(text: str) -> str:
     """Keep a number and its unit on one line."""
     return re.sub(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Pa|N|m))(?:\W|$))", "\N{NO-BREAK SPACE}", text)
 
 
-def _versions() -> list[tuple[str, str]]:
+def versions() -> list[tuple[str, str]]:
+    """Return what a result depends on and its version, truespring first."""
     found = [("python", platform.python_version())]
     for package in ("truespring", "numpy", "scipy", "scikit-fem"):
         try:
@@ -99,7 +100,7 @@ def _versions() -> list[tuple[str, str]]:
 
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     drawings = render_figures(result)
-    pictures = {name: _picture(drawing) for name, drawing in drawings.items()}
+    pictures = {name: picture(drawing) for name, drawing in drawings.items()}
     nearest = result.closest if len(result.comparisons) == 1 else nearest_reference(result)
     in_space = result.problem.mesh.dim == 3
     moving = viewer(result, budget)
@@ -145,7 +146,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
 _SENTENCES = (carrying_sentence, closest_sentence, cause_sentence, force_sentence, mesh_sentence)
 
 
-def _picture(drawing: Drawing) -> dict[str, str]:
+def picture(drawing: Drawing) -> dict[str, str]:
     """A picture as the address that an <img> takes it from, its width on paper in CSS pixels, and its words."""
     if len(drawing.svg) <= _LARGEST_SVG:
         address = "data:image/svg+xml," + quote(

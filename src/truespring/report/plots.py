@@ -20,7 +20,9 @@ from truespring.report.young import Known, young_figure
 
 
 @dataclass(frozen=True, slots=True)
-class _Curve:
+class Curve:
+    """A curve of a plot, shape (n,) each; a new line in its label begins a fainter second part."""
+
     x: Floats
     y: Floats
     color: str
@@ -49,7 +51,7 @@ def curves_figure(result: Result) -> Sheet:
     y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
     name_of_x = "load factor" if balanced else f"total force along {to.name} [{x_scale.unit}]"
     curves = [
-        _Curve(
+        Curve(
             forces[name] / (1.0 if balanced else x_scale.size),
             moves[name] / y_scale.size,
             *styles[name],
@@ -60,7 +62,7 @@ def curves_figure(result: Result) -> Sheet:
         )
         for name in forces
     ]
-    return _plot(
+    return plot(
         f"Displacement of the probe against {'load factor' if balanced else 'force'}",
         name_of_x,
         f"displacement along {to.name} [{y_scale.unit}]",
@@ -109,7 +111,7 @@ def reactions_figure(result: Result) -> Sheet:
         (1.0, "turn [degrees]") if turned else (y_scale.size, f"displacement along its way [{y_scale.unit}]")
     )
     curves = [
-        _Curve(
+        Curve(
             forces[name] / x_scale.size,
             moves[name] / size,
             *styles[name],
@@ -119,7 +121,7 @@ def reactions_figure(result: Result) -> Sheet:
         for name in forces
     ]
     title = "What it takes to move the support" if len(moved) == 1 else f"What it takes to move support {number + 1}"
-    return _plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
+    return plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
 
 
 def error_figure(result: Result) -> Sheet:
@@ -128,7 +130,7 @@ def error_figure(result: Result) -> Sheet:
 
     styles = path_styles(result)
     curves = [
-        _Curve(
+        Curve(
             one.load_factors,
             100 * np.asarray(one.rms_errors),
             *styles[name],
@@ -140,9 +142,9 @@ def error_figure(result: Result) -> Sheet:
     ]
     tolerance = 100 * result.tolerance
     within = f"within {tolerance_percent(result.tolerance)}"
-    curves.append(_Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
+    curves.append(Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    area = _plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
+    area = plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
     area.add(Rectangle((0, 0), 1.02, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
     return area.sheet
 
@@ -155,7 +157,7 @@ def _two_lines(result: Result, name: str) -> str:
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
-def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_right: float | None = None) -> Area:
+def plot(title: str, x_label: str, y_label: str, curves: Sequence[Curve], to_right: float | None = None) -> Area:
     """Curves with their names at their ends, moved apart where they would meet.
 
     The axes end at 0 or below and, with `to_right`, span 0 to that.
@@ -196,7 +198,7 @@ def _plot(title: str, x_label: str, y_label: str, curves: Sequence[_Curve], to_r
     return area
 
 
-def _stretches(curve: _Curve) -> Iterator[tuple[slice, bool]]:
+def _stretches(curve: Curve) -> Iterator[tuple[slice, bool]]:
     """Cut a curve into stretches that are stable or not: a step is stable where both its ends are."""
     if curve.unstable is None or not curve.unstable.any():
         yield slice(None), False
@@ -216,7 +218,7 @@ def _span(several: Sequence[Floats]) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _look(curve: _Curve) -> dict[str, Any]:
+def _look(curve: Curve) -> dict[str, Any]:
     return {
         "color": curve.color,
         "ls": curve.dashes,
@@ -229,7 +231,7 @@ def _look(curve: _Curve) -> dict[str, Any]:
     }
 
 
-def _name_ends(area: Area, curves: Sequence[_Curve]) -> None:
+def _name_ends(area: Area, curves: Sequence[Curve]) -> None:
     """Write each curve's name right of the area, by height of their ends, with a sample of its line.
 
     A leader joins the two where the curve ends near the right edge.

@@ -12,6 +12,12 @@ from truespring.models import Fitness
 from truespring.problem import Problem
 
 
+def head_note(source: str) -> str:
+    """Return what the comments at the head of a study file say."""
+    head = itertools.takewhile(lambda line: line.startswith("#"), source.splitlines())
+    return " ".join(line.lstrip("#").strip() for line in head)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """One study, solved.
@@ -54,8 +60,7 @@ class Result:
     @property
     def note(self) -> str:
         """What the comments at the head of the study file say."""
-        head = itertools.takewhile(lambda line: line.startswith("#"), self.source.splitlines())
-        return " ".join(line.lstrip("#").strip() for line in head)
+        return head_note(self.source)
 
     @cached_property
     def closest(self) -> str | None:

@@ -1,5 +1,6 @@
 """Study files: read, checked, run."""
 
+from truespring.study.changes import value_at as value_at
 from truespring.study.compare import compare_sources as compare_sources
 from truespring.study.compare import read_probe as read_probe
 from truespring.study.compare import write_comparisons as write_comparisons
@@ -9,7 +10,9 @@ from truespring.study.export import export_study as export_study
 from truespring.study.export import springs_of as springs_of
 from truespring.study.network import read_network as read_network
 from truespring.study.read import Study as Study
+from truespring.study.read import StudyText as StudyText
 from truespring.study.read import read_study as read_study
+from truespring.study.read import read_text as read_text
 from truespring.study.run import Realised as Realised
 from truespring.study.run import plan as plan
 from truespring.study.run import read_studies as read_studies

@@ -30,9 +30,11 @@ from truespring.mesh import (
 from truespring.models import (
     BemSprings,
     Fem,
+    GivenSprings,
     Heml,
     MassTensor,
     Model,
+    SpringModel,
     SpringNetwork,
     Springs,
     Terzopoulos,
@@ -44,6 +46,8 @@ from truespring.problem import Load, Problem, Region
 from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
 from truespring.study import schema
+from truespring.study.changes import changed
+from truespring.study.given import read_given
 from truespring.study.network import read_network
 from truespring.units import to_si
 
@@ -82,11 +86,35 @@ class Study:
         return self.file.stem
 
 
-def read_study(file: str | FilePath, halvings: int = 0) -> Study:
-    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+@dataclass(frozen=True)
+class StudyText:
+    """A study file as it stands: what studies are made of, as it is or with other values.
 
-    With `halvings` its mesh is that many times finer: elements of half the size, each time.
+    Attributes:
+        file, source: the file as it was named, and its text.
+        tables: the text as TOML has it, not yet checked.
     """
+
+    file: FilePath
+    source: str
+    tables: Mapping[str, Any]
+
+    def table(self, changes: Mapping[str, Any] | None = None) -> schema.StudyTable:
+        """Return the tables, checked; raise StudyError. Changes are values by key, such as {"load.1.force": [0, 1]}."""
+        try:
+            return schema.StudyTable.model_validate(changed(self.tables, changes) if changes else self.tables)
+        except ValidationError as error:
+            raise StudyError("\n".join(_messages(self.file, error, _line_numbers(self.source)))) from None
+        except StudyError as error:
+            raise StudyError(f"{self.file}: {error}") from None
+
+    def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0) -> Study:
+        """Return the study, checked as far as can be without solving; raise StudyError."""
+        return _Builder(self.file, self.source, self.table(changes), halvings).study()
+
+
+def read_text(file: str | FilePath) -> StudyText:
+    """Read a study file; raise StudyError where it cannot be read or is no TOML."""
     place = FilePath(file)
     try:
         source = place.read_text(encoding="utf-8-sig")
@@ -98,11 +126,16 @@ def read_study(file: str | FilePath, halvings: int = 0) -> Study:
         tables = tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{place}: is not valid TOML: {error}") from None
-    try:
-        table = schema.StudyTable.model_validate(tables)
-    except ValidationError as error:
-        raise StudyError("\n".join(_messages(place, error, _line_numbers(source)))) from None
-    return _Builder(place, source, table, halvings).study()
+    return StudyText(place, source, tables)
+
+
+def read_study(file: str | FilePath, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
+    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+
+    With `halvings` its mesh is that many times finer: elements of half the size, each time. With `changes` some keys
+    have other values: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
+    """
+    return read_text(file).study(changes, halvings)
 
 
 class _Builder:
@@ -277,7 +310,7 @@ class _Builder:
                     refuse_mechanism(self.network, problem.loading.held)
                     return self.network
                 case schema.CalculixTable():
-                    springs = None if table.springs is None else self.springs_of(name, table.springs)
+                    springs = None if table.springs is None else self.springs_of(problem, name, table.springs)
                     program = CalculiX(springs=springs) if table.law is None else CalculiX(table.law, springs)
                     program.check(problem, solver)
                     return program
@@ -294,13 +327,21 @@ class _Builder:
                     bem.check(problem)  # its potential takes long
                     return bem
                 case _:
-                    model = _springs(table)
+                    model = self.springs(problem, table)
             model.potential(problem)  # what does not fit is said before anything is solved
             if isinstance(model, Springs):
                 moduli(problem.homogeneous[0], model)
             return model
 
-    def springs_of(self, name: str, other: str) -> Springs | SpringNetwork:
+    def springs(self, problem: Problem, table: schema.SpringsTable) -> Springs | GivenSprings:
+        """Return springs by rule, by numbers, or as they are read spring by spring."""
+        own = table.stiffness
+        if own is None or own.file is None:
+            return _springs(table)
+        volume = None if own.volume is None else self.file.parent / own.volume
+        return read_given(problem, self.file.parent / own.file, volume, table.allow_negative)
+
+    def springs_of(self, problem: Problem, name: str, other: str) -> SpringModel:
         """Return the springs of another model of the study, which `name` is to be a twin of."""
         tables = self.table.models
         kinds = (schema.SpringsTable, schema.NetworkTable)
@@ -308,7 +349,7 @@ class _Builder:
         with self.at("models", name, "springs"):
             match tables.get(other):
                 case schema.SpringsTable() as table:
-                    return _springs(table)
+                    return self.springs(problem, table)
                 case schema.NetworkTable() if self.network is not None:
                     return self.network
             told = f"there are {', '.join(known)}" if known else "there are none"
@@ -317,7 +358,7 @@ class _Builder:
     def compared(self, entries: Mapping[str, Entry]) -> tuple[str, tuple[str, ...]]:
         """Return the model that is compared, by default the first springs, and its references, by default the rest."""
         compare = self.table.compare
-        springs = [name for name, entry in entries.items() if isinstance(entry, Springs)]
+        springs = [name for name, entry in entries.items() if isinstance(entry, Springs | GivenSprings)]
         model = compare.model or (springs or list(entries))[0]
         self._known("model", model, entries)
         if compare.references is None:
@@ -346,7 +387,9 @@ def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
 
 
 def _springs(table: schema.SpringsTable) -> Springs:
-    own = UserStiffness(**table.stiffness.model_dump()) if table.stiffness else None
+    own = None
+    if table.stiffness is not None and table.stiffness.edge is not None:
+        own = UserStiffness(table.stiffness.edge, table.stiffness.diagonal, table.stiffness.body)
     return Springs(table.rule, own, table.sharing, table.allow_negative, table.volume, table.k_body)
 
 

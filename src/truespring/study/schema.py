@@ -283,11 +283,26 @@ class SolverTable(Table):
 
 
 class StiffnessTable(Table):
-    """Springs of the user's own, in units of thickness times Young's modulus; in 3D of Young's modulus times size."""
+    """Springs of the user's own, in units of thickness times Young's modulus; in 3D of Young's modulus times size.
 
-    edge: Number
+    Or spring by spring: `file` is a CSV file with columns a, b and stiffness, `volume` one with element and kappa.
+    """
+
+    edge: Number | None = None
     diagonal: Number = 0.0
     body: Number = 0.0
+    file: str | None = None
+    volume: str | None = None
+
+    @model_validator(mode="after")
+    def _numbers_or_file(self) -> "StiffnessTable":
+        if self.file is None and self.edge is None:
+            raise ValueError("edge is required and missing; or file, with the stiffness of each spring")
+        if self.file is not None and {"edge", "diagonal", "body"} & self.model_fields_set:
+            raise ValueError("file tells the stiffness of each spring: leave edge, diagonal and body out")
+        if self.file is None and self.volume is not None:
+            raise ValueError("volume, the moduli of the volume term, goes with a file of springs: file is missing")
+        return self
 
 
 class SpringsTable(Table):
@@ -300,6 +315,14 @@ class SpringsTable(Table):
     allow_negative: bool = False
     volume: bool = False
     k_body: Number | None = None
+
+    @model_validator(mode="after")
+    def _stiffness_read(self) -> "SpringsTable":
+        if self.stiffness is not None and self.stiffness.file is not None:
+            told = sorted({"rule", "sharing", "volume", "k_body"} & self.model_fields_set)
+            if told:
+                raise ValueError(f"stiffness is read from a file, spring by spring: leave {' and '.join(told)} out")
+        return self
 
 
 class FemTable(Table):

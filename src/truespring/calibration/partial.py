@@ -1,0 +1,64 @@
+"""Springs from what is known of their displacements and forces, full fields or not: by the equilibria themselves."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.calibration.objective import Objective
+
+#: Up to so many unknowns their sensitivities are found one by one, for Gauss and Newton's method.
+GAUSS_NEWTON = 300
+
+# Steps of the unknowns below this share end the search, and gains of the objective below that one: so small a gain
+# changes an error of 1 % by a two-thousandth of itself.
+_SETTLED, _GAIN = 1e-3, 1e-3
+
+
+class Fit(NamedTuple):
+    """Unknowns that were found, the objective there, and how."""
+
+    values: Floats
+    objective: float
+    method: str
+
+
+def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit:
+    """Minimise the objective over unknowns c >= 0 from `start`, with so many evaluations at most.
+
+    Few unknowns by Gauss and Newton's method in a trust region (Branch, Coleman, Li 1999), many by L-BFGS-B (Byrd et
+    al. 1995) with the adjoint gradient. Where no equilibrium is found a step is taken back.
+    """
+    from scipy.optimize import Bounds, least_squares, minimize
+
+    if len(start) <= GAUSS_NEWTON:
+        found = least_squares(
+            objective.residuals,
+            start,
+            jac=objective.jacobian,
+            bounds=(0.0, np.inf),
+            xtol=_SETTLED,
+            ftol=_GAIN,
+            gtol=1e-12,
+            max_nfev=evaluations,
+        )
+        values, method = np.asarray(found.x), "Gauss-Newton"
+    else:
+        largest = objective.value(start) * 1e3
+
+        def value(values: Floats) -> float:
+            return min(objective.value(values), largest)
+
+        def gradient(values: Floats) -> Floats:
+            return objective.gradient(values) if objective.paths(values) is not None else np.zeros(len(values))
+
+        searched = minimize(
+            value,
+            start,
+            jac=gradient,
+            method="L-BFGS-B",
+            bounds=Bounds(0.0, np.inf),
+            options={"maxfun": evaluations, "ftol": 1e-9, "gtol": 1e-12},
+        )
+        values, method = np.asarray(searched.x), "L-BFGS-B, adjoint gradient"
+    return Fit(values, objective.value(values), method)

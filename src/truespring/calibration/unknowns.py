@@ -1,0 +1,259 @@
+"""The unknowns of a calibration: stiffness k = P c, linear in numbers c of which 1 is the rule one starts from."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Bools, Floats, Ints
+from truespring.errors import ModelError, nearest
+from truespring.mesh import Mesh
+from truespring.mesh.selections import AXES
+from truespring.models import GivenSprings, SpringNetwork, Springs, VolumeSprings, VolumeTerm, shared_springs
+from truespring.models.elasticity import lattice_classes
+from truespring.models.links import link_vectors
+from truespring.problem import Problem
+
+Columns = sparse.csr_array[Any, tuple[int, int]]
+
+# Components of a direction below this share of its length are rounding; heights are one within it of a spring.
+_ROUNDING = 1e-6
+# An unknown of less weight than this share of the largest stiffness has none.
+_NO_WEIGHT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What a calibration changes: each unknown c scales a part of what the rule gives.
+
+    Attributes:
+        kind: a key of UNKNOWNS.
+        names: of the unknowns, of length n.
+        problem, springs: the body, and node numbers of its springs, shape (n_springs, 2).
+        stiffness: P, each spring's stiffness per unknown [N/m], sparse, shape (n_springs, n); its rows sum to the rule.
+        kappa: modulus of each element's volume term per unknown [Pa], sparse, shape (n_elements, n); None without one.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    problem: Problem
+    springs: Ints
+    stiffness: Columns
+    kappa: Columns | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def start(self) -> Floats:
+        """The rule: all ones, shape (n,)."""
+        return np.ones(len(self))
+
+    def model(self, values: Floats, label: str = "springs (calibrated)") -> GivenSprings:
+        """Return the springs with these unknowns, which `solve` takes on any problem of the same mesh."""
+        kappa = np.zeros(0) if self.kappa is None else self.kappa @ values
+        return GivenSprings(self.springs, self.stiffness @ values, kappa, label)
+
+    def potential(self, values: Floats) -> SpringNetwork | VolumeSprings:
+        """Return the potential with these unknowns; it is not asked whether it is a mechanism."""
+        network = SpringNetwork(self.problem.mesh.nodes, self.springs, self.stiffness @ values)
+        if self.kappa is None:
+            return network
+        return VolumeSprings(network, VolumeTerm(self.problem, np.asarray(self.kappa @ values)))
+
+    def forces(self, positions: Floats) -> Columns:
+        """Return the derivative of the internal force by each unknown [N], sparse, shape (n_dof, n).
+
+        The internal force is this times the unknowns, at any deformation: spring s adds k_s (l - L) n to its second
+        node and takes it from its first, the volume term of an element adds kappa (V / V0 - 1) dV/dx.
+        """
+        found = _spring_forces(self.problem.mesh.nodes, self.springs, positions) @ self.stiffness
+        if self.kappa is not None:
+            found = found + self._volume_forces(positions) @ self.kappa
+        return sparse.csr_array(found)
+
+    def _volume_forces(self, positions: Floats) -> Columns:
+        values = self._unit_term.element_forces(positions)
+        elements, dim = self.problem.mesh.elements, positions.shape[1]
+        rows = (elements[:, :, None] * dim + np.arange(dim)).reshape(values.shape)
+        columns = np.repeat(np.arange(len(elements)), values.shape[1])
+        return sparse.csr_array((values.ravel(), (rows.ravel(), columns)), shape=(positions.size, len(elements)))
+
+    @cached_property
+    def _unit_term(self) -> VolumeTerm:
+        return VolumeTerm(self.problem, np.ones(len(self.problem.mesh.elements)))
+
+
+def _spring_forces(nodes: Floats, springs: Ints, positions: Floats) -> Columns:
+    """What a unit of stiffness of each spring adds to the internal force [m], shape (n_dof, n_springs)."""
+    first, second = springs.T
+    rest = np.linalg.norm(nodes[second] - nodes[first], axis=1)
+    across = positions[second] - positions[first]
+    length = np.linalg.norm(across, axis=1)
+    pull = ((length - rest) / length)[:, None] * across
+    dim = nodes.shape[1]
+    rows = [(ends[:, None] * dim + np.arange(dim)).ravel() for ends in (second, first)]
+    columns = np.repeat(np.arange(len(springs)), dim)
+    return sparse.csr_array(
+        (np.concatenate([pull.ravel(), -pull.ravel()]), (np.concatenate(rows), np.tile(columns, 2))),
+        shape=(nodes.size, len(springs)),
+    )
+
+
+def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Unknowns:
+    """Return the unknowns of a kind, a key of UNKNOWNS, for the springs of a problem.
+
+    Raises ModelError for springs that answer to each other's lengths, for a kind that is unknown or does not fit the
+    mesh, and where the rule itself does not.
+    """
+    if kind not in UNKNOWNS:
+        raise ModelError(f"unknowns = '{kind}' is unknown{nearest(kind, UNKNOWNS)}; allowed: {', '.join(UNKNOWNS)}")
+    if springs.coupled:
+        raise ModelError(
+            f"rule = '{springs.rule}': its springs answer to each other's lengths, they have no stiffness of their own "
+            "to fit; take another rule to start from, such as least-squares"
+        )
+    springs.potential(problem)  # what does not fit is said as it is elsewhere
+    pairs, place = shared_springs(problem.mesh)
+    given = springs.element_stiffness(problem).ravel()
+    if springs.sharing == "single":
+        given = given / np.bincount(place)[place]
+    labels, group = UNKNOWNS[kind](problem, np.asarray(pairs), np.asarray(place))
+    shape = (len(pairs), len(labels))
+    stiffness = sparse.csr_array((given, (place, group)), shape=shape)
+    kappas = springs.kappa(problem) if springs.volume else np.zeros(len(problem.mesh.elements))
+    if not kappas.any():
+        return _weighted(Unknowns(kind, tuple(labels), problem, np.asarray(pairs, dtype=np.int64), stiffness))
+    terms, of = _volume_groups(problem, kind)
+    elements = np.arange(len(kappas))
+    kappa = sparse.csr_array((kappas, (elements, len(labels) + of)), shape=(len(kappas), len(labels) + len(terms)))
+    wide = sparse.csr_array((stiffness.data, stiffness.indices, stiffness.indptr), shape=(len(pairs), kappa.shape[1]))
+    return _weighted(
+        Unknowns(kind, (*labels, *terms), problem, np.asarray(pairs, dtype=np.int64), wide, kappa),
+    )
+
+
+def _weighted(unknowns: Unknowns) -> Unknowns:
+    """Drop the unknowns that scale nothing: springs to which the rule gives no stiffness."""
+    weight = np.zeros(len(unknowns), dtype=bool)
+    for part in (unknowns.stiffness, unknowns.kappa):
+        if part is not None:
+            size = np.asarray(abs(part).max(axis=0).todense()).ravel()
+            weight |= size > _NO_WEIGHT * size.max()
+    kept = np.flatnonzero(weight)
+    return Unknowns(
+        unknowns.kind,
+        tuple(unknowns.names[number] for number in kept),
+        unknowns.problem,
+        unknowns.springs,
+        sparse.csr_array(unknowns.stiffness[:, kept]),
+        None if unknowns.kappa is None else sparse.csr_array(unknowns.kappa[:, kept]),
+    )
+
+
+#: How unknowns group springs: names, and the number of the group of each element's each link, (n_elements * links,).
+Groups = tuple[list[str], Ints]
+
+
+def _classes(problem: Problem, pairs: Ints, place: Ints) -> Groups:
+    """Edges, diagonals of faces and through the body; on lattices edges along each axis apart."""
+    kind = problem.mesh.kind
+    words = ["edge"] * len(kind.edges) + ["diagonal"] * len(kind.diagonals) + ["body"] * len(kind.body_diagonals)
+    per_link = np.tile(np.array(words, dtype=object), len(problem.mesh.elements))
+    if lattice_classes(problem.mesh) is not None:
+        axis = _axis_of(problem.mesh)
+        for number, name in enumerate(AXES[: problem.mesh.dim]):
+            per_link[(axis == number) & (per_link == "edge")] = f"edge along {name}"
+    return _numbered(per_link)
+
+
+def _regions(problem: Problem, pairs: Ints, place: Ints) -> Groups:
+    """The classes of each material apart."""
+    if len(problem.materials) < 2:
+        raise ModelError("unknowns = 'region' is for bodies of several materials, this one has one: take 'class'")
+    names, group = _classes(problem, pairs, place)
+    n_links = len(problem.mesh.kind.links)
+    material = np.repeat(problem.material_numbers, n_links)
+    return _numbered(
+        np.array(
+            [f"{names[g]}, {_material(m)}" for g, m in zip(group.tolist(), material.tolist(), strict=True)],
+            dtype=object,
+        )
+    )
+
+
+def _material(number: int) -> str:
+    return f"region {number}" if number else "body"
+
+
+def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
+    """Springs of one direction, up to sign along each axis, at one height."""
+    mesh = problem.mesh
+    if mesh.kind.n_nodes not in (4, 8) or not _axis_aligned(mesh):
+        raise ModelError(
+            "unknowns = 'direction-row' is for rectangles and bricks along the axes: take 'class', or 'spring'"
+        )
+    along = _components(mesh)
+    names = np.array(
+        ["along " + "".join(a for a, there in zip(AXES, row, strict=False) if there) for row in along], dtype=object
+    )
+    height = mesh.nodes[pairs, 1].mean(axis=1)
+    smallest = np.linalg.norm(mesh.nodes[pairs[:, 1]] - mesh.nodes[pairs[:, 0]], axis=1).min()
+    heights = np.round((height - height.min()) / (_ROUNDING * smallest)).astype(np.int64)[place]
+    row = np.zeros(len(place), dtype=np.int64)
+    for name in set(names):
+        own = names == name
+        row[own] = np.unique(heights[own], return_inverse=True)[1] + 1
+    return _numbered(np.array([f"{name} in row {r}" for name, r in zip(names, row, strict=True)], dtype=object))
+
+
+def _springs(problem: Problem, pairs: Ints, place: Ints) -> Groups:
+    """Each spring its own."""
+    return [f"spring {a}-{b}" for a, b in pairs.tolist()], np.asarray(place, dtype=np.int64)
+
+
+def _volume_groups(problem: Problem, kind: str) -> Groups:
+    """The volume term's own unknowns: one, or one a region."""
+    if kind == "region":
+        used = [f"volume term, {_material(number)}" for number in range(len(problem.materials))]
+        return used, problem.material_numbers
+    return ["volume term"], np.zeros(len(problem.mesh.elements), dtype=np.int64)
+
+
+def _numbered(names: Any) -> Groups:
+    """Each name once, in natural order, and its number."""
+    found = sorted(set(names), key=lambda name: [int(part) if part.isdigit() else part for part in _parts(name)])
+    number = {name: place for place, name in enumerate(found)}
+    return found, np.array([number[name] for name in names], dtype=np.int64)
+
+
+def _parts(name: str) -> list[str]:
+    head, _, row = name.rpartition("row ")
+    return [head, row] if row.isdigit() else [name, "0"]
+
+
+def _components(mesh: Mesh) -> Bools:
+    """Along which axes each element's each link goes, shape (n_elements * links, dim)."""
+    vectors = np.abs(link_vectors(mesh).reshape(-1, mesh.dim))
+    return np.asarray(vectors > _ROUNDING * vectors.max(axis=1, keepdims=True))
+
+
+def _axis_of(mesh: Mesh) -> Ints:
+    """The axis that each link goes along, -1 where it goes along several, shape (n_elements * links,)."""
+    along = _components(mesh)
+    return np.where(along.sum(axis=1) == 1, along.argmax(axis=1), -1)
+
+
+def _axis_aligned(mesh: Mesh) -> bool:
+    n_links, n_edges = len(mesh.kind.links), len(mesh.kind.edges)
+    return bool((_axis_of(mesh).reshape(-1, n_links)[:, :n_edges] >= 0).all())
+
+
+#: What may be unknown, by name.
+UNKNOWNS: MappingProxyType[str, Callable[[Problem, Ints, Ints], Groups]] = MappingProxyType(
+    {"class": _classes, "region": _regions, "direction-row": _directions_and_rows, "spring": _springs}
+)

@@ -1,0 +1,59 @@
+"""Springs whose stiffness is known spring by spring: measured, or fitted to references."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
+from truespring.errors import ModelError
+from truespring.models.mechanism import refuse_mechanism
+from truespring.models.network import SpringNetwork
+from truespring.models.volume import VolumeSprings, VolumeTerm
+from truespring.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class GivenSprings:
+    """The springs of a mesh, each with a stiffness of its own, and a modulus of the volume term of each element.
+
+    No rule stands behind them and no lattice repeats itself: moduli are not told of them.
+
+    Attributes:
+        springs: node numbers, shape (n_springs, 2).
+        stiffness: [N/m], shape (n_springs,).
+        kappa: modulus of the area or volume term of each element [Pa], shape (n_elements,); empty for none.
+        label: how curves and tables call them.
+
+    Raises ModelError where shapes do not fit, or a spring names a node that the problem does not have.
+    """
+
+    springs: Ints
+    stiffness: Floats
+    kappa: Floats = field(default_factory=lambda: np.zeros(0))
+    label: str = "springs (given)"
+
+    kind = "springs"
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "springs", frozen_ints(self.springs, (None, 2), "springs"))
+            object.__setattr__(self, "stiffness", frozen_floats(self.stiffness, (len(self.springs),), "stiffness"))
+            object.__setattr__(self, "kappa", frozen_floats(self.kappa, (None,), "kappa"))
+        except ValueError as error:
+            raise ModelError(str(error)) from None
+
+    def __repr__(self) -> str:
+        volume = ", with a volume term" if self.kappa.size else ""
+        return f"GivenSprings({self.label}, {len(self.springs)} springs{volume})"
+
+    def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
+        """Return the springs on the problem's mesh; raise ModelError where they leave nodes free to move."""
+        network = SpringNetwork(problem.mesh.nodes, self.springs, self.stiffness)
+        if not (self.stiffness > 0).any():
+            raise ModelError("no spring has a positive stiffness: these springs carry nothing")
+        if not self.kappa.size:
+            refuse_mechanism(network, problem.loading.held)
+            return network
+        if len(self.kappa) != len(problem.mesh.elements):
+            raise ModelError(f"kappa has {len(self.kappa)} values, the mesh has {len(problem.mesh.elements)} elements")
+        return VolumeSprings(network, VolumeTerm(problem, self.kappa))

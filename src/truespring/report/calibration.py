@@ -1,0 +1,197 @@
+"""What a calibration tells: a table for a terminal, values for JSON, and a page that loads nothing from anywhere."""
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.calibration import Calibration, CaseResult
+from truespring.report.calibration_plots import calibration_figures
+from truespring.report.figures import Drawing
+from truespring.report.page import close, picture, versions
+from truespring.report.quantity import percent
+from truespring.report.style import figure_style
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# More unknowns than this are not listed one by one.
+_MOST = 2000
+# So many singular values are shown on a page.
+_SHOWN = 40
+
+
+def calibration_table(title: str, found: Calibration) -> "Table":
+    """Return the error of each load case at its last level, by the rule and calibrated."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for name, justify in (
+        ("load", "left"),
+        ("", "left"),
+        ("of the", "left"),
+        ("rule", "right"),
+        ("calibrated", "right"),
+    ):
+        table.add_column(name, justify="right" if justify == "right" else "left")
+    for row in _rows(found):
+        table.add_row(
+            row["name"], "held out" if row["held_out"] else "fitted", row["quantity"], row["before"], row["after"]
+        )
+    return table
+
+
+def _rows(found: Calibration) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": one.case.name,
+            "held_out": one.held_out,
+            "quantity": quantity,
+            "before": _percent(one.error(one.before, quantity)),
+            "after": _percent(one.error(one.after, quantity)),
+        }
+        for one in sorted(found.cases, key=lambda one: not one.held_out)
+        for quantity in dict.fromkeys(seen.quantity for seen in one.case.observations)
+    ]
+
+
+def _percent(share: float | None) -> str:
+    return "no equilibrium" if share is None else percent(share)
+
+
+def calibration_values(found: Calibration) -> dict[str, Any]:
+    """Return a calibration as values that JSON can hold."""
+    told = found.identifiability
+    each = len(found.unknowns) <= _MOST
+    return {
+        "headline": found.headline,
+        "held_out_error": found.error,
+        "rule": found.rule.label,
+        "unknowns": found.unknowns.kind,
+        "n_unknowns": len(found.unknowns),
+        "regularisation": found.regularisation,
+        "method": found.method,
+        "solves": found.solves,
+        "objective": {name: _finite(value) for name, value in found.objectives.items()},
+        "force_residual": dict(found.residuals),
+        "cases": [_case_values(one) for one in found.cases],
+        "values": [
+            {"name": name, "value": float(value), "undetermined": float(loose), "resolution": float(share)}
+            for name, value, loose, share in zip(
+                found.unknowns.names, found.values, told.undetermined, told.resolution, strict=True
+            )
+        ]
+        if each
+        else None,
+        "identifiability": {
+            "rank": told.rank,
+            "n_unknowns": told.n_unknowns,
+            "determined": told.determined,
+            "singular_values": told.singular_values.tolist(),
+            "not_determined": list(told.loose),
+            "held_by_regularisation": list(told.weak),
+            "of": told.of,
+            "sentence": told.sentence,
+        },
+        "warnings": list(found.warnings),
+    }
+
+
+def _case_values(one: CaseResult) -> dict[str, Any]:
+    quantities = dict.fromkeys(seen.quantity for seen in one.case.observations)
+    return {
+        "name": one.case.name,
+        "held_out": one.held_out,
+        "quantity": one.quantity,
+        "error_before": one.pair[0],
+        "error_after": one.pair[1],
+        "status_before": str(one.before.status),
+        "status_after": str(one.after.status),
+        "levels": {
+            quantity: [
+                {"load_factor": level, "before": before.get(level), "after": after.get(level)}
+                for level in sorted({*before, *after})
+            ]
+            for quantity in quantities
+            for before, after in [(one.errors(one.before, quantity), one.errors(one.after, quantity))]
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def draw_calibration(found: Calibration) -> dict[str, Drawing]:
+    """Return the pictures of a calibration as PNG and SVG, by the stem of their file names."""
+    with figure_style():
+        return {
+            name: Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width)
+            for name, sheet in calibration_figures(found)
+        }
+
+
+def render_calibration(
+    title: str, what: str, found: Calibration, drawings: Mapping[str, Drawing], names: Sequence[str], command: str
+) -> str:
+    """Return the page as HTML.
+
+    Args:
+        title: of the study.
+        what: what was fitted to what, in a sentence.
+        found: the calibration.
+        drawings: its pictures.
+        names: of the files beside the page.
+        command: what does it again.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    folder = files("truespring.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["close"] = close
+    template = environment.from_string((folder / "calibration.html.j2").read_text(encoding="utf-8"))
+    told = found.identifiability
+    shown = [f"{value:.2e}" for value in told.singular_values[:_SHOWN]]
+    return template.render(
+        # The look of all pages stands in that of studies.
+        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+        title=title,
+        what=what,
+        headline=found.headline,
+        fitted=fitted_sentence(found),
+        identifiability=told.sentence,
+        trouble=not found.held_out or found.error is None,
+        warnings=found.warnings,
+        errors=[picture(drawing) for name, drawing in drawings.items() if name not in ("unknowns", "lattice")],
+        unknowns=[picture(drawing) for name, drawing in drawings.items() if name in ("unknowns", "lattice")],
+        rows=_rows(found),
+        method=_method(found),
+        of=told.of,
+        singular_values=", ".join(shown) + (", …" if len(told.singular_values) > _SHOWN else ""),
+        steps=[
+            (name, f"{value:.3e}", f"{found.residuals[name]:.3e}" if name in found.residuals else "–")
+            for name, value in found.objectives.items()
+        ],
+        files=f"Beside this page: {', '.join(names)}.",
+        versions=versions(),
+        command=command,
+    )
+
+
+def fitted_sentence(found: Calibration) -> str:
+    """Return how well the springs follow what they were fitted to."""
+    told = [
+        f"{one.case.name} from {_percent(one.pair[0])} to {_percent(one.pair[1])}"
+        for one in found.cases
+        if not one.held_out
+    ]
+    return f"The error on the loads that they were fitted to went in {'; '.join(told)}."
+
+
+def _method(found: Calibration) -> str:
+    return (
+        f"{len(found.unknowns)} unknowns ({found.unknowns.kind}), each a factor on what {found.rule.label} gives, none "
+        f"below zero. Found by {found.method}, {found.solves} paths solved; regularisation {found.regularisation:g} "
+        "toward the rule."
+    )

@@ -1,0 +1,118 @@
+"""What a sweep tells: a table for a terminal, and one page of plots that loads nothing from anywhere."""
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.report.figures import Drawing
+from truespring.report.page import close, picture, versions
+from truespring.report.quantity import percent
+from truespring.report.style import figure_style
+from truespring.report.sweep_plots import sweep_figures
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Row = Mapping[str, Any]
+
+# More rows than a page can show, or a reader read: sweep.csv has all of them.
+_MOST_ROWS = 300
+
+
+def sweep_table(keys: Sequence[str], rows: Sequence[Row]) -> "Table":
+    """Return the smallest and largest rms error against each reference, and where they are."""
+    from rich.table import Table
+
+    failed = sum(row["status"] != "converged" for row in rows)
+    title = f"{len(rows)} points" + (f", {failed} of them failed" if failed else ", all converged")
+    table = Table(title=title, title_justify="left")
+    table.add_column("rms error against")
+    table.add_column("")
+    table.add_column("", justify="right")
+    table.add_column("where")
+    for reference, extremes in _extremes(rows).items():
+        for which, row in extremes.items():
+            value = f"{row[_error_of(reference)]:.2%}"
+            table.add_row(reference, which, value, ", ".join(f"{key} = {_words(row[key])}" for key in keys))
+    return table
+
+
+def _error_of(reference: str) -> str:
+    return f"comparison.{reference}.rms_error"
+
+
+def _extremes(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
+    """The rows of the smallest and of the largest rms error, by reference, of points that converged."""
+    references = [
+        column.split(".")[1] for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")
+    ]
+    found = {}
+    for reference in references:
+        column = _error_of(reference)
+        known = [row for row in rows if row["status"] == "converged" and row[column] is not None]
+        if known:
+            by_error = sorted(known, key=lambda row: float(row[column]))
+            found[reference] = {"smallest": by_error[0], "largest": by_error[-1]}
+    return found
+
+
+def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Sequence[Row], command: str | None) -> str:
+    """Return the page as HTML.
+
+    Args:
+        file, title: of the study that was varied.
+        keys: what was varied.
+        rows: a point each, as in the table.
+        command: what does it again, where it was a command line.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    folder = files("truespring.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["close"] = close
+    with figure_style():
+        drawings = [Drawing(one.png(), one.svg(), one.title, one.width) for one in sweep_figures(keys, rows)]
+    failed = [row for row in rows if row["status"] != "converged"]
+    extremes = _extremes(rows)
+    template = environment.from_string((folder / "sweep.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        # The look of all pages stands in that of studies.
+        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+        title=title or file.stem,
+        file=str(file),
+        keys=keys,
+        n_points=len(rows),
+        n_failed=len(failed),
+        sentences=[_sentence(reference, two, keys) for reference, two in extremes.items()],
+        failed=[([_words(row[key]) for key in keys], row["reason"]) for row in failed[:_MOST_ROWS]],
+        pictures=[picture(drawing) for drawing in drawings],
+        references=list(extremes),
+        rows=[_shown(row, keys, list(extremes)) for row in rows[:_MOST_ROWS]],
+        versions=versions(),
+        command=command,
+    )
+
+
+def _sentence(reference: str, two: Mapping[str, Row], keys: Sequence[str]) -> str:
+    least, most = (two[which] for which in ("smallest", "largest"))
+    column = _error_of(reference)
+    if least[column] == most[column]:
+        return f"Against {reference} the rms error is {percent(least[column])} at every point."
+    places = (", ".join(f"{key} = {_words(row[key])}" for key in keys) for row in (least, most))
+    low, high = (f"{percent(row[column])} at {place}" for row, place in zip((least, most), places, strict=True))
+    return f"Against {reference} the rms error is from {low} to {high}."
+
+
+def _shown(row: Row, keys: Sequence[str], references: Sequence[str]) -> dict[str, Any]:
+    errors = (row[_error_of(reference)] for reference in references)
+    return {
+        "values": [_words(row[key]) for key in keys],
+        "status": row["status"],
+        "errors": ["–" if error is None else percent(error) for error in errors],
+        "closest": row["closest"] or "–",
+    }
+
+
+def _words(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

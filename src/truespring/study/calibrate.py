@@ -1,0 +1,189 @@
+"""Studies as load cases of a calibration."""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from truespring.calibration import (
+    REGULARISATION,
+    Calibration,
+    LoadCase,
+    calibrate,
+    make_unknowns,
+    read_curve,
+    require_one_body,
+    turned,
+)
+from truespring.calibration.calibration import Progress
+from truespring.comparison import most_moved
+from truespring.equilibrium import Path, solve
+from truespring.errors import StudyError, TruespringError, nearest
+from truespring.models import LAWS, Fem, Springs
+from truespring.reference import read_result
+from truespring.solvers import Newton
+from truespring.study.read import Study
+from truespring.study.run import follow
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A study whose springs were calibrated.
+
+    Attributes:
+        study: whose springs and mesh these are.
+        springs: the name of the springs in it.
+        reference: the name of the model, or the names of the files, that the springs were fitted to.
+        calibration: what was found.
+    """
+
+    study: Study
+    springs: str
+    reference: str
+    calibration: Calibration
+
+
+def calibrate_study(
+    study: Study,
+    cases: Sequence[Study] = (),
+    held_out: Sequence[Study] = (),
+    unknowns: str = "class",
+    to: str | None = None,
+    markers: FilePath | None = None,
+    curve: FilePath | None = None,
+    regularisation: float = REGULARISATION,
+    progress: Progress | None = None,
+) -> Calibrated:
+    """Fit the springs of a study to a reference under its own load and those of further cases, on one mesh.
+
+    `to` names the model of the references, by default one of neo-Hookean finite elements, else the first of another
+    law that is not linear, else the first. With `markers` or `curve`, files of what was measured under the study's own
+    load, these are its reference. Where nothing is `held_out` the study's own load is, turned by 45 degrees, if its
+    reference can be solved. Raises StudyError, with the file, where studies do not go together.
+    """
+    name = springs_of(study)
+    model = study.entries[name]
+    assert isinstance(model, Springs)  # springs_of takes no other
+    for one in (study, *cases, *held_out):
+        _require_newton(one)
+    for one in (*cases, *held_out):
+        with _naming(study):
+            require_one_body([(str(one.file), one.problem)], study.problem)
+    with _naming(study):
+        make_unknowns(study.problem, model, unknowns)  # what does not fit is said before anything is solved
+    measured = markers is not None or curve is not None
+    names = [_reference(one, to) for one in (*([] if measured else [study]), *cases, *held_out)]
+    own = [*([] if measured else [study]), *cases, *held_out]
+    found = {}
+    for number, (one, reference) in enumerate(zip(own, names, strict=True)):
+        if progress:
+            progress(f"{one.stem}: {reference}", 0.5 * number / max(len(own), 1))
+        found[one.file] = _case(one, reference)
+    fitted = [_measured(study, name, markers, curve)] if measured else [found[study.file]]
+    fitted += [found[one.file] for one in cases]
+    apart = [found[one.file] for one in held_out]
+    if not held_out and not measured:
+        apart = list(_turned(study, names[0]))
+
+    def say(text: str, share: float) -> None:
+        if progress:
+            progress(text, 0.5 + 0.5 * share)
+
+    with _naming(study):
+        calibration = calibrate(fitted, model, unknowns, apart, regularisation, report=say)
+    files = [str(file) for file in (markers, curve) if file is not None]
+    return Calibrated(study, name, ", ".join(files) or names[0], calibration)
+
+
+def springs_of(study: Study) -> str:
+    """Return the name of the springs to calibrate: the compared model where it is springs of a rule, else the first.
+
+    Springs that answer to each other's lengths are passed over where there are others.
+    """
+    springs = [name for name, entry in study.entries.items() if isinstance(entry, Springs)]
+    springs = [name for name in springs if not getattr(study.entries[name], "coupled", False)] or springs
+    if not springs:
+        raise StudyError(
+            f"{study.file}: there are no springs of a rule or of numbers to start from among "
+            f"{', '.join(study.entries)}: add some to [models]"
+        )
+    return study.model if study.model in springs else springs[0]
+
+
+def _reference(study: Study, to: str | None) -> str:
+    """The name of the model that the springs of a study are to follow."""
+    known = [name for name, entry in study.entries.items() if not isinstance(entry, Springs)]
+    if to is not None and to not in known:
+        there = f"there are {', '.join(known)}" if known else "there is none beside the springs"
+        raise StudyError(f"{study.file}: --to {to}: no such reference{nearest(to, known)}: {there}")
+    if not known:
+        raise StudyError(f"{study.file}: there is no reference beside the springs: add a model of kind fem")
+    if to is not None:
+        return to
+    fem = {name: entry for name, entry in study.entries.items() if isinstance(entry, Fem)}
+    best = [name for name, entry in fem.items() if entry.law == "neo-hookean"]
+    best += [name for name, entry in fem.items() if LAWS[entry.law].finite]
+    return (best or known)[0]
+
+
+def _case(study: Study, reference: str) -> LoadCase:
+    path = follow(study, study.entries[reference])
+    _refuse_short(study, reference, path)
+    with _naming(study):
+        return LoadCase(study.stem, study.problem, path, solver=_newton(study))
+
+
+def _measured(study: Study, springs: str, markers: FilePath | None, curve: FilePath | None) -> LoadCase:
+    """The study's own load with what was measured under it."""
+    seen = None if markers is None else read_result(markers)
+    told = None
+    if curve is not None:
+        probe = study.probe
+        if probe is None:
+            model = study.entries[springs]
+            assert isinstance(model, Springs)
+            probe = most_moved(solve(study.problem, model, study.solver))
+        told = read_curve(curve, study.problem, probe)
+    with _naming(study):
+        return LoadCase(study.stem, study.problem, seen, told, _newton(study))
+
+
+def _turned(study: Study, reference: str) -> Iterator[LoadCase]:
+    """The study's load turned by 45 degrees, if it can be and its reference then converges."""
+    entry = study.entries[reference]
+    problem = turned(study.problem, math.pi / 4)
+    if problem is None or not isinstance(entry, Fem):
+        return
+    path = solve(problem, entry, study.solver)
+    if path.complete:
+        yield LoadCase(f"{study.stem}, its load turned by 45 degrees", problem, path, solver=_newton(study))
+
+
+def _refuse_short(study: Study, reference: str, path: Path) -> None:
+    if not path.complete:
+        raise StudyError(
+            f"{study.file}: reference '{reference}' is {path.status} and ends at load factor {path.load_factor:.6g}: "
+            "load less, take more load_steps, or another reference by --to"
+        )
+
+
+def _require_newton(study: Study) -> None:
+    if not isinstance(study.solver, Newton):
+        raise StudyError(f'{study.file}: solver.control: springs are calibrated under control = "load"')
+
+
+def _newton(study: Study) -> Newton:
+    assert isinstance(study.solver, Newton)  # others are refused
+    return study.solver
+
+
+@contextmanager
+def _naming(study: Study) -> Iterator[None]:
+    """Name the study in front of an error."""
+    try:
+        yield
+    except StudyError:
+        raise
+    except TruespringError as error:
+        raise StudyError(f"{study.file}: {error}") from None

@@ -1,0 +1,124 @@
+"""What a calibration leaves behind: a study like any other with its springs in a file, values, and a page."""
+
+import json
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path as FilePath
+from typing import Any
+
+from truespring.report.calibration import (
+    calibration_values,
+    draw_calibration,
+    fitted_sentence,
+    render_calibration,
+)
+from truespring.study.calibrate import Calibrated
+from truespring.study.given import write_given
+from truespring.study.toml import toml_text
+
+#: What the calibrated springs are called in the study that is written.
+NAME = "calibrated"
+
+# Keys of tables that name files beside the study.
+_MESH_FILES, _MODEL_FILES = ("file", "voxels", "nodes", "springs"), ("file", "undeformed")
+
+
+def calibrated_values(found: Calibrated) -> dict[str, Any]:
+    """Return a calibration of a study as values that JSON can hold."""
+    return {
+        "title": found.study.title,
+        "truespring": version("truespring"),
+        "study": str(found.study.file),
+        "springs": found.springs,
+        "reference": found.reference,
+        **calibration_values(found.calibration),
+    }
+
+
+def write_calibrated(found: Calibrated, out: FilePath, command: str) -> tuple[FilePath, ...]:
+    """Write calibrated.toml, its springs as CSV, calibrate.json, figures and report.html into out/STEM; return them."""
+    folder = out / found.study.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    springs, volume, study = folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv", folder / f"{NAME}.toml"
+    tables = write_given(found.calibration.model, springs, volume)
+    study.write_text(calibrated_study(found, folder, [file.name for file in tables]), encoding="utf-8")
+    values = folder / "calibrate.json"
+    values.write_text(json.dumps(calibrated_values(found), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    drawings = draw_calibration(found.calibration)
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    for name, drawing in drawings.items():
+        (figures / f"calibration_{name}.png").write_bytes(drawing.png)
+        (figures / f"calibration_{name}.svg").write_bytes(drawing.svg)
+    page = folder / "report.html"
+    names = [study.name, *(file.name for file in tables), values.name]
+    text = render_calibration(found.study.title, what_was_fitted(found), found.calibration, drawings, names, command)
+    page.write_text(text, encoding="utf-8")
+    return study, *tables, values, page
+
+
+def what_was_fitted(found: Calibrated) -> str:
+    """Return what was fitted to what, in a sentence."""
+    told = found.calibration
+    loads = ", ".join(one.case.name for one in told.cases if not one.held_out)
+    return (
+        f"{told.rule.label[:1].upper()}{told.rule.label[1:]} with {len(told.unknowns)} unknowns by "
+        f"{told.unknowns.kind}, fitted to {found.reference} under {loads}."
+    )
+
+
+def calibrated_study(found: Calibrated, folder: FilePath, tables: list[str]) -> str:
+    """Return the text of the study with its calibrated springs beside those of the rule, to stand in `folder`.
+
+    The comments at its head tell the errors: they are shown with its results, and stand in what it is exported to.
+    """
+    study = tomllib.loads(found.study.source)
+    study["title"] = f"{found.study.title}, springs calibrated"
+    _move(study.get("mesh", {}), _MESH_FILES, found.study.file.parent, folder)
+    for model in study["models"].values():
+        _move(model, _MODEL_FILES, found.study.file.parent, folder)
+        own = model.get("stiffness")
+        if isinstance(own, dict):
+            _move(own, ("file", "volume"), found.study.file.parent, folder)
+    stiffness = {"file": tables[0], **({"volume": tables[1]} if len(tables) > 1 else {})}
+    name = _free_name(study["models"])
+    entry: dict[str, Any] = {"kind": "springs", "stiffness": stiffness}
+    if (found.calibration.model.stiffness < 0).any():
+        entry["allow_negative"] = True
+    study["models"] = {name: entry, **study["models"]}
+    compare = dict(study.get("compare", {}))
+    references = [one for one in compare.get("references", found.study.references) if one != name]
+    if found.reference in study["models"] and found.reference not in references:
+        references.append(found.reference)
+    study["compare"] = {**compare, "model": name, "references": references}
+    return "".join(f"# {line}\n" for line in _head(found)) + "\n" + toml_text(study)
+
+
+def _head(found: Calibrated) -> list[str]:
+    """What the reader of the study, and of what it is exported to, must know of its springs."""
+    told = found.calibration
+    lines = [
+        f"Springs calibrated by truespring {version('truespring')}: {what_was_fitted(found)}",
+        fitted_sentence(told),
+        told.headline,
+        told.identifiability.sentence,
+    ]
+    return [" ".join(line.split()) for line in lines]
+
+
+def _free_name(models: Mapping[str, Any]) -> str:
+    """A name that the study does not have yet."""
+    taken = {name.casefold() for name in models}
+    numbers = ("", *(f"-{number}" for number in range(2, len(taken) + 3)))
+    return next(f"{NAME}{number}" for number in numbers if f"{NAME}{number}" not in taken)
+
+
+def _move(table: dict[str, Any], keys: tuple[str, ...], before: FilePath, now: FilePath) -> None:
+    """Keep what a table calls its files true where the study moves to another folder."""
+    for key in keys:
+        name = table.get(key)
+        if isinstance(name, str) and not re.match(r"\w\w+:", name):
+            table[key] = FilePath(os.path.relpath((before / name).resolve(), now.resolve())).as_posix()

@@ -1,0 +1,119 @@
+"""The tidy table of a sweep: a row a point, a column for each varied key and each figure of the summary."""
+
+import io
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.sweeping.store import write_whole
+
+if TYPE_CHECKING:
+    import polars
+
+# What of each model, and of each comparison, is a column; a vector has one for each direction.
+_OF_MODELS = (
+    "status",
+    "load_factor",
+    "probe_displacement",
+    "force",
+    "energy",
+    "smallest_area_ratio",
+    "newton_iterations",
+    "n_nodes",
+    "n_unknowns",
+    "seconds",
+)
+_OF_MODULI = ("young", "poisson", "anisotropy")
+_OF_COMPARISONS = ("probe_error", "rms_error", "max_error", "agrees_up_to_load_factor", "force_error")
+_VECTORS = ("probe_displacement", "force")
+
+
+def rows_of(keys: Sequence[str], records: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row a record, sorted by the varied keys; all rows have the same columns, None where one has no value."""
+    rows = [_row(keys, record) for record in records]
+    rows.sort(key=lambda row: [_rank(row[key]) for key in keys])
+    columns: dict[str, None] = {}
+    for row in rows:
+        columns.update(dict.fromkeys(row))
+    ordered = [*keys, *_gathered(column for column in columns if column not in keys)]
+    return [{column: row.get(column) for column in ordered} for row in rows]
+
+
+def _row(keys: Sequence[str], record: Mapping[str, Any]) -> dict[str, Any]:
+    summary = record["summary"] or {"models": {}, "comparison": {}, "closest": None}
+    row = {key: record["values"][key] for key in keys}
+    row |= {"status": record["status"], "reason": record["reason"], "closest": summary["closest"]}
+    for name, model in summary["models"].items():
+        row.update(_figures(f"models.{name}", model, _OF_MODELS))
+        if "moduli" in model:
+            row.update(_figures(f"models.{name}", model["moduli"], _OF_MODULI))
+    for name, comparison in summary["comparison"].items():
+        row.update(_figures(f"comparison.{name}", comparison, _OF_COMPARISONS))
+    return row
+
+
+def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    for name in wanted:
+        value = values.get(name)
+        if name in _VECTORS:
+            for axis, component in zip("xyz", value or (), strict=False):
+                yield f"{prefix}.{name}.{axis}", component
+        elif name in values:
+            yield f"{prefix}.{name}", value
+
+
+def _gathered(columns: Iterable[str]) -> list[str]:
+    """Columns in the order of the first row that has them, those of one model or comparison side by side."""
+    names = list(columns)
+    first: dict[str, int] = {}
+    for place, name in enumerate(names):
+        first.setdefault(_group(name), place)
+    return sorted(names, key=lambda name: first[_group(name)])
+
+
+def _group(column: str) -> str:
+    parts = column.split(".")
+    return ".".join(parts[:2]) if parts[0] in ("models", "comparison") and len(parts) > 2 else column
+
+
+def _rank(value: Any) -> tuple[int, Any]:
+    """What values are sorted by: numbers before lists before texts, those left out last."""
+    if isinstance(value, int | float):
+        return 0, value
+    if isinstance(value, list):
+        return 1, [_rank(one) for one in value]
+    return (3, "") if value is None else (2, str(value))
+
+
+def table_of(rows: Sequence[Mapping[str, Any]]) -> "polars.DataFrame":
+    """Return rows as a table of polars; lists, and what differs in kind within a column, become texts."""
+    import polars
+
+    columns = {name: _column([row[name] for row in rows]) for name in rows[0]}
+    return polars.DataFrame([polars.Series(name, values, kind) for name, (values, kind) in columns.items()])
+
+
+def _column(values: Sequence[Any]) -> tuple[list[Any], Any]:
+    import polars
+
+    kinds = {type(value) for value in values if value is not None}
+    if kinds == {bool}:
+        return list(values), polars.Boolean
+    if kinds == {int}:
+        return list(values), polars.Int64
+    if kinds and kinds <= {int, float}:
+        return list(values), polars.Float64
+    return [
+        None if value is None else value if isinstance(value, str) else json.dumps(value) for value in values
+    ], polars.String
+
+
+def write_table(rows: Sequence[Mapping[str, Any]], out: Path) -> Path:
+    """Write sweep.csv and sweep.parquet, each whole; return the first."""
+    table = table_of(rows)
+    parquet = io.BytesIO()
+    table.write_parquet(parquet)
+    write_whole(out / "sweep.parquet", parquet.getvalue())
+    write_whole(out / "sweep.csv", table.write_csv().encode())
+    return out / "sweep.csv"

@@ -1,0 +1,137 @@
+"""How far springs are off the reference at every size of the load: from levels to all sizes between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from truespring.arrays import Floats
+from truespring.comparison import compare
+from truespring.validity.reference import Reference
+from truespring.validity.solving import Solved, conjugate_force
+
+# Levels that are nearer to each other than this share of the whole are one.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curve:
+    """Errors of one springs model on one mesh under one load type, all relative.
+
+    Attributes:
+        sizes, rms_errors, probe_errors, stiffness: at the levels that were solved, the small one first, shape (n,):
+            rms and probe errors as in a Comparison; `stiffness` how much stiffer than the reference the springs are, by
+            the displacement along the load under the same load, or the force of the same motion.
+        force_errors: of the force that moved supports need; zero under loads.
+        grid: sizes from 0 on, shape (m,).
+        errors, probe_on_grid, stiffness_on_grid: there, not a number where springs or reference do not reach.
+        reached: the largest size for which there is an error.
+        end: why the springs end there, empty where they do not.
+        interpolation: what levels left out are off when told from the others: a bound for what lies between levels.
+        n_nodes: nodes of the springs; seconds: of their solution.
+    """
+
+    sizes: Floats
+    rms_errors: Floats
+    probe_errors: Floats
+    force_errors: Floats
+    stiffness: Floats
+    grid: Floats
+    errors: Floats
+    probe_on_grid: Floats
+    stiffness_on_grid: Floats
+    reached: float
+    end: str
+    interpolation: float
+    n_nodes: int
+    seconds: float
+
+
+def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None) -> Curve:
+    """Compare springs with the reference, carried to their nodes, at each level, and between levels.
+
+    Between levels not the error but the difference of the two displacements, over the size of the reference's, is
+    interpolated by a cubic spline over the size of the load: where springs cross the reference the error has a valley
+    that no interpolation of the errors themselves would find.
+    """
+    theirs = reference.solved
+    small = compare(springs.small, theirs.small, probe)
+    full = compare(springs.path, theirs.path, probe)
+    n = min(len(springs.states), len(theirs.states))
+    size = reference.sizes[:n]
+    rising = np.flatnonzero(np.diff(size) <= _SAME * size[-1]) if n else np.zeros(0, dtype=int)
+    n = int(rising[0]) + 1 if rising.size else n
+    inside = ~full.outside
+    mine = np.array([state.displacement for state in springs.states[:n]])
+    theirs_loaded = [state for state in full.reference.states if state.level > 0]
+    other = np.array([state.displacement for state in (small.reference.states[-1], *theirs_loaded)[:n]])
+    norms = np.sqrt((other[:, inside] ** 2).sum(axis=(1, 2)))
+    apart = (mine - other)[:, inside].reshape(n, -1) / norms[:, None]
+    moved = np.linalg.norm(other[:, full.probe], axis=1)
+    told_at_probe = bool((moved > 0).all())  # a probe that is held tells nothing
+    at_probe = (mine - other)[:, full.probe] / np.where(moved > 0, moved, 1.0)[:, None]
+    force = np.zeros(n)
+    loading = springs.path.problem.loading
+    if loading.driven_by_motion:
+        levels = springs.levels[:n]
+        both = [conjugate_force(one.path, one.states[:n], levels) for one in (springs, theirs)]
+        stiffness = both[0] / both[1] - 1
+        force = stiffness
+    else:
+        load = loading.force(springs.path.problem.mesh.nodes)
+        stiffness = (load * other).sum(axis=(1, 2)) / (load * mine).sum(axis=(1, 2)) - 1
+    told = np.column_stack([apart, at_probe, force, stiffness])
+    d = at_probe.shape[1]
+
+    def split(rows: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        fields = rows[:, : -d - 2]
+        return (
+            np.linalg.norm(fields, axis=1),
+            np.linalg.norm(rows[:, -d - 2 : -2], axis=1) if told_at_probe else np.full(len(rows), np.nan),
+            np.abs(rows[:, -2]),
+            rows[:, -1],
+        )
+
+    size = size[:n]
+    between = _spline(size, told)
+    reached = float(size[-1])
+    there = grid <= reached * (1 + 1e-3)  # what a load was scaled to is met to a hair
+    rms, probed, forced, stiff = split(between(np.minimum(grid[there], reached)))
+    on_grid = np.full((3, len(grid)), np.nan)
+    on_grid[:, there] = np.maximum(rms, forced), probed, stiff
+    rms, probed, forced, stiff = split(told)
+    return Curve(
+        sizes=size,
+        rms_errors=rms,
+        probe_errors=probed,
+        force_errors=forced,
+        stiffness=stiff,
+        grid=grid,
+        errors=on_grid[0],
+        probe_on_grid=on_grid[1],
+        stiffness_on_grid=on_grid[2],
+        reached=reached,
+        end=springs.end if n == len(springs.states) and n < len(theirs.states) else "",
+        interpolation=_left_out(size, told[:, : -d - 2]),
+        n_nodes=springs.path.problem.mesh.n_nodes,
+        seconds=springs.seconds,
+    )
+
+
+def _spline(size: Floats, rows: Floats) -> CubicSpline:
+    if len(size) == 1:
+        size, rows = np.array([0.0, size[0]]), np.vstack([rows, rows])
+    return CubicSpline(size, rows, axis=0)
+
+
+def _left_out(size: Floats, fields: Floats) -> float:
+    """The rms error with which every second level is told from the others, over 8: halving the steps of a cubic
+    spline divides its error by 16, near its ends by less."""
+    if len(size) < 5:
+        return 0.0
+    kept = np.unique([*range(0, len(size), 2), len(size) - 1])
+    left = np.setdiff1d(np.arange(len(size)), kept)
+    return (
+        float(np.linalg.norm(CubicSpline(size[kept], fields[kept], axis=0)(size[left]) - fields[left], axis=1).max())
+        / 8
+    )

@@ -1,0 +1,304 @@
+"""Solving a validity map, round by round, on one process or many."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from truespring.errors import StudyError, TruespringError, nearest
+from truespring.models import LAWS
+from truespring.study import Study, read_study
+from truespring.sweeping import Failure, Pool
+from truespring.validity.axes import NAMES, Range, axis_of, chosen, known, range_of, sizes_to
+from truespring.validity.bodies import Body, Spot
+from truespring.validity.curve import Curve, curve
+from truespring.validity.loads import LOADS, LoadType
+from truespring.validity.maps import Key, Map, Validity
+from truespring.validity.reference import Reference, solve_reference
+from truespring.validity.refine import Cells, Rows
+from truespring.validity.rules import Chosen, choose
+from truespring.validity.solving import Solved, Task, run_task
+
+#: Told what is solved, how many paths are, and how many are known to be needed so far.
+Progress = Callable[[str, int, int], None]
+
+# Load steps at first, in the plane and in space; they are doubled up to so many where levels lie too far apart.
+_STEPS, _MOST_STEPS = {2: 10, 3: 6}, 48
+# What may be lost between levels, relative: a tenth of the smallest line.
+_BETWEEN = 0.001
+
+
+def map_validity(
+    study: str | FilePath | Study,
+    *,
+    law: str = "neo-hookean",
+    loads: Sequence[str] | None = None,
+    rules: Sequence[str] | None = None,
+    x: str = "load",
+    y: str | None = "depth",
+    ranges: Mapping[str, Range | Sequence[float]] | None = None,
+    adaptive: bool = True,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> Validity:
+    """Map how far the springs of a study are off FEM, by load level, mesh, material, rule or load type.
+
+    Args:
+        study: a study file, or one that was read.
+        law: of the reference, a key of LAWS; it is solved on finer and finer meshes until it changes no more.
+        loads: load types, keys of LOADS, or "all"; by default the study's own load.
+        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs.
+        x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
+        y: another of them, or "rule" or "load-type", or None. A mesh from a file has no depth: "rule" there.
+        ranges: first, last and if wanted the number of intervals at the finest, by axis; the load's from 0 on.
+        adaptive: solve only where a line passes; else the whole grid.
+        workers: processes on this machine; 1 solves in this one. None takes as many as cores.
+        scheduler: address of a Dask cluster whose workers are taken instead.
+        progress: told what goes on.
+
+    Raises StudyError where something does not go together.
+    """
+    read = study if isinstance(study, Study) else read_study(study)
+    if law not in LAWS:
+        raise StudyError(f"law = '{law}' is unknown{nearest(law, LAWS)}; allowed: {', '.join(LAWS)}")
+    started = time.perf_counter()
+    with ExitStack() as stack:
+        pool = None
+        if workers != 1 or scheduler is not None:
+            pool = stack.enter_context(Pool(None if scheduler else workers, scheduler))
+        run = _Run(read, law, loads, rules, x, y, ranges or {}, adaptive, pool, progress)
+        maps = tuple(run.maps())
+    return Validity(
+        title=read.title,
+        stem=read.stem,
+        body=run.body,
+        law=law,
+        x=run.x,
+        y=run.y,
+        axes=run.axes,
+        maps=maps,
+        references=tuple(run.references.values()),
+        tolerance=read.tolerance,
+        solves=(run.solved, sum(one.solves for one in run.spent)),
+        full=sum(one.full for one in maps),
+        seconds=time.perf_counter() - started,
+        notes=tuple(axis.note for axis in run.axes.values() if axis.note),
+    )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Wanted:
+    """A reference to be solved: what travels to a worker."""
+
+    body: Body
+    load: LoadType
+    law: str
+    poisson: float | None
+    last: float | None
+    steps: int
+
+
+def _solve(job: Task | _Wanted) -> Solved | Reference:
+    if isinstance(job, Task):
+        return run_task(job)
+    return solve_reference(job.body, job.load, job.law, job.poisson, job.last, job.steps)
+
+
+# Rows that are drawn for each of the grid where y is no whole number.
+_PARTS = 4
+
+
+class _Run:
+    """One map on its way."""
+
+    def __init__(
+        self,
+        study: Study,
+        law: str,
+        loads: Sequence[str] | None,
+        rules: Sequence[str] | None,
+        x: str,
+        y: str | None,
+        ranges: Mapping[str, Range | Sequence[float]],
+        adaptive: bool,
+        pool: Pool | None,
+        progress: Progress | None,
+    ) -> None:
+        self.body = Body.of(study)
+        if y == "depth" and x == "load" and self.body.shape is None:
+            y = "rule"
+        chosen([x, y])
+        self.x, self.y, self.law, self.pool = x, y, law, pool
+        given = {known(name, {"load": 0, "depth": 0, "aspect": 0, "poisson": 0}): one for name, one in ranges.items()}
+        self.ranges = {name: range_of(name, one) for name, one in given.items()}
+        numbers = [name for name in (x, y) if name not in (None, "load", *NAMES)]
+        if idle := [name for name in self.ranges if name not in (*numbers, "load")]:
+            raise StudyError(f"a range of {idle[0]} is given, which is no axis of this map: x = {x}, y = {y}")
+        self.axes = {str(name): axis_of(str(name), self.body, self.ranges) for name in numbers}
+        if not adaptive:
+            self.axes = {name: replace(axis, start=tuple(range(len(axis.values)))) for name, axis in self.axes.items()}
+        names = list(LOADS) if loads and "all" in loads else list(loads or ["own"])
+        if "all" in (loads or ()):
+            names = [one for one in names if self.body.dim in LOADS[one].dims and (self.body.shape or one == "own")]
+        for name in names:
+            if name not in LOADS:
+                raise StudyError(f"load '{name}' is unknown{nearest(name, LOADS)}; allowed: {', '.join(LOADS)}, all")
+        self.loads = [self.body.refuse(name) for name in dict.fromkeys(names)]
+        self.rules = {one.name: one for one in choose(study, rules, "poisson" in self.axes)}
+        self.progress = progress or (lambda what, done, wanted: None)
+        self.references: dict[tuple[str, float | None], Reference] = {}
+        self.steps = {load.name: _STEPS[self.body.dim] for load in self.loads}
+        self.spent: list[Reference] = []
+        self.found: dict[Key, Curve | Failure] = {}
+        self.solved, self.done, self.wanted = 0, 0, 0
+
+    def maps(self) -> Iterator[Map]:
+        """Solve round by round, each of what all maps want next; yield them at the end."""
+        grids = {(load.name, rule): self._grid() for load in self.loads for rule in self.rules}
+        while True:
+            asked = {pair: {place: self._spot(place) for place in grid.wanted()} for pair, grid in grids.items()}
+            keys = [Key(*pair, spot) for pair, places in asked.items() for spot in places.values()]
+            if not keys:
+                break
+            self._solve_all(keys)
+            for pair, places in asked.items():
+                values = {place: self._errors(Key(*pair, spot)) for place, spot in places.items()}
+                grids[pair].add(values)
+        for (load, rule), grid in grids.items():
+            yield self._map(LOADS[load], self.rules[rule], grid)
+
+    def _grid(self) -> Any:
+        y = self.axes.get(self.y or "")
+        rows, start = (len(y.values), y.start) if y else (1, (0,))
+        if self.x == "load":
+            return Rows(rows, start)
+        x = self.axes[self.x]
+        if y is None:
+            return Cells((len(x.values), 1), (x.start, (0,)))
+        return Cells((len(x.values), len(y.values)), (x.start, y.start))
+
+    def _spot(self, place: int | tuple[int, int]) -> Spot:
+        """What is solved at a place of a grid."""
+        at = {}
+        if isinstance(place, tuple):
+            at[self.x] = self.axes[self.x].values[place[0]]
+            if self.y in self.axes:
+                at[str(self.y)] = self.axes[str(self.y)].values[place[1]]
+        elif self.y in self.axes:
+            at[str(self.y)] = self.axes[str(self.y)].values[place]
+        depth, aspect, poisson = at.get("depth"), at.get("aspect"), at.get("poisson")
+        return Spot(
+            None if depth is None else int(depth),
+            None if aspect is None else float(aspect),
+            None if poisson is None else float(poisson),
+        )
+
+    def _errors(self, key: Key) -> Any:
+        """The errors, with what has a sign of them as the real part: see Rows."""
+        found = self.found[key]
+        if isinstance(found, Failure):
+            return np.full(len(sizes_to(1.0)), np.nan) if self.x == "load" else np.nan
+        signed = np.clip(found.stiffness_on_grid, -found.errors, found.errors)
+        errors = signed + 1j * np.sqrt(found.errors**2 - signed**2)
+        return errors if self.x == "load" else complex(errors[-1])
+
+    def _solve_all(self, keys: list[Key]) -> None:
+        """Solve references, then springs, then both once more in more steps where levels lie too far apart."""
+        keys = [key for key in dict.fromkeys(keys) if key not in self.found]
+        while keys:
+            self._solve_references(keys)
+            tasks: dict[Key, Any] = {}
+            for key in keys:
+                try:
+                    tasks[key] = self._task(key)
+                except TruespringError as error:
+                    self.found[key] = Failure(str(error))
+            for key, solved in self._run(tasks, lambda key: f"{key.load}: {key.rule}"):
+                self.solved += 1
+                self.found[key] = self._curve(key, solved)
+            short = [
+                key for key in tasks if isinstance(found := self.found[key], Curve) and found.interpolation > _BETWEEN
+            ]
+            keys = [key for key in short if self.steps[key.load] < _MOST_STEPS]
+            for load in {key.load for key in keys}:
+                self.steps[load] *= 2
+                for one in [one for one in self.references if one[0] == load]:
+                    del self.references[one]
+
+    def _solve_references(self, keys: list[Key]) -> None:
+        wanted = {(key.load, key.spot.poisson) for key in keys} - self.references.keys()
+        last = self.ranges["load"].last if "load" in self.ranges else None
+        jobs = {
+            (load, poisson): _Wanted(self.body, LOADS[load], self.law, poisson, last, self.steps[load])
+            for load, poisson in sorted(wanted, key=str)
+        }
+        for key, found in self._run(jobs, lambda key: f"{key[0]}: reference"):
+            if isinstance(found, Failure):
+                raise StudyError(found.reason)
+            self.references[key] = found
+            self.spent.append(found)
+
+    def _task(self, key: Key) -> Task:
+        reference = self.references[key.load, key.spot.poisson]
+        problem = self.body.springs_problem(LOADS[key.load], reference.factor, key.spot)
+        return Task(problem, self.rules[key.rule].springs, self.steps[key.load])
+
+    def _curve(self, key: Key, solved: Any) -> Curve | Failure:
+        if isinstance(solved, Failure):
+            return solved
+        reference = self.references[key.load, key.spot.poisson]
+        if not solved.states:
+            return Failure(f"the springs have no equilibrium under a small load: {solved.end or 'unstable at rest'}")
+        probe = self.body.probe_in(solved.path.problem, LOADS[key.load])
+        return curve(solved, reference, sizes_to(reference.asked), probe)
+
+    def _run(self, jobs: Mapping[Any, Any], say: Callable[[Any], str]) -> Iterator[tuple[Any, Any]]:
+        self.wanted += len(jobs)
+        for key, found in self._each(jobs):
+            self.done += 1
+            self.progress(say(key), self.done, self.wanted)
+            yield key, found
+
+    def _each(self, jobs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:
+        if self.pool is not None and len(jobs) > 1:
+            yield from self.pool.run(jobs, _solve)
+            return
+        for key, job in jobs.items():
+            try:
+                found: Any = _solve(job)
+            except TruespringError as error:
+                found = Failure(str(error))
+            yield key, found
+
+    def _map(self, load: LoadType, rule: Chosen, grid: Any) -> Map:
+        here = {key.spot: one for key, one in self.found.items() if (key.load, key.rule) == (load.name, rule.name)}
+        references = {poisson: one for (name, poisson), one in self.references.items() if name == load.name}
+        y = self.axes.get(self.y or "")
+        if self.x == "load":
+            x = sizes_to(max(one.asked for one in references.values()))
+            full = grid.rows
+        else:
+            x = self.axes[self.x].values
+            full = grid.shape[0] * grid.shape[1]
+        errors, along = grid.filled(), np.zeros(0) if y is None else y.values
+        smooth = along, errors
+        if self.x == "load" and y is not None and y.name != "depth":
+            places = np.arange((len(along) - 1) * _PARTS + 1) / _PARTS
+            smooth = np.interp(places, np.arange(len(along)), along), grid.filled(_PARTS)
+        return Map(
+            load=load,
+            rule=rule,
+            x=x,
+            y=along,
+            errors=errors,
+            smooth=smooth,
+            curves={spot: one for spot, one in here.items() if isinstance(one, Curve)},
+            failures={spot: one.reason for spot, one in here.items() if isinstance(one, Failure)},
+            references=references,
+            full=full,
+        )

@@ -1,0 +1,280 @@
+"""Pictures of a map: areas between the 1, 2, 5 and 10 % lines, the lines named, what was solved and what ended."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.models import LAWS
+from truespring.report.frame import EDGE, SIZE, draw_frame
+from truespring.report.quantity import tolerance_percent
+from truespring.report.sheet import Area, Sheet
+from truespring.report.style import INK, POINT
+from truespring.report.words import draw_words, text_width
+from truespring.validity.lines import contours, spans
+from truespring.validity.maps import Map, Validity
+from truespring.validity.refine import LINES
+from truespring.validity.sentences import headline, row_words
+
+if TYPE_CHECKING:
+    from matplotlib.path import Path
+
+# From within the smallest line to beyond the largest: dark is near, also on grey paper and to colour-blind eyes.
+COLORS = ("#0b4f7d", "#3f87b8", "#8fbddb", "#d3e5f2", "#f7e6d8")
+_HATCH, _BEYOND = "#b4bac0", 1e9
+
+# Sizes [inch]: the margins, the area, the legend on the right, a strip, and how near two names of lines may be.
+_LEFT, _BOTTOM, _TOP, _LEGEND = 0.62, 0.5, 0.62, 1.5
+_WIDTH, _HEIGHT, _STRIP, _APART = 3.6, 2.6, 0.34, 0.42
+
+
+def figures(validity: Validity) -> Iterator[tuple[str, Sheet]]:
+    """Yield each picture and the stem of its files: one a map, or one for all rows of a map whose y has names."""
+    shown = [one for one in validity.maps if not one.refused]
+    if validity.y in ("rule", "load-type"):
+        kept = "load" if validity.y == "rule" else "rule"
+        for name, group in itertools.groupby(
+            sorted(shown, key=lambda one: _name(one, kept)), lambda one: _name(one, kept)
+        ):
+            yield f"validity_{_safe(name)}", strips_figure(validity, list(group))
+        return
+    for one in shown:
+        drawn = map_figure(validity, one) if len(one.y) > 1 else strips_figure(validity, [one])
+        yield f"validity_{one.load.name}_{_safe(one.rule.name)}", drawn
+
+
+def _name(one: Map, kept: str) -> str:
+    return one.load.name if kept == "load" else one.rule.name
+
+
+def _safe(name: str) -> str:
+    return name.replace("+", "_")
+
+
+def map_figure(validity: Validity, one: Map) -> Sheet:
+    """A map over two axes of numbers."""
+    title = f"{one.load.did}: {one.rule.words}"
+    sheet = Sheet(_LEFT + _WIDTH + _LEGEND, _BOTTOM + _HEIGHT + _TOP, f"{title}. {headline(validity, one)}")
+    scale = one.load.scale if validity.x == "load" else 1.0
+    x, (y, errors) = scale * one.x, _rows(validity, one)
+    area = Area(sheet, _LEFT, _BOTTOM, _WIDTH, _HEIGHT, (x[0], x[-1]), (y[0], y[-1]))
+    _draw_title(validity, one, sheet, title)
+    missing = bool(np.isnan(errors).any())
+    if missing:
+        _draw_background(area)
+    for low, high, color in _bands():
+        for path in _filled(x, y, errors, low, high):
+            _add_filled(area, path, color)
+    _draw_solved(area, validity, one)
+    draw_frame(area, _x_label(validity, one), validity.axes[str(validity.y)].label)
+    _draw_lines(area, contours(x, y, errors))
+    _draw_legend(sheet, validity, one, _LEFT + _WIDTH + 0.16, _BOTTOM + _HEIGHT, missing)
+    return sheet
+
+
+def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
+    """A strip of areas a map, for an axis of names or one axis alone; sizes of several loads as shares of each."""
+    first = maps[0]
+    shared = validity.x == "load" and len({one.load.name for one in maps}) > 1
+    names = [row_words(validity, one, shared) for one in maps]
+    left = max(text_width(name, SIZE) for name in names) + 0.25
+    height = _STRIP * len(maps)
+    title = {"rule": first.load.did, "load-type": first.rule.words.capitalize()}.get(
+        str(validity.y), f"{first.load.did}: {first.rule.words}"
+    )
+    top = _TOP if len(maps) == 1 else _TOP - 0.2
+    room = max(height, 1.3)
+    sheet = Sheet(left + _WIDTH + _LEGEND, _BOTTOM + room + top, title)
+    if len(maps) == 1:
+        _draw_title(validity, first, sheet, title)
+    else:
+        draw_words(sheet, 0.1, sheet.height - 0.17, f"{title}: error against {LAWS[validity.law].label}", 9, bold=True)
+    scale = 100.0 / first.x[-1] if shared else first.load.scale if validity.x == "load" else 1.0
+    end = scale * first.x[-1]
+    bottom = _BOTTOM + room - height
+    area = Area(sheet, left, bottom, _WIDTH, height, (scale * first.x[0], end), (0.0, float(len(maps))))
+    missing = any(bool(np.isnan(one.errors).any()) for one in maps)
+    if missing:
+        _draw_background(area)
+    for row, one in enumerate(reversed(maps)):
+        x = one.x * (100.0 / one.x[-1] if shared else scale)
+        _draw_strip(area, x, one, float(row))
+        draw_words(sheet, left - 0.1, bottom + _STRIP * (row + 0.5), names[::-1][row], SIZE, align=1.0)
+    _draw_x(area, "size of the load [% of each range]" if shared else _x_label(validity, first))
+    _draw_legend(sheet, validity, first, left + _WIDTH + 0.16, _BOTTOM + room, missing)
+    return sheet
+
+
+def _rows(validity: Validity, one: Map) -> tuple[Floats, Floats]:
+    """The values along y and the errors there; a whole number is drawn as a row of its own, from middle to middle."""
+    if validity.y != "depth":
+        return one.smooth
+    middles = (one.y[:-1] + one.y[1:]) / 2
+    lower = np.concatenate([[one.y[0] - 0.5], middles])
+    upper = np.concatenate([middles, [one.y[-1] + 0.5]])
+    hair = 1e-6
+    return np.column_stack([lower + hair, upper - hair]).ravel(), np.repeat(one.errors, 2, axis=0)
+
+
+def _draw_title(validity: Validity, one: Map, sheet: Sheet, title: str) -> None:
+    draw_words(sheet, 0.1, sheet.height - 0.17, title, 9, bold=True)
+    words, lines = headline(validity, one).split(), [""]
+    for word in words:
+        longer = f"{lines[-1]} {word}".strip()
+        if text_width(longer, 7.5) > sheet.width - 0.2 and len(lines) < 2:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    for place, line in enumerate(lines):
+        draw_words(sheet, 0.1, sheet.height - 0.34 - 0.14 * place, line, 7.5, EDGE)
+
+
+def _x_label(validity: Validity, one: Map) -> str:
+    return one.load.axis if validity.x == "load" else validity.axes[validity.x].label
+
+
+def _bands() -> Iterator[tuple[float, float, str]]:
+    yield from zip((-1.0, *LINES), (*LINES, _BEYOND), COLORS, strict=True)
+
+
+def _filled(x: Floats, y: Floats, errors: Floats, low: float, high: float) -> "Iterator[Path]":
+    from contourpy import FillType, contour_generator
+    from matplotlib.path import Path
+
+    made = contour_generator(x, y, np.ma.masked_invalid(np.minimum(errors, _BEYOND / 2)), fill_type=FillType.OuterCode)
+    points, codes = made.filled(low, high)[:2]
+    for corners, code in zip(points, codes, strict=True):
+        yield Path(np.asarray(corners), np.asarray(code))
+
+
+def _add_filled(area: Area, path: "Path", color: str) -> None:
+    from matplotlib.patches import PathPatch
+
+    area.add(PathPatch(path, fc=color, ec=color, lw=0.3, zorder=1))
+
+
+def _draw_background(area: Area) -> None:
+    """Hatching, seen where there is no error to tell."""
+    from matplotlib.patches import Rectangle
+
+    (x, right), (y, top) = area.x, area.y
+    look: dict[str, Any] = {"fc": "#f3f4f5", "ec": _HATCH, "lw": 0, "hatch": "////", "zorder": 0.4, "gid": "no result"}
+    area.add(Rectangle((x, y), right - x, top - y, **look))
+
+
+def _draw_strip(area: Area, x: Floats, one: Map, bottom: float) -> None:
+    from matplotlib.patches import Rectangle
+
+    for low, high, color in _bands():
+        for begin, end in spans(x, np.where(one.errors[0] > low, one.errors[0], np.nan), high):
+            area.add(Rectangle((begin, bottom + 0.08), end - begin, 0.84, fc=color, ec="none", lw=0, zorder=1))
+    edges = [edge for line in LINES for stretch in spans(x, one.errors[0], line) for edge in stretch]
+    _draw_marks(area, [edge for edge in edges if x[0] < edge < x[-1]], bottom)
+
+
+def _draw_marks(area: Area, at: Sequence[float], bottom: float) -> None:
+    from matplotlib.lines import Line2D
+
+    for place in at:
+        area.add(Line2D([place, place], [bottom + 0.08, bottom + 0.92], color="white", lw=0.8, zorder=2))
+
+
+def _draw_x(area: Area, label: str) -> None:
+    """The frame of strips, which have names instead of numbers along y."""
+    from truespring.report.frame import round_numbers, written
+
+    values = round_numbers(*area.x)
+    for at, told in zip(values, written(values), strict=True):
+        x, _ = area.place(np.array([at, 0.0]))
+        draw_words(area.sheet, x, area.bottom - 10 * POINT, told, SIZE, align=0.5)
+    draw_words(area.sheet, area.left + area.width / 2, area.bottom - 24 * POINT, label, SIZE, align=0.5)
+
+
+def _draw_solved(area: Area, validity: Validity, one: Map) -> None:
+    """Marks at what was solved: rows at the left edge, or points."""
+    from matplotlib.lines import Line2D
+
+    look: dict[str, Any] = {
+        "ls": "",
+        "marker": "o",
+        "mfc": "white",
+        "mec": INK,
+        "mew": 0.7,
+        "zorder": 6,
+        "gid": "solved",
+    }
+    y = [getattr(spot, str(validity.y)) for spot in one.curves]
+    if validity.x == "load":
+        drawn = Line2D([area.x[0]] * len(y), y, ms=3.6, clip_on=False, **look)
+        area.add(drawn)
+        drawn.set_clip_on(False)
+        return
+    area.add(Line2D([getattr(spot, validity.x) for spot in one.curves], y, ms=2.4, **look))
+
+
+def _draw_lines(area: Area, lines: Mapping[float, Sequence[Floats]]) -> None:
+    """The lines, and the name of each where it is longest and no other name is near."""
+    from matplotlib.lines import Line2D
+
+    taken: list[Floats] = []
+    low = np.array([area.left, area.bottom]) + 0.2
+    high = np.array([area.left + area.width, area.bottom + area.height]) - 0.2
+    for line, places in lines.items():
+        for part in places:
+            area.add(Line2D(*part.T, color=INK, lw=1.1, zorder=4, gid=f"line {tolerance_percent(line)}"))
+        on_paper = [area.place(part) for part in places]
+        for part in sorted(on_paper, key=_length, reverse=True):
+            if _length(part) < 0.3:
+                continue
+            candidates = [_along(part, share) for share in (0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9)]
+            free = [at for at in candidates if (at > low).all() and (at < high).all()]
+            best = max(
+                free, key=lambda at: min((float(np.linalg.norm(at - one)) for one in taken), default=9.0), default=None
+            )
+            if best is None or min((float(np.linalg.norm(best - one)) for one in taken), default=9.0) < _APART:
+                continue
+            taken.append(best)
+            draw_words(area.sheet, best[0], best[1], tolerance_percent(line), 7.5, bold=True, align=0.5, halo=True)
+
+
+def _length(part: Floats) -> float:
+    return float(np.linalg.norm(np.diff(part, axis=0), axis=1).sum())
+
+
+def _along(part: Floats, share: float) -> Floats:
+    """The place at a share of the length of a polyline."""
+    way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
+    return np.array([np.interp(share * way[-1], way, part[:, axis]) for axis in (0, 1)])
+
+
+def _draw_legend(sheet: Sheet, validity: Validity, one: Map, left: float, top: float, missing: bool) -> None:
+    from matplotlib.patches import Rectangle
+
+    draw_words(sheet, left, top - 0.06, "error against", 7.5, EDGE)
+    draw_words(sheet, left, top - 0.2, LAWS[validity.law].label, 7.5, bold=True)
+    bounds = [tolerance_percent(line) for line in LINES]
+    words = [
+        f"within {bounds[0]}",
+        *(f"{a[:-2]} to {b}" for a, b in itertools.pairwise(bounds)),
+        f"more than {bounds[-1]}",
+    ]
+    looks: list[tuple[str, dict[str, Any]]] = [
+        (word, {"fc": color, "ec": EDGE, "lw": 0.5}) for word, color in zip(words, COLORS, strict=True)
+    ]
+    if missing:
+        looks.append(("no result", {"fc": "#f3f4f5", "ec": _HATCH, "lw": 0.5, "hatch": "////"}))
+    y = top - 0.46
+    if len(one.y) > 1:
+        from matplotlib.lines import Line2D
+
+        below = y - 0.17 * len(looks) - 0.05
+        mark = Line2D([left + 0.1], [below], ls="", marker="o", mfc="white", mec=INK, mew=0.7, ms=3.6)
+        sheet.add(mark)
+        draw_words(sheet, left + 0.28, below, "solved", 7.5)
+    for word, look in looks:
+        drawn = Rectangle((left, y - 0.055), 0.2, 0.11, zorder=3, **look)
+        sheet.add(drawn)
+        draw_words(sheet, left + 0.28, y, word, 7.5)
+        y -= 0.17

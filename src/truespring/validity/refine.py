@@ -1,0 +1,169 @@
+"""Adaptive refinement: a grid is solved where a line passes, and told from its neighbours elsewhere."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.arrays import Floats, Ints
+
+Values = NDArray[np.float64] | NDArray[np.complex128]
+
+#: The errors along which the lines of a map run.
+LINES = (0.01, 0.02, 0.05, 0.1)
+
+#: Places of a line that are nearer than this share of the range are one.
+TOLERANCE = 0.01
+
+
+class Rows:
+    """A map whose rows come whole: errors at all sizes of the load for one value along y.
+
+    Errors may be complex: their size is the error, and between rows the numbers themselves are interpolated. With what
+    changes sign where springs cross the reference as the real part, the valley there is found between two rows too.
+
+    Rows at `start` are solved first; between two in which a line passes at different places, or one ends, the middle
+    one is; unless the middle one of their parents was where the two had told. `rows` is the number of all.
+    """
+
+    def __init__(self, rows: int, start: Sequence[int], tolerance: float = TOLERANCE) -> None:
+        self.rows, self.tolerance = rows, tolerance
+        self.known: dict[int, Values] = {}
+        self._start = tuple(start)
+        self._straight: set[tuple[int, int]] = set()
+
+    def wanted(self) -> list[int]:
+        """The rows to be solved next; none where the map is done."""
+        if missing := [row for row in self._start if row not in self.known]:
+            return missing
+        return [(a + b) // 2 for a, b in pairwise(sorted(self.known)) if b - a > 1 and not self._settled(a, b)]
+
+    def add(self, found: Mapping[int, Values]) -> None:
+        """Take the errors of rows, shape (n_sizes,) each, not a number where there are none."""
+        known = sorted(self.known)
+        for row, errors in found.items():
+            around = [(a, b) for a, b in pairwise(known) if a < row < b]
+            self.known[row] = errors
+            for a, b in around:
+                share = (row - a) / (b - a)
+                told = (1 - share) * self.known[a] + share * self.known[b]
+                if _alike(_passes(told), _passes(errors), self.tolerance):
+                    self._straight |= {(a, row), (row, b)}
+
+    def _settled(self, a: int, b: int) -> bool:
+        first, last = self.known[a], self.known[b]
+        places = [_passes(one) for one in (first, last)]
+        if not any(len(one) for line in places for one in line.values()):
+            return _band(first) == _band(last)
+        return (a, b) in self._straight or _alike(places[0], places[1], self.tolerance)
+
+    def filled(self, parts: int = 1) -> Floats:
+        """Errors of all rows, shape (n, n_sizes), those not solved told from the two beside them.
+
+        With `parts` also those between two of the grid: that many a row.
+        """
+        solved = np.array(sorted(self.known))
+        values = np.array([self.known[row] for row in solved])
+        return np.abs([_between(solved, values, row) for row in np.arange((self.rows - 1) * parts + 1) / parts])
+
+
+def _between(solved: Ints, values: Values, row: float) -> Values:
+    above = int(np.clip(np.searchsorted(solved, row), 1, max(len(solved) - 1, 1)))
+    if len(solved) == 1 or row == solved[above - 1]:
+        return np.asarray(values[above - 1])
+    if row == solved[above]:
+        return np.asarray(values[above])
+    share = (row - solved[above - 1]) / (solved[above] - solved[above - 1])
+    return np.asarray((1 - share) * values[above - 1] + share * values[above])
+
+
+def crossings(errors: Floats, line: float) -> Floats:
+    """Return where errors pass a line, as shares of their range, ascending."""
+    place = np.arange(len(errors)) / max(len(errors) - 1, 1)
+    apart = errors - line
+    left, right = apart[:-1], apart[1:]
+    passed = np.isfinite(left) & np.isfinite(right) & ((left <= 0) != (right <= 0))
+    share = left[passed] / (left[passed] - right[passed])
+    return np.asarray(place[:-1][passed] + share * (place[1:] - place[:-1])[passed])
+
+
+def _passes(values: Values) -> dict[float, Floats]:
+    """Where each line is passed, and under 0 where the errors end."""
+    errors = np.abs(values)
+    found = {line: crossings(errors, line) for line in LINES}
+    finite = np.flatnonzero(np.isfinite(errors))
+    last = finite[-1] / max(len(errors) - 1, 1) if finite.size else 0.0
+    return found | {0.0: np.array([last] if last < 1 else [])}
+
+
+def _alike(one: dict[float, Floats], other: dict[float, Floats], hair: float) -> bool:
+    """Whether lines pass two rows at the same places."""
+    return all(
+        len(places) == len(other[line]) and (not len(places) or np.abs(places - other[line]).max() <= hair)
+        for line, places in one.items()
+    )
+
+
+def _band(values: Values) -> int:
+    errors = np.abs(values)
+    finite = errors[np.isfinite(errors)]
+    return int(np.searchsorted(LINES, finite[0])) if finite.size else -1
+
+
+class Cells:
+    """A map of single points over two grids, or over one where the second has a single value; as of Rows, complex too.
+
+    Cells between the values of `start` are solved at their corners; one whose corners lie on both sides of a line is
+    divided, down to the grid itself.
+    """
+
+    def __init__(self, shape: tuple[int, int], start: tuple[Sequence[int], Sequence[int]]) -> None:
+        self.shape = shape
+        self.known: dict[tuple[int, int], complex] = {}
+        x, y = (list(pairwise(one)) or [(0, 0)] for one in start)
+        self._cells = [(*i, *j) for i in x for j in y]
+
+    def wanted(self) -> list[tuple[int, int]]:
+        """The points to be solved next; none where the map is done."""
+        while True:
+            missing = {one for cell in self._cells for one in _corners(cell) if one not in self.known}
+            if missing:
+                return sorted(missing)
+            divided = [part for cell in self._cells for part in self._divided(cell)]
+            if len(divided) == len(self._cells):
+                return []
+            self._cells = divided
+
+    def add(self, found: Mapping[tuple[int, int], complex]) -> None:
+        """Take the errors of points."""
+        self.known.update(found)
+
+    def _divided(self, cell: tuple[int, int, int, int]) -> list[tuple[int, int, int, int]]:
+        i, j, k, l = cell  # noqa: E741
+        if (j - i < 2 and l - k < 2) or len({self._band(one) for one in _corners(cell)}) == 1:
+            return [cell]
+        x = [(i, (i + j) // 2), ((i + j) // 2, j)] if j - i > 1 else [(i, j)]
+        y = [(k, (k + l) // 2), ((k + l) // 2, l)] if l - k > 1 else [(k, l)]
+        return [(*one, *other) for one in x for other in y]
+
+    def _band(self, at: tuple[int, int]) -> int:
+        error = abs(self.known[at])
+        return int(np.searchsorted(LINES, error)) if np.isfinite(error) else -1
+
+    def filled(self) -> Floats:
+        """Errors of all points, shape (n_y, n_x), those not solved told from the corners of their cell."""
+        errors = np.full(self.shape[::-1], np.nan + 0j)
+        for i, j, k, l in self._cells:  # noqa: E741
+            x = np.linspace(0, 1, j - i + 1)[None] if j > i else np.zeros((1, 1))
+            y = np.linspace(0, 1, l - k + 1)[:, None] if l > k else np.zeros((1, 1))
+            a, b, c, d = (self.known[one] for one in ((i, k), (j, k), (i, l), (j, l)))
+            errors[k : l + 1, i : j + 1] = (1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)
+        for (i, j), error in self.known.items():
+            errors[j, i] = error
+        return np.abs(errors)
+
+
+def _corners(cell: tuple[int, int, int, int]) -> list[tuple[int, int]]:
+    i, j, k, l = cell  # noqa: E741
+    return list(dict.fromkeys([(i, k), (j, k), (i, l), (j, l)]))

@@ -1,0 +1,134 @@
+"""The springs of a map: those of the study, or all rules that are made for its elements."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.errors import ModelError, StudyError, nearest
+from truespring.models import RULES, Springs
+from truespring.problem import Problem
+from truespring.study import Study
+
+# Poisson's ratio of a lattice of plain springs, in the plane and in space, and what differs from it by so much only
+# is it.
+_CAUCHY, _SAME = {2: 1 / 3, 3: 1 / 4}, 0.005
+
+_WORDS = {
+    "lloyd": "springs by Lloyd's rule",
+    "isotropic": "isotropic springs",
+    "least-squares": "least-squares springs",
+    "projected": "projected springs",
+    "van-gelder": "springs by Van Gelder's rule",
+    "biquadratic": "biquadratic springs",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Springs to be mapped: their `name` in files, themselves, and the names of others that are the same here."""
+
+    name: str
+    springs: Springs
+    same: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """How a sentence calls them."""
+        one = self.springs
+        words = (
+            f"springs of one's own stiffness ({self.name})"
+            if one.rule is None
+            else _WORDS.get(one.rule, f"{one.rule} springs")
+        )
+        words += f" with k_body {one.k_body:g}" if one.k_body is not None else ""
+        words += ", unsummed," if one.sharing == "single" else ""
+        return words + (" with a volume term" if one.volume else "")
+
+
+def choose(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> list[Chosen]:
+    """Return the springs asked for: names of models of the study, rules, "RULE+volume", or "all"; else the study's.
+
+    "all" are the rules made for the mesh, each once, and with a volume term those that can have one where Poisson's
+    ratio is not that of plain springs. Raises StudyError for names that are none.
+    """
+    own = {name: entry for name, entry in study.entries.items() if isinstance(entry, Springs)}
+    problem = study.problem
+    if asked is None and own:
+        names = {name: _rule_name(springs) or name for name, springs in own.items()}
+        alone = {name: list(names.values()).count(called) == 1 for name, called in names.items()}
+        given = {names[name] if alone[name] else name: springs for name, springs in own.items()}
+        return _once(given, problem, study, varies_poisson)
+    found: dict[str, Springs] = {}
+    for name in asked or ["all"]:
+        if name == "all":
+            found |= _all(problem, varies_poisson)
+        else:
+            found[name] = _named(name, own, study)
+    return _once(found, problem, study, varies_poisson)
+
+
+def _rule_name(springs: Springs) -> str:
+    """How a rule is asked for that gives just these springs, empty where none does."""
+    plain = springs.rule is not None and springs == Springs(springs.rule, volume=springs.volume)
+    return f"{springs.rule}{'+volume' if springs.volume else ''}" if plain else ""
+
+
+def _named(name: str, own: dict[str, Springs], study: Study) -> Springs:
+    if name in own:
+        return own[name]
+    rule, _, volume = name.partition("+")
+    if rule not in RULES or volume not in ("", "volume"):
+        allowed = [*own, *RULES, *(f"{one}+volume" for one in RULES if not RULES[one].coupled), "all"]
+        raise StudyError(f"rule '{name}' is unknown{nearest(name, allowed)}; allowed: {', '.join(allowed)}")
+    if study.problem.mesh.element not in RULES[rule].elements:
+        fit = [one for one in RULES if study.problem.mesh.element in RULES[one].elements]
+        raise StudyError(
+            f"rule '{rule}' is not for {study.problem.mesh.element} elements, of which this study's body is made; "
+            f"for them there are {', '.join(fit)}"
+        )
+    return Springs(rule, volume=bool(volume))
+
+
+def _all(problem: Problem, varies_poisson: bool) -> dict[str, Springs]:
+    found = {name: Springs(name) for name, rule in RULES.items() if problem.mesh.element in rule.elements}
+    assert problem.material is not None and problem.section is not None  # a body has both
+    _, poisson = problem.section.apparent_moduli(problem.material)
+    if varies_poisson or abs(poisson - _CAUCHY[problem.mesh.dim]) > _SAME:
+        for name in list(found):
+            springs = None if found[name].coupled else Springs(name, volume=True)
+            if springs is not None and _goes(problem, springs):
+                found[f"{name}+volume"] = springs
+    return found
+
+
+def _goes(problem: Problem, springs: Springs) -> bool:
+    try:
+        springs.potential(problem)
+    except ModelError:
+        return False
+    return True
+
+
+def _once(found: dict[str, Springs], problem: Problem, study: Study, varies_poisson: bool) -> list[Chosen]:
+    """Each of the springs once: others that give the same stiffness here are named beside the first."""
+    several: list[tuple[list[str], Springs]] = []
+    for name, springs in found.items():
+        twin = None if varies_poisson else next((one for one in several if _same(problem, one[1], springs)), None)
+        if twin is not None:
+            twin[0].append(name)
+        elif springs not in [one for _, one in several]:
+            several.append(([name], springs))
+    return [Chosen(names[0], springs, tuple(names[1:])) for names, springs in several]
+
+
+def _same(problem: Problem, one: Springs, other: Springs) -> bool:
+    if one == other:
+        return True
+    if one.coupled or other.coupled or one.volume or other.volume or one.sharing != other.sharing:
+        return False
+    try:
+        found = one.element_stiffness(problem), other.element_stiffness(problem)
+    except ModelError:
+        return False
+    return bool(np.allclose(found[0], found[1], rtol=1e-6, atol=0))  # poisson = 0.3333 is 1/3

@@ -1,0 +1,348 @@
+"""Validity maps: held against closed forms of the lattice and of the laws, and against their own whole grid."""
+
+import csv
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import truespring as ts
+from tests.closed_forms import bending_factor, lattice_tension, principal_state
+from tests.studies import STUDY
+from truespring.cli import main
+from truespring.errors import TruespringError
+from truespring.study import read_study
+from truespring.validity import Validity, map_validity, reference
+from truespring.validity.bodies import Body, Spot
+from truespring.validity.lines import polylines, spans
+from truespring.validity.loads import LOADS, scaled
+from truespring.validity.refine import LINES, Cells, Rows, crossings
+from truespring.validity.sentences import headline, verdict
+from truespring.validity.solving import Task, run_task
+
+LATTICES = {"lloyd": (5 / 16, 7 / 16), "isotropic": (3 / 8, 3 / 8)}
+# One third, as a material has it whose springs need no term of volume.
+THIRD = STUDY.replace("poisson = 0.3", "poisson = 0.33333333333")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("validity") / "small.toml"
+    file.write_text(THIRD)
+    return file
+
+
+@pytest.fixture(scope="module")
+def bent(study: Path) -> Validity:
+    return map_validity(study, loads=["bend"], rules=list(LATTICES), ranges={"depth": (1, 8), "load": (0, 0.3)})
+
+
+def _lattice(strain: float, rule: str) -> tuple[float, float]:
+    """The nominal stress over E of a lattice pulled to a strain, and its stretch across."""
+    edge, diagonal = LATTICES[rule]
+
+    def pulled(force: float) -> tuple[float, float]:
+        return lattice_tension(force, (1.0, 1.0), (edge, edge), diagonal)
+
+    force = float(brentq(lambda force: pulled(force)[0] - 1 - strain, -0.2, 0.8, xtol=1e-14))
+    return force, pulled(force)[1]
+
+
+@pytest.mark.parametrize("law", ["neo-hookean", "linear", "saint-venant-kirchhoff"])
+def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) -> None:
+    """Both moved between smooth plates: uniform stress; they differ in the force and in the stretch across."""
+    found = map_validity(study, law=law, loads=["stretch"], rules=list(LATTICES), y=None)
+    nodes = found.body.problem.mesh.nodes
+    along, across = (nodes**2).mean(axis=0)
+    for one in found.maps:
+        (curve,) = one.curves.values()
+        for strain in (0.1, 0.2, 0.3, 0.5):
+            stretch, stress = principal_state(law, 1.0, 1 / 3, (1 + strain, None, None))
+            force, narrow = _lattice(strain, one.rule.name)
+            place = int(np.abs(one.x - strain).argmin())
+            assert one.x[place] == pytest.approx(strain)
+            assert curve.stiffness_on_grid[place] == pytest.approx(force / stress[0] - 1, abs=1e-5)
+            moved = strain**2 * along + (stretch[1] - 1) ** 2 * across
+            rms = np.sqrt((narrow - stretch[1]) ** 2 * across / moved)
+            assert one.errors[0, place] == pytest.approx(max(abs(force / stress[0] - 1), rms), abs=1e-5)
+
+
+def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(study: Path) -> None:
+    """15/17 of E along the mesh; its hardening crosses the straight line where P = 0.3 E."""
+    (one,) = map_validity(study, law="linear", loads=["stretch"], rules=["lloyd"], y=None).maps
+    (curve,) = one.curves.values()
+    assert curve.stiffness_on_grid[0] == pytest.approx(-2 / 17, abs=1e-5)
+    assert one.errors[0, 0] == pytest.approx(0.118, abs=5e-4)
+    crossing = float(np.interp(0.0, curve.stiffness_on_grid, one.x))
+    exact = brentq(lambda strain: _lattice(strain, "lloyd")[0] - strain, 0.25, 0.35)
+    assert crossing == pytest.approx(exact, abs=1e-4)
+    assert crossing == pytest.approx(0.3, abs=3e-3)
+    at = int(np.abs(one.x - 0.3).argmin())
+    assert 1 + curve.stiffness_on_grid[at] == pytest.approx(0.29976 / 0.3, abs=1e-4)
+
+
+def test_bending_is_best_at_three_elements_for_lloyd_and_falls_for_isotropic(bent: Validity) -> None:
+    lloyd, isotropic = bent.maps
+    assert lloyd.y[int(lloyd.errors[:, 0].argmin())] == 3
+    small = {spot.depth: float(curve.stiffness_on_grid[0]) for spot, curve in lloyd.curves.items()}
+    for depth in (3, 4):  # in EI alone: clamp and shear are the same to both but for what meshes add
+        factor = bending_factor(5 / 16, 7 / 16, depth) / bending_factor(5 / 16, 7 / 16, 2)
+        assert (1 + small[depth]) / (1 + small[2]) == pytest.approx(factor, rel=0.02)
+    assert (np.diff(isotropic.errors[:, 0]) < 0).all()
+    assert isotropic.errors[0, 0] > 0.5 and isotropic.errors[-1, 0] < 0.03
+
+
+def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
+    """What a map tells of a level is what `compare` tells of the two paths there."""
+    lloyd, found = bent.maps[0], bent.references[0]
+    body = Body.of(read_study(study))
+    problem = body.springs_problem(LOADS["bend"], found.factor, Spot(depth=3))
+    path = ts.solve(problem, ts.Springs("lloyd"), ts.Newton(load_steps=10))
+    whole = ts.compare(path, found.solved.path, [0.04, 0.005])
+    curve = lloyd.curves[Spot(depth=3)]
+    assert curve.rms_errors[1:] == pytest.approx(whole.rms_errors, rel=1e-9)
+    assert curve.probe_errors[1:] == pytest.approx(whole.probe_errors, rel=1e-9)
+    between = np.interp(curve.sizes, curve.grid, lloyd.errors[2])
+    assert curve.rms_errors == pytest.approx(between, abs=2e-4)
+
+
+def test_the_reference_is_converged_and_says_to_what(bent: Validity, study: Path) -> None:
+    (found,) = bent.references
+    assert found.converged and found.error < 0.002 and found.tolerance == 0.002
+    assert found.order is not None and 0.8 < found.order < 3
+    finer = run_task(
+        Task(
+            Body.of(read_study(study)).reference_problem(found.load, found.factor, None, 3),
+            ts.Fem("neo-hookean", "quadratic"),
+            2,
+        )
+    )
+    apart = ts.compare(found.solved.path, finer.path).rms_errors
+    assert 0.2 * found.error < apart.max() < found.error  # what it still was off is what it had told
+    assert found.reached == pytest.approx(0.3, rel=0.02)
+
+
+def test_what_is_adaptive_has_the_lines_of_the_whole_grid(bent: Validity, study: Path) -> None:
+    whole = map_validity(
+        study,
+        loads=["bend"],
+        rules=list(LATTICES),
+        ranges={"depth": (1, 8), "load": (0, 0.3)},
+        adaptive=False,
+    )
+    assert bent.full == whole.full == whole.solves[0] == 16
+    assert bent.solves[0] < whole.solves[0]
+    for one, other in zip(bent.maps, whole.maps, strict=True):
+        for mine, theirs in zip(one.errors, other.errors, strict=True):
+            for line in LINES:
+                assert crossings(mine, line) == pytest.approx(crossings(theirs, line), abs=0.02)
+
+
+def test_rows_are_solved_where_a_line_bends() -> None:
+    """A line that is straight needs its middle, one that turns its neighbourhood, one that stands nothing."""
+    x = np.linspace(0, 1, 201)
+    solved: dict[str, int] = {}
+    fields = {
+        "standing": lambda y: 0.2 * x,
+        "straight": lambda y: 0.2 * x / (1 + y),
+        "turning": lambda y: 0.3 * np.abs(x - 0.5) + 0.4 * (y - 0.3) ** 2,
+        "far": lambda y: 0.5 + 0.1 * x,
+        "ending": lambda y: np.where(x < 0.5 + 0.4 * y, 0.2 * x, np.nan),
+    }
+    for name, field in fields.items():
+        grid = Rows(33, (0, 8, 16, 24, 32))
+        while wanted := grid.wanted():
+            grid.add({row: field(row / 32) for row in wanted})
+        solved[name] = len(grid.known)
+        exact = np.array([field(row / 32) for row in range(33)])
+        for row, errors in enumerate(grid.filled()):
+            for line in LINES:
+                assert len(crossings(errors, line)) == len(crossings(exact[row], line)), (name, row, line)
+                assert crossings(errors, line) == pytest.approx(crossings(exact[row], line), abs=0.02)
+    assert solved["standing"] == solved["far"] == 5
+    assert 5 < solved["straight"] <= 13
+    assert solved["turning"] < 33
+
+
+def test_cells_are_divided_where_a_line_passes() -> None:
+    def field(i: int, j: int) -> float:
+        return 0.004 + 0.3 * (i / 32) ** 2 + 0.1 * j / 16
+
+    grid = Cells((33, 17), (range(0, 33, 8), range(0, 17, 4)))
+    while wanted := grid.wanted():
+        grid.add({at: field(*at) for at in wanted})
+    exact = np.array([[field(i, j) for i in range(33)] for j in range(17)])
+    assert len(grid.known) < 0.6 * exact.size
+    filled = grid.filled()
+    for line in LINES:  # where it was not solved, few points are on the wrong side of a line
+        assert ((filled <= line) != (exact <= line)).mean() < 0.01
+
+
+def _with_errors(found: Validity, rows: Mapping[int, tuple[float, float]]) -> Validity:
+    """Errors that rise straight from one value to another over the load, by elements through the depth."""
+    one = found.maps[0]
+    errors = np.array([np.linspace(*rows[int(depth)], len(one.x)) for depth in one.y])
+    return replace(found, maps=(replace(one, errors=errors),))
+
+
+def test_sentences_follow_from_the_numbers(bent: Validity) -> None:
+    near, far = (0.001, 0.002), (0.3, 0.4)
+    some = _with_errors(bent, {depth: near if depth >= 5 else far for depth in range(1, 9)})
+    said = verdict(some, some.maps[0])
+    assert "springs by Lloyd's rule are within 5 % of neo-Hookean FEM up to 30 % of the length" in said
+    assert "on meshes of 5 to 8 elements through the depth" in said
+    every = _with_errors(bent, dict.fromkeys(range(1, 9), near))
+    assert "on every mesh of 1 to 8 elements through the depth" in verdict(every, every.maps[0])
+    none = _with_errors(bent, dict.fromkeys(range(1, 9), far))
+    assert "are nowhere within 5 % of neo-Hookean FEM: nearest under a small load, 30 % off" in verdict(
+        none, none.maps[0]
+    )
+    part = _with_errors(bent, dict.fromkeys(range(1, 9), (0.1, 0.0)))
+    assert "within 5 % of neo-Hookean FEM from 15 to 30 % of the length on every mesh" in verdict(part, part.maps[0])
+    assert headline(part, part.maps[0]).startswith("Within 5 % of neo-Hookean FEM from 15 to 30 %")
+    small = {spot.depth: curve.stiffness_on_grid[0] for spot, curve in bent.maps[0].curves.items()}
+    assert f"{100 * small[1]:.0f} % too stiff (1 element)" in said.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_stretches_and_lines_lie_where_errors_pass() -> None:
+    x = np.linspace(0, 1, 11)
+    errors = np.abs(x - 0.5)
+    assert spans(x, errors, 0.22) == [pytest.approx((0.28, 0.72))]
+    assert spans(x, np.where(x > 0.65, np.nan, errors), 0.22) == [pytest.approx((0.28, 0.6))]
+    assert spans(x, errors, -1.0) == []
+    assert spans(x, 0 * x, 0.1) == [(0.0, 1.0)]
+
+
+def test_a_reference_that_is_not_converged_is_said(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reference, "_MOST_UNKNOWNS", {2: 40, 3: 40})
+    assert main(["map", str(study), "--range", "depth=1:2", "--out", str(tmp_path), "--json"]) == 1
+    values = json.loads(capsys.readouterr().out)
+    (told,) = values["references"]
+    assert not told["converged"] and told["reference_error"] > told["tolerance"]
+    assert "The reference is not converged" in values["maps"][0]["verdict"]
+    page = (tmp_path / "small" / "report.html").read_text(encoding="utf-8")
+    assert "not converged" in page and "did not converge everywhere" in page
+
+
+@pytest.mark.verification
+def test_a_reference_that_ends_limits_the_map(study: Path) -> None:
+    """St. Venant-Kirchhoff's stress falls beyond a stretch of 1 / sqrt(3): no equilibrium is stable there."""
+    found = map_validity(
+        study, law="saint-venant-kirchhoff", loads=["compress"], rules=["lloyd"], y=None, ranges={"load": (0, 0.6)}
+    )
+    (one,), (end,) = found.maps, found.references
+    assert end.end and end.reached < 0.5
+    assert np.isnan(one.errors[0, one.x > end.reached * 1.01]).all()
+    assert np.isfinite(one.errors[0, one.x <= end.reached]).all()
+    assert "St. Venant-Kirchhoff FEM itself ends at" in verdict(found, one)
+
+
+def test_other_axes(study: Path) -> None:
+    """Elements of the right length suit Lloyd's squares alone; Poisson's ratio the rules that follow it."""
+    found = map_validity(study, rules=["lloyd", "isotropic"], x="aspect", y=None, ranges={"aspect": (1, 2, 2)})
+    lloyd, isotropic = found.maps
+    assert np.isfinite(lloyd.errors[0]).tolist() == [True, False, False]
+    assert "made for squares" in next(iter(lloyd.failures.values()))
+    assert "negative stiffness" in next(iter(isotropic.failures.values()))  # beyond sqrt(3)
+    ratios = map_validity(
+        study,
+        loads=["stretch"],
+        rules=["isotropic", "isotropic+volume"],
+        x="poisson",
+        y="rule",
+        ranges={"poisson": (0.1, 0.4, 2), "load": (0, 0.002)},
+    )
+    plain, corrected = ratios.maps
+    assert plain.errors.max() > 0.02 > 0.005 > corrected.errors.max()
+    assert len(ratios.figures()) == 1 and len(ratios.references) == 3
+
+
+def test_loads_are_scaled_one_and_all() -> None:
+    mesh = ts.rectangle((2.0, 1.0), (2, 1))
+    problem = ts.Problem(
+        mesh,
+        ts.Material(1.0, 0.3, 1.0),
+        ts.PlaneStress(1.0),
+        supports=[ts.Fixed("left"), ts.Fixed("right-middle", ["x"], displacement=(0.1, 0.0))],
+        loads=[ts.Force("top", (0.0, 1.0)), ts.Traction("top", (0.0, 2.0)), ts.Gravity((0.0, 3.0))],
+    )
+    half, whole = scaled(problem, 0.5).loading, problem.loading
+    assert half.external_force == pytest.approx(0.5 * whole.external_force)
+    assert half.motion() == pytest.approx(0.5 * whole.motion())
+    turned = ts.Problem(
+        mesh,
+        ts.Material(1.0, 0.3),
+        ts.PlaneStress(1.0),
+        supports=[ts.Fixed("left", rotation=0.2)],
+        loads=[ts.Moment("right", 1.0), ts.Pressure("top", 1.0)][:1],
+    )
+    assert scaled(turned, 0.5).supports[0].rotation == pytest.approx(0.1)
+    assert scaled(turned, 0.5).loads[0].moment == pytest.approx(0.5)  # type: ignore[union-attr]
+
+
+def test_the_verb_leaves_a_table_pictures_and_a_page(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["--load", "stretch", "--rule", "lloyd", "--range", "depth=1:4", "--out", str(tmp_path)]
+    assert main(["map", str(study), *asked]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("Stretched along x, springs by Lloyd's rule are within 5 % of neo-Hookean FEM from 6")
+    folder = tmp_path / "small"
+    values = json.loads((folder / "validity.json").read_text(encoding="utf-8"))
+    (one,) = values["maps"]
+    assert one["verdict"].split() == " ".join(said.splitlines()[:1]).split()
+    assert np.shape(one["errors"]) == (len(one["y"]), len(one["x"])) == (4, 121)
+    assert {len(line) for line in one["lines"]["0.05"]} and one["solved"] < one["whole_grid"] == 4
+    with (folder / "validity.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == sum(len(point["size"]) for point in one["points"])
+    assert float(rows[0]["stiffness"]) == pytest.approx(-2 / 17, abs=6e-3)
+    for kind in ("png", "svg"):
+        assert (folder / "figures" / f"validity_stretch_lloyd.{kind}").stat().st_size > 5000
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.index("12\N{NO-BREAK SPACE}% too soft") < page.index("How to read a map")
+    assert "src=" in page and not re.search(r'(src|href)="http', page)
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["--load", "strech"], "did you mean 'stretch'"),
+        (["--load", "twist"], "is for bodies in space"),
+        (["--rule", "loyd"], "did you mean 'lloyd'"),
+        (["--rule", "van-gelder"], "not for quadrilateral elements"),
+        (["--law", "mooney"], "law = 'mooney' is unknown"),
+        (["--x", "rule"], "names go along y"),
+        (["--y", "load"], "both axes are load"),
+        (["--range", "depth=1"], "depth=first:last"),
+        (["--range", "depth=0:4"], "whole numbers from 1 on"),
+        (["--range", "depht=1:4"], "did you mean 'depth'"),
+        (["--range", "poisson=0:0.4"], "no axis of this map"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], asked: list[str], told: str
+) -> None:
+    assert main(["map", str(study), *asked, "--out", str(tmp_path)]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_a_mesh_from_a_file_is_mapped_as_it_is() -> None:
+    tissue = Path(__file__).parent.parent / "examples" / "tissue.toml"
+    with pytest.raises(TruespringError, match="study's own load only"):
+        map_validity(tissue, loads=["stretch"])
+    with pytest.raises(TruespringError, match="taken as it is"):
+        map_validity(tissue, y="aspect")
+
+
+def test_lines_of_one_row_are_points(bent: Validity) -> None:
+    one = bent.maps[0]
+    row = replace(one, y=one.y[:1], errors=np.abs(one.x[None] - 0.1))
+    assert [float(part[0, 0]) for part in polylines(row)[0.05]] == pytest.approx([0.05, 0.15])
