@@ -34,6 +34,7 @@ def test_the_pages_hold_code() -> None:
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
 def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # some write files
+    shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
     exec(compile(code, page, "exec"), {})
 
 
