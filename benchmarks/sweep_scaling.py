@@ -58,7 +58,7 @@ def _pauses(workers: int, n_points: int) -> float:
 
 def _sweep(workers: int, n_points: int) -> float:
     """Seconds for a sweep of equal points, from the start of its workers to the last record."""
-    vary = {"material.density": [1000.0 + number for number in range(n_points)], "mesh.elements": [[64, 16]]}
+    vary = {"material.density": [1000.0 + number for number in range(n_points)], "mesh.elements": [[32, 8]]}
     plan = plan_sweep(_STUDY, vary)
     with tempfile.TemporaryDirectory() as folder:
         return _timed(lambda: run_sweep(plan, Path(folder), workers))

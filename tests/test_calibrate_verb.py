@@ -12,8 +12,11 @@ from tests.test_examples import EXAMPLES
 from truespring.calibration import turned
 from truespring.cli import main
 from truespring.errors import MeshError, StudyError
-from truespring.mesh import rectangle
+from truespring.loading import Fixed, Moment
+from truespring.material import Material
+from truespring.mesh import box, rectangle
 from truespring.models import GivenSprings, Springs
+from truespring.problem import Problem
 from truespring.report.result import head_note
 from truespring.report.series import write_mesh
 from truespring.study import export_study, read_study, run
@@ -221,6 +224,13 @@ def test_loads_are_turned_and_those_that_follow_stay() -> None:
     other = turned(problem, np.pi / 2)
     assert other is not None
     assert other.loading.external_force.sum(axis=0) == pytest.approx([0.0428, 0.0], abs=1e-12)
+    supports = [Fixed("left"), Fixed("right", displacement=(0.0, 0.003, -0.004))]
+    solid = Problem(box((0.02, 0.01, 0.01), (2, 1, 1)), Material(1e3, 0.3), supports=supports)
+    aside = turned(solid)  # about x, along which nothing moves
+    assert aside is not None and aside.supports[0] == solid.supports[0]
+    assert aside.supports[1].displacement == pytest.approx(np.array([0.0, 0.007, -0.001]) / np.sqrt(2))
+    bent = Problem(problem.mesh, problem.material, problem.section, Fixed("left"), Moment("right", 1e-3))
+    assert turned(bent) is None
 
 
 @pytest.mark.parametrize("name", sorted(file.stem for file in (EXAMPLES / "loads").glob("bending*.toml")))

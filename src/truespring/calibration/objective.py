@@ -1,7 +1,7 @@
 """How far springs are from what is known, and how that changes with the unknowns: by equilibria that are solved."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.calibration.cases import LoadCase, Observation
 from truespring.calibration.unknowns import Unknowns
-from truespring.equilibrium import Path, State, solve
+from truespring.equilibrium import Path, State, Status, solve
 from truespring.errors import ModelError
 from truespring.linear.choice import Tangent, choose
 from truespring.linear.direct import SingularMatrixError
@@ -35,12 +35,14 @@ class Objective:
     """J(c) = 1/2 mean of the squared relative errors + regularisation^2 / 2 mean of (c - 1)^2.
 
     The mean is over all observations of all cases, each error |B x(c) - y|, x(c) the equilibrium at its level,
-    over the size of what is known of that kind at the case's last level.
+    over the size of what is known of that kind at the case's last level. Where a path ends early, or is unstable or
+    inverted but for the cases by name that are `excused`, J is infinite.
     """
 
     unknowns: Unknowns
     cases: Sequence[LoadCase]
     regularisation: float
+    excused: Container[str] = ()
     solves: int = 0
     _last: tuple[Floats, list[Path] | None] | None = field(default=None, repr=False)
 
@@ -63,7 +65,7 @@ class Objective:
             except ModelError:  # a mechanism
                 return None
             self.solves += 1
-            if not path.complete:
+            if not path.complete or (path.status is not Status.CONVERGED and case.name not in self.excused):
                 return None
             found.append(path)
         return found

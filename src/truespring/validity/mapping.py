@@ -82,7 +82,7 @@ def map_validity(
         y=run.y,
         axes=run.axes,
         maps=maps,
-        references=tuple(run.references.values()),
+        references=tuple(run.references[key] for key in run.reference_order),
         tolerance=read.tolerance,
         solves=(run.solved, sum(one.solves for one in run.spent)),
         full=sum(one.full for one in maps),
@@ -156,6 +156,12 @@ class _Run:
         self.spent: list[Reference] = []
         self.found: dict[Key, Curve | Failure] = {}
         self.solved, self.done, self.wanted = 0, 0, 0
+
+    @property
+    def reference_order(self) -> list[tuple[str, float | None]]:
+        """The references by load as they were asked for, then by Poisson's ratio."""
+        names = [load.name for load in self.loads]
+        return sorted(self.references, key=lambda key: (names.index(key[0]), key[1] or 0.0))
 
     def maps(self) -> Iterator[Map]:
         """Solve round by round, each of what all maps want next; yield them at the end."""

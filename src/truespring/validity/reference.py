@@ -216,7 +216,7 @@ def _estimate(changes: list[float], settling: Settling) -> tuple[float, float | 
     if not changes:
         return math.inf, None
     error, order = changes[-1], None
-    if len(changes) > 1 and changes[-1] > 0:
+    if len(changes) > 1 and min(changes[-2:]) > 0:
         found = math.log2(changes[-2] / changes[-1])
         if _ORDERS[0] <= found <= _ORDERS[1]:
             order, error = found, _SAFETY * changes[-1] / (2**found - 1)
