@@ -28,7 +28,7 @@ _UNITS = {
     **dict.fromkeys(("force",), "N"),
     **dict.fromkeys(("moment",), "N m"),
 }
-_STYLES = (
+_STYLES: tuple[tuple[str, Any, str], ...] = (
     (BLUE, "-", "o"),
     ("#000000", (0, (6, 2)), "s"),
     ("#b84a00", (0, (3, 1.5, 1, 1.5)), "^"),
@@ -147,8 +147,9 @@ def _curves(key: str, rows: Sequence[Row], what: Measured, groups: Mapping[str, 
             known = [at for at in groups[group] if what.values[name][at] is not None]
             if known:
                 y = np.array([what.values[name][at] for at in known], dtype=np.float64)
-                style = _STYLES[place % len(_STYLES)]
-                curves.append(Curve(x[known], y, *style, label=name if alone else group, strong=False))
+                color, dashes, marker = _STYLES[place % len(_STYLES)]
+                called_so = name if alone else group
+                curves.append(Curve(x[known], y, color, dashes, marker, called_so, strong=False))
         if curves:
             yield plot(title, label, what.label, curves).sheet
 
