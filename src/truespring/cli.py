@@ -104,9 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(
         add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
     )
-    _add_map(
-        add("map", _map, "map up to which load, on which meshes, the springs of a study are within 5 percent of FEM", False)
-    )
+    _add_map(add("map", _map, "map up to which load and on which meshes springs are within 5 percent of FEM", False))
     add("check", _check, "check a study and show what would be run, solving nothing")
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
