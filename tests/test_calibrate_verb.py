@@ -238,3 +238,21 @@ def test_the_shipped_loads_are_those_of_the_shipped_body(name: str) -> None:
     mine, theirs = (read_study(EXAMPLES / file).problem for file in (f"loads/{name}.toml", "bending.toml"))
     assert np.array_equal(mine.mesh.nodes, theirs.mesh.nodes) and mine.material == theirs.material
     assert not np.array_equal(mine.loading.external_force, theirs.loading.external_force)
+
+
+@pytest.mark.verification
+def test_the_organ_is_nearer_to_its_reference_under_loads_that_were_held_out(tmp_path: Path) -> None:
+    """Some minutes; docs/calibration.md has the figures."""
+    study, pushed, aside, back = (
+        read_study(EXAMPLES / f"{name}.toml")
+        for name in ("organ", "loads/organ_pushed", "loads/organ_aside", "loads/organ_back")
+    )
+    found = calibrate_study(study, [pushed], [aside, back])
+    assert found.calibration.converged and found.calibration.warnings == ()
+    for one in found.calibration.cases:
+        before, after = one.pair
+        assert before is not None and after is not None and after < 0.9 * before < 0.09
+    files = write_calibrated(found, tmp_path, "")
+    carried = export_study(read_study(files[0]), ["json"], tmp_path)
+    header = json.loads((tmp_path / "calibrated" / "springs.json").read_text(encoding="utf-8"))["header"]
+    assert carried[0].converged and any(found.calibration.headline in line for line in header)

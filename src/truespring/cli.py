@@ -104,14 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(
         add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
     )
-    _add_map(
-        add(
-            "map",
-            _map,
-            "map up to which load, on which meshes, the springs of a study are within 5 percent of FEM",
-            False,
-        )
-    )
+    _add_map(add("map", _map, "map up to which load and on which meshes springs are within 5 percent of FEM", False))
     add("check", _check, "check a study and show what would be run, solving nothing")
     verb = add(
         "table1", _table1, "measure the paper's Table 1: six methods on one body, beside its signs", studies=False

@@ -28,7 +28,7 @@ _UNITS = {
     **dict.fromkeys(("force",), "N"),
     **dict.fromkeys(("moment",), "N m"),
 }
-_STYLES = (
+_STYLES: tuple[tuple[str, Any, str], ...] = (
     (BLUE, "-", "o"),
     ("#000000", (0, (6, 2)), "s"),
     ("#b84a00", (0, (3, 1.5, 1, 1.5)), "^"),
@@ -148,7 +148,8 @@ def _curves(key: str, rows: Sequence[Row], what: Measured, groups: Mapping[str, 
             if known:
                 y = np.array([what.values[name][at] for at in known], dtype=np.float64)
                 color, dashes, marker = _STYLES[place % len(_STYLES)]
-                curves.append(Curve(x[known], y, color, dashes, marker, name if alone else group, strong=False))
+                called_so = name if alone else group
+                curves.append(Curve(x[known], y, color, dashes, marker, called_so, strong=False))
         if curves:
             yield plot(title, label, what.label, curves).sheet
 
