@@ -8,7 +8,8 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models import LAWS
-from truespring.report.frame import EDGE, SIZE, draw_frame
+from truespring.report.frame import EDGE, SIZE, round_numbers, written
+from truespring.report.lines import draw_lines
 from truespring.report.quantity import tolerance_percent
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import INK, POINT
@@ -68,7 +69,8 @@ def map_figure(validity: Validity, one: Map) -> Sheet:
         for path in _filled(x, y, errors, low, high):
             _add_filled(area, path, color)
     _draw_solved(area, validity, one)
-    draw_frame(area, _x_label(validity, one), validity.axes[str(validity.y)].label)
+    whole = one.y if validity.y == "depth" else None
+    _draw_axes(area, _x_label(validity, one), validity.axes[str(validity.y)].label, whole)
     _draw_lines(area, contours(x, y, errors))
     _draw_legend(sheet, validity, one, _LEFT + _WIDTH + 0.16, _BOTTOM + _HEIGHT, missing)
     return sheet
@@ -81,7 +83,7 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
     names = [row_words(validity, one, shared) for one in maps]
     left = max(text_width(name, SIZE) for name in names) + 0.25
     height = _STRIP * len(maps)
-    title = {"rule": first.load.did, "load-type": first.rule.words.capitalize()}.get(
+    title = {"rule": first.load.did, "load-type": first.rule.words[0].upper() + first.rule.words[1:]}.get(
         str(validity.y), f"{first.load.did}: {first.rule.words}"
     )
     top = _TOP if len(maps) == 1 else _TOP - 0.2
@@ -102,7 +104,7 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
         x = one.x * (100.0 / one.x[-1] if shared else scale)
         _draw_strip(area, x, one, float(row))
         draw_words(sheet, left - 0.1, bottom + _STRIP * (row + 0.5), names[::-1][row], SIZE, align=1.0)
-    _draw_x(area, "size of the load [% of each range]" if shared else _x_label(validity, first))
+    _draw_axes(area, "size of the load [% of each range]" if shared else _x_label(validity, first))
     _draw_legend(sheet, validity, first, left + _WIDTH + 0.16, _BOTTOM + room, missing)
     return sheet
 
@@ -181,15 +183,26 @@ def _draw_marks(area: Area, at: Sequence[float], bottom: float) -> None:
         area.add(Line2D([place, place], [bottom + 0.08, bottom + 0.92], color="white", lw=0.8, zorder=2))
 
 
-def _draw_x(area: Area, label: str) -> None:
-    """The frame of strips, which have names instead of numbers along y."""
-    from truespring.report.frame import round_numbers, written
-
+def _draw_axes(area: Area, x_label: str, y_label: str = "", whole: Floats | None = None) -> None:
+    """Draw axes, ticks, numbers and what they stand for; along y none without a label, and `whole` numbers as given."""
+    sheet, tick = area.sheet, 3.5 * POINT
+    left, bottom, right, top = area.left, area.bottom, area.left + area.width, area.bottom + area.height
     values = round_numbers(*area.x)
-    for at, told in zip(values, written(values), strict=True):
-        x, _ = area.place(np.array([at, 0.0]))
-        draw_words(area.sheet, x, area.bottom - 10 * POINT, told, SIZE, align=0.5)
-    draw_words(area.sheet, area.left + area.width / 2, area.bottom - 24 * POINT, label, SIZE, align=0.5)
+    places = [float(area.place(np.array([at, area.y[0]]))[0]) for at in values]
+    edges = [((left, bottom), (right, bottom)), *(((at, bottom), (at, bottom - tick)) for at in places)]
+    for at, told in zip(places, written(values), strict=True):
+        draw_words(sheet, at, bottom - tick - 7 * POINT, told, SIZE, align=0.5)
+    draw_words(sheet, left + area.width / 2, bottom - tick - 21 * POINT, x_label, SIZE, align=0.5)
+    if y_label:
+        values = round_numbers(*area.y) if whole is None else whole[:: 1 + len(whole) // 12]
+        heights = [float(area.place(np.array([area.x[0], at]))[1]) for at in values]
+        edges += [((left, bottom), (left, top)), *(((left, at), (left - tick, at)) for at in heights)]
+        numbers = written(values) if whole is None else [f"{value:g}" for value in values]
+        for at, told in zip(heights, numbers, strict=True):
+            draw_words(sheet, left - 2 * tick, at, told, SIZE, align=1.0)
+        beside = left - 2 * tick - max(text_width(told, SIZE) for told in numbers) - 7 * POINT
+        draw_words(sheet, beside, (bottom + top) / 2, y_label, SIZE, align=0.5, upright=True)
+    draw_lines(sheet, np.array(edges), EDGE, 0.7, 2.5, "axes")
 
 
 def _draw_solved(area: Area, validity: Validity, one: Map) -> None:

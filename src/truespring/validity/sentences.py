@@ -23,8 +23,8 @@ def verdict(validity: Validity, one: Map) -> str:
     """Return the verdict of a map."""
     if one.refused:
         return f"{one.load.did}, {one.rule.words} cannot be had: {one.refused}."
-    said = [_by_load(validity, one), *_small(one), *_ends(one)] if validity.x == "load" else [_by_mesh(validity, one)]
-    return " ".join([*said, *_left_out(one), *_unsure(one)])
+    said = [_by_load(validity, one), *_small(one)] if validity.x == "load" else [_by_mesh(validity, one)]
+    return " ".join([*said, *_ends(one), *_left_out(one), *_unsure(one)])
 
 
 def _by_load(validity: Validity, one: Map) -> str:
@@ -139,6 +139,8 @@ def _run(axis: str | None, first: float, last: float) -> str:
         case "depth":
             return f"on meshes of {values} {_elements(last)} through the depth"
         case "aspect":
+            if values == "1":
+                return "with elements as long as high"
             return f"with elements {values} times as long as high"
         case "poisson":
             return f"at {'a ' if first == last else ''}Poisson's ratio{'' if first == last else 's'} of {values}"
@@ -202,7 +204,7 @@ def _left_out(one: Map) -> list[str]:
 def _unsure(one: Map) -> list[str]:
     """Say where the reference is not converged."""
     worst = max(one.references.values(), key=lambda reference: reference.error)
-    return [] if worst.converged else [unconverged(worst)]
+    return [] if worst.converged else [f"The reference is not converged: it may be {percent(worst.error)} off itself."]
 
 
 def unconverged(reference: Reference) -> str:
@@ -229,11 +231,12 @@ def _by_mesh(validity: Validity, one: Map) -> str:
     if len(rows) == 1:
         where = " and ".join(_run(validity.x, *_on_grid(one.x, validity.x, span)) for span in rows[0])
         return f"{begin} within {tolerance_percent(line)} of {law} {where}."
-    told = []
-    for chosen, found in _grouped(rows, float(one.x[-1] - one.x[0])):
-        where = " and ".join(_run(validity.x, *_on_grid(one.x, validity.x, span)) for span in found) or "nowhere"
-        told.append(f"{where} {_rows(validity, one, [row in chosen for row in range(len(rows))])}")
-    return f"{begin} within {tolerance_percent(line)} of {law} {'; '.join(told)}."
+    groups = _grouped(rows, float(one.x[-1] - one.x[0]))
+    chosen, found = max(groups, key=lambda group: sum(end - begin + 1e-9 for begin, end in group[1]))
+    where = " and ".join(_run(validity.x, *_on_grid(one.x, validity.x, span)) for span in found)
+    on = _rows(validity, one, [row in chosen for row in range(len(rows))])
+    less = ", less elsewhere" if len(groups) > 1 else ""
+    return f"{begin} within {tolerance_percent(line)} of {law} {where} {on}{less}."
 
 
 def _on_grid(x: Floats, axis: str, span: tuple[float, float]) -> tuple[float, float]:

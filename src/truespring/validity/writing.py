@@ -230,7 +230,7 @@ def _groups(validity: Validity, drawings: Mapping[str, Drawing]) -> Iterator[dic
         begins = f"validity_{name.replace('+', '_')}"
         kept = [drawn for stem, drawn in drawings.items() if stem == begins or stem.startswith(f"{begins}_")]
         yield {
-            "title": maps[0].rule.words.capitalize() if by_rule else maps[0].load.did,
+            "title": maps[0].rule.words[0].upper() + maps[0].rule.words[1:] if by_rule else maps[0].load.did,
             "how": "" if by_rule else maps[0].load.how,
             "verdicts": [verdict(validity, one).partition(one.rule.words) for one in maps],
             "same": [
