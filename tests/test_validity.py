@@ -239,6 +239,7 @@ def test_a_reference_that_ends_limits_the_map(study: Path) -> None:
     )
     (one,), (end,) = found.maps, found.references
     assert end.end and end.reached < 0.5
+    assert not any(state.branched or state.negative_eigenvalues for state in end.solved.states)
     assert np.isnan(one.errors[0, one.x > end.reached * 1.01]).all()
     assert np.isfinite(one.errors[0, one.x <= end.reached]).all()
     assert "St. Venant-Kirchhoff FEM itself ends at" in verdict(found, one)
@@ -262,6 +263,19 @@ def test_other_axes(study: Path) -> None:
     plain, corrected = ratios.maps
     assert plain.errors.max() > 0.02 > 0.005 > corrected.errors.max()
     assert len(ratios.figures()) == 1 and len(ratios.references) == 2
+
+
+def test_a_valley_between_two_rows_is_not_filled(study: Path) -> None:
+    """Where springs cross the reference at another strain for each Poisson's ratio, they do so between two as well."""
+    (one,) = map_validity(
+        study, loads=["stretch"], rules=["projected"], y="poisson", ranges={"poisson": (0.25, 0.4, 2)}
+    ).maps
+    y, errors = one.smooth
+    lowest = errors.min(axis=1)
+    assert len(y) == 9 and y[::4] == pytest.approx(one.y)
+    assert (errors.argmin(axis=1) > 0).all() and len(set(errors.argmin(axis=1).tolist())) > 3
+    for first in (0, 4):
+        assert lowest[first + 1 : first + 4].max() < lowest[[first, first + 4]].max() + 1e-3
 
 
 def test_loads_are_scaled_one_and_all() -> None:
