@@ -29,7 +29,7 @@ from truespring.table1.bodies import (
 from truespring.table1.entries import Entry
 
 #: Poisson's ratios at which the realised material is asked for.
-RATIOS = (0.0, 0.1, 0.2, 0.3, 1 / 3, 0.4, 0.45)
+RATIOS = (0.0, 0.1, 0.2, 0.25, 0.3, 1 / 3, 0.4, 0.45)
 
 #: Elements through the depth that are tried for an error of 1 %.
 DEPTHS = (2, 3, 4, 6, 8, 12, 16, 24, 32)

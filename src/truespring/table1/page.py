@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from truespring.table1.bodies import POISSON
 from truespring.table1.entries import CRITERIA, METHODS, PRINTED
 from truespring.table1.measures import RATIOS
 from truespring.table1.run import sizes
@@ -71,7 +72,8 @@ def _of_dim(rows: list[Row], dim: int, figure: str) -> Iterator[str]:
 def _figures(rows: list[Row], dim: int) -> Iterator[str]:
     heads = ["solve [ms]", "force [ms]"]
     heads += ["1 % from, in [ms]"] if dim == 2 else []
-    heads += ["moduli off at ν = 0, 1/3, 0.45", "small load", "on a fine mesh", "within 5 % up to"]
+    own = "1/3" if dim == 2 else "1/4"
+    heads += [f"moduli off at ν = 0, {own}, 0.45", "small load", "on a fine mesh", "within 5 % up to"]
     yield "| method | " + " | ".join(heads) + " |"
     yield "|---" * (1 + len(heads)) + "|"
     for row in rows:
@@ -104,7 +106,7 @@ def _time(row: Row) -> str:
 
 def _moduli(row: Row) -> str:
     errors = {one["poisson"]: one["error"] for one in row.get("moduli_errors", [])}
-    return ", ".join(_percent(errors.get(ratio)) for ratio in (RATIOS[0], 1 / 3, RATIOS[-1]))
+    return ", ".join(_percent(errors.get(ratio)) for ratio in (RATIOS[0], POISSON[row["dim"]], RATIOS[-1]))
 
 
 def _reach(row: Row) -> str:

@@ -94,8 +94,8 @@ IF = {
         "Poisson's ratio along its axes."
     ),
     ("material properties", "MSM"): (
-        "the springs would have to have a volume term for +, or no ratio at all for -: pure springs realise "
-        "one Poisson's ratio."
+        "the isotropic rule would have to be meant, which realises one Poisson's ratio; with a volume term "
+        "springs realise all of them."
     ),
     ("material properties", "HEML"): ("the law of the links would have to be fitted, not derived."),
     ("material properties", "BEM + MSM"): (
