@@ -202,7 +202,7 @@ SMALL, LARGE = (1e-4, (-2.6548e-05, -6.68281e-03)), (0.0107, (-0.18417, -0.53139
 def test_a_bent_strip(model: Model, element: str, small: float, large: float) -> None:
     """Distances from the converged end at small load and where it has moved by 53 % of the length, 16 x 4 elements.
 
-    The numbers are those of an independent prototype: triangles and quadrilaterals in plain NumPy.
+    The numbers are those of another program: triangles and quadrilaterals in plain NumPy.
     """
     for (load, reference), expected in ((SMALL, small), (LARGE, large)):
         assert apart(end(element, model, (0.0, -load)), np.array(reference)) == pytest.approx(expected, abs=0.002)

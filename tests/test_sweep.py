@@ -571,3 +571,9 @@ def test_two_hundred_points_whose_workers_and_scheduler_are_killed(tmp_path: Pat
     assert killed >= 3 and schedulers == 1, "it was disturbed"
     assert found["n_points"] == len(records(tmp_path / "out")) == 200 and not found["n_failed"]
     assert unclocked(found["rows"]) == unclocked(wanted["rows"])
+
+
+@pytest.mark.parametrize("workers", [0, -3])
+def test_without_workers_nothing_is_solved(workers: int) -> None:
+    with pytest.raises(ts.TruespringError, match="1 or more"):
+        ts.sweep("examples/bending.toml", {"material.young": ["1 kPa"]}, workers=workers)

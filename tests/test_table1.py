@@ -96,10 +96,8 @@ def test_moduli_errors_are_those_of_closed_forms() -> None:
         ("mass-tensor", "St. Venant", 0.130),
     ],
 )
-def test_small_load_errors_are_those_of_an_independent_prototype(
-    method: str, name: str, published: float, coarse: None
-) -> None:
-    """On 16 x 4 elements; the prototype was written apart, with a reference of its own."""
+def test_small_load_errors_are_those_of_another_program(method: str, name: str, published: float, coarse: None) -> None:
+    """On 16 x 4 elements; found by plain NumPy code against a reference of its own."""
     assert accuracy(entry(method, name), Size(2, 4), Size(2, 4))["small_error"] == pytest.approx(published, rel=0.04)
 
 
@@ -109,7 +107,9 @@ def test_speed_and_reach_are_measured(coarse: None) -> None:
     finite = reach(entry("FEM", "neo-Hookean"), Size(2, 8))
     assert finite["ended_by"] == "the largest load" and finite["deflection_within_5_percent"] > 0.6
     linear = reach(entry("FEM", "linear"), Size(2, 8))
-    assert linear["ended_by"] == "the error" and linear["deflection_within_5_percent"] < 0.2
+    assert linear["ended_by"] == "the error"
+    # What a linear law misses is the shortening, 3/5 of the squared deflection over the length in a cubic beam.
+    assert linear["deflection_within_5_percent"] == pytest.approx(0.05 * 5 / 3, rel=0.15)
 
 
 def test_the_mesh_for_one_percent_is_one_from_which_on_all_are_enough(

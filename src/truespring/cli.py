@@ -104,7 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(
         add("calibrate", _calibrate, "fit the springs of a study to a reference, test them on other loads", False)
     )
-    _add_map(add("map", _map, "map up to which load and on which meshes springs are within 5 percent of FEM", False))
+    _add_map(add("map", _map, "map up to which load and on which meshes springs are near FEM", False))
     add("check", _check, "check a study and show what would be run, solving nothing")
     verb = add(
         "table1", _table1, "measure the paper's Table 1: six methods on one body, beside its signs", studies=False
@@ -167,7 +167,7 @@ def _add_map(verb: argparse.ArgumentParser) -> None:
         action="append",
         metavar="R",
         help="a springs model of the study, a rule, RULE+volume, or all that are for its mesh; may be given again; "
-        "default: the springs of the study",
+        "default: the springs of the study, all rules where it has none",
     )
     verb.add_argument("--x", default="load", metavar="A", help="load (default), depth, aspect or poisson")
     verb.add_argument(

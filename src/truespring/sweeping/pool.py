@@ -85,6 +85,8 @@ class Pool:
         require_dask()
         if workers is not None and scheduler is not None:
             raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one")
+        if workers is not None and workers < 1:
+            raise TruespringError(f"workers = {workers} is not allowed: 1 or more, or None for as many as cores")
         self.scheduler, self.threads, self.patience = scheduler, threads, patience
         self.workers = workers
         self._report = report or (lambda _: None)

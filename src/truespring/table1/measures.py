@@ -169,21 +169,32 @@ def to_one_percent(entry: Entry, dim: int = 2) -> dict[str, float | int | None]:
 def reach(entry: Entry, size: Size) -> dict[str, float | str]:
     """Return the largest deflection over length up to which the end is within 5 % of converged neo-Hookean FEM.
 
-    Contiguous from zero, through stable states; `ended` tells what ended it.
+    Contiguous from a small load, through stable states, and interpolated where the error passes 5 %; `ended_by` tells
+    what ended it.
     """
-    wanted = reference(size.dim, large=True)
-    problem = cantilever(size, entry.element(size.dim), LARGEST)
-    path = solve(problem, entry.model(size.dim, POISSON[size.dim]), followed())
-    last, ended = 0.0, "the largest load"
-    for state in wanted.states[1:]:
-        mine = path.at(state.load_factor)
+    small = solve(
+        cantilever(size, entry.element(size.dim), SMALL), entry.model(size.dim, POISSON[size.dim]), followed()
+    )
+    path = solve(
+        cantilever(size, entry.element(size.dim), LARGEST), entry.model(size.dim, POISSON[size.dim]), followed()
+    )
+    at_small, at_large = reference(size.dim, large=False), reference(size.dim, large=True)
+    pairs = [(small.at(1.0), at_small, at_small.states[-1], small)]
+    pairs += [(path.at(state.load_factor), at_large, state, path) for state in at_large.states[1:]]
+    last, error = 0.0, 0.0
+    for count, (mine, wanted, state, found) in enumerate(pairs):
         if mine is None or mine.negative_eigenvalues or mine.area_ratio <= 0:
             ended = "no stable state" if mine is None or mine.negative_eigenvalues else "an inverted element"
             break
         given = end_displacement(wanted, state)
-        error = float(np.linalg.norm(end_displacement(path, mine) - given) / np.linalg.norm(given))
+        before, error = error, float(np.linalg.norm(end_displacement(found, mine) - given) / np.linalg.norm(given))
+        here = float(given[1]) / LENGTH
         if error >= _FIVE_PERCENT:
+            if count:
+                last += (here - last) * (_FIVE_PERCENT - before) / (error - before)
             ended = "the error"
             break
-        last = float(given[1]) / LENGTH
+        last = here
+    else:
+        ended = "the largest load"
     return {"deflection_within_5_percent": last, "ended_by": ended}

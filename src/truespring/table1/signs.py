@@ -11,7 +11,7 @@ Row = Mapping[str, Any]
 MEANING = {
     "computational speed": (
         "+ where an equilibrium takes at most half as long as FEM on the same mesh, - where more than twice "
-        "as long; FEM itself is +/-"
+        "as long or where no stable one is found; FEM itself is +/-"
     ),
     "material properties": (
         "+ where the moduli are within 5 % of the material's at every Poisson's ratio from 0 to 0.45, - where at none"
@@ -75,7 +75,7 @@ IF = {
     ("computational speed", "FEM"): ("FEM would have to be coded as loops over Gauss points that an interpreter runs."),
     ("computational speed", "Terzopoulos"): (
         "the force would have to be all that counts, as where time is stepped explicitly: one is cheap. An "
-        "equilibrium is not: with his boundary a fine grid has many that are unstable."
+        "equilibrium is not, and in the plane a fine grid with his boundary has many that are unstable."
     ),
     ("computational speed", "MSM"): (
         "the force evaluation alone would have to be compared, which is many times cheaper; in an "
@@ -110,8 +110,8 @@ IF = {
         "direction across."
     ),
     ("results accuracy", "MSM"): (
-        "Lloyd's springs would have to be judged on one mesh only: their error at four elements through the "
-        "depth is two errors that cancel there, and does not vanish on fine meshes."
+        "springs would have to be judged in the plane on one mesh only: Lloyd's error at four elements through the "
+        "depth is two errors that cancel there. On fine meshes none vanishes, and on cubes nothing cancels."
     ),
     ("results accuracy", "HEML"): (
         "HEML would have to be something else than finite elements: with the same law on the same elements "
@@ -119,7 +119,7 @@ IF = {
     ),
     ("results accuracy", "BEM + MSM"): ("the springs would have to be few beside the boundary elements."),
     ("results accuracy", "mass-tensor"): (
-        "finer meshes would have to be taken: triangles of first order lock in bending."
+        "finer meshes would have to be taken: triangles and tetrahedra of first order lock in bending."
     ),
     ("large deflection", "FEM"): (
         "a law would have to be taken that resists compression: St. Venant-Kirchhoff loses its solution, "
@@ -129,12 +129,12 @@ IF = {
         "it would have to be linear; the metric tensor is not, it follows any rotation."
     ),
     ("large deflection", "MSM"): (
-        "the mesh would have to be three or four elements deep, where Lloyd's springs bend right: on finer "
-        "ones they are more than 5 % off from the start."
+        "squares three or four deep would have to be taken, where Lloyd's springs bend right. On finer ones, "
+        "and on cubes, they are more than 5 % off from the start; the isotropic rule in the plane is not."
     ),
     ("large deflection", "HEML"): (
-        "the law would have to be St. Venant-Kirchhoff, which ends where elements are compressed by half; "
-        "with the neo-Hookean law it goes on."
+        "more would have to be asked than half the length: with St. Venant-Kirchhoff's law it ends between that and "
+        "the whole length, as finite elements of that law do."
     ),
     ("large deflection", "BEM + MSM"): (
         "the block would have to be kept from turning: let to turn as a whole, it follows."

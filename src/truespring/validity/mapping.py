@@ -52,7 +52,8 @@ def map_validity(
         study: a study file, or one that was read.
         law: of the reference, a key of LAWS; it is solved on finer and finer meshes until it changes no more.
         loads: load types, keys of LOADS, or "all"; by default the study's own load.
-        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs.
+        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs,
+            or all rules where it has none.
         x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
         y: another of them, or "rule" or "load-type", or None. A mesh from a file has no depth: "rule" there.
         ranges: first, last and if wanted the number of intervals at the finest, by axis; the load's from 0 on.
