@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from truespring.errors import ExportError
 from truespring.exports.decks import (
+    LAST_ONLY,
     Dialect,
     Step,
     check_fem,
@@ -20,8 +21,6 @@ from truespring.exports.decks import (
     spring_twin,
 )
 from truespring.exports.exported import Exported
-
-_LAST_ONLY = "FREQUENCY=1000000"  # of a step: the last increment is written always
 
 
 def abaqus(exported: Exported) -> dict[str, str]:
@@ -79,16 +78,16 @@ def _start(step: Step, nonlinear: bool) -> list[str]:
 
 def _output(continuum: bool) -> list[str]:
     return [
-        f"*OUTPUT, FIELD, {_LAST_ONLY}",
+        f"*OUTPUT, FIELD, {LAST_ONLY}",
         "*NODE OUTPUT",
         "U, RF",
         *(["*ELEMENT OUTPUT", "S, LE"] if continuum else []),
-        f"*OUTPUT, HISTORY, {_LAST_ONLY}",
+        f"*OUTPUT, HISTORY, {LAST_ONLY}",
         "*ENERGY OUTPUT",
         "ALLSE",
-        f"*NODE PRINT, NSET=NALL, {_LAST_ONLY}, SUMMARY=NO",
+        f"*NODE PRINT, NSET=NALL, {LAST_ONLY}, SUMMARY=NO",
         "U",
-        f"*NODE PRINT, NSET=HELD, {_LAST_ONLY}, SUMMARY=NO, TOTALS=YES",
+        f"*NODE PRINT, NSET=HELD, {LAST_ONLY}, SUMMARY=NO, TOTALS=YES",
         "RF",
     ]
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from truespring.errors import ExportError
 from truespring.exports.decks import (
+    LAST_ONLY,
     Dialect,
     Step,
     check_fem,
@@ -33,7 +34,6 @@ FORCE_UNIT = 1e-6
 # By default it stops at a residual of 0.5 % of the mean force, from the ninth iteration on 2 %, and a correction of
 # 1 % of the displacement; these are less than it prints.
 _CONTROLS = ["*CONTROLS, PARAMETERS=FIELD", "1.E-7, 1.E-7, , , 1.E-7"]
-_LAST_ONLY = "FREQUENCY=1000000"  # of a step: the last increment is printed always
 
 
 def fem_deck(
@@ -116,14 +116,14 @@ def _start(step: Step, nonlinear: bool) -> list[str]:
 
 def _output(continuum: bool) -> list[str]:
     return [
-        f"*NODE PRINT, NSET=NALL, {_LAST_ONLY}",
+        f"*NODE PRINT, NSET=NALL, {LAST_ONLY}",
         "U",
-        f"*NODE PRINT, NSET=HELD, {_LAST_ONLY}",
+        f"*NODE PRINT, NSET=HELD, {LAST_ONLY}",
         "RF",
-        *([f"*EL PRINT, ELSET=BODY, TOTALS=ONLY, {_LAST_ONLY}", "ELSE"] if continuum else []),
-        f"*NODE FILE, OUTPUT=2D, {_LAST_ONLY}",  # results of plane elements at the nodes that were given
+        *([f"*EL PRINT, ELSET=BODY, TOTALS=ONLY, {LAST_ONLY}", "ELSE"] if continuum else []),
+        f"*NODE FILE, OUTPUT=2D, {LAST_ONLY}",  # results of plane elements at the nodes that were given
         "U, RF",
-        *([f"*EL FILE, OUTPUT=2D, {_LAST_ONLY}", "S, E"] if continuum else []),
+        *([f"*EL FILE, OUTPUT=2D, {LAST_ONLY}", "S, E"] if continuum else []),
     ]
 
 

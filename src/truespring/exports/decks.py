@@ -25,6 +25,9 @@ from truespring.potential import Loading
 from truespring.problem import Problem
 
 # The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
+#: Of results of a step: the last increment is always written.
+LAST_ONLY = "FREQUENCY=1000000"
+
 _LARGEST_INCREMENT = 0.25
 # How long a step is that is no load level.
 _NO_TIME = 1e-9

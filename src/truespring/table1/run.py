@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from truespring.errors import TruespringError
@@ -101,7 +102,7 @@ def _reference(dim: int) -> dict[str, Any]:
 
 def _processor() -> str:
     try:
-        with open("/proc/cpuinfo", encoding="utf-8") as stream:  # noqa: PTH123
+        with Path("/proc/cpuinfo").open(encoding="utf-8") as stream:
             return next(line.split(":")[1].strip() for line in stream if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or "unknown"

@@ -1,7 +1,7 @@
 """Load types of a map: the study's own, and standard ones that a rectangle or box is put under."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,7 +172,9 @@ def scaled(problem: Problem, factor: float) -> Problem:
 
 
 def _times(load: Load, factor: float) -> Load:
-    several: Callable[[Sequence[float]], tuple[float, ...]] = lambda values: tuple(factor * one for one in values)  # noqa: E731
+    def several(values: Sequence[float]) -> tuple[float, ...]:
+        return tuple(factor * one for one in values)
+
     match load:
         case Force():
             return replace(load, total=several(load.total))

@@ -140,11 +140,11 @@ class Cells:
         self.known.update(found)
 
     def _divided(self, cell: tuple[int, int, int, int]) -> list[tuple[int, int, int, int]]:
-        i, j, k, l = cell  # noqa: E741
-        if (j - i < 2 and l - k < 2) or len({self._band(one) for one in _corners(cell)}) == 1:
+        left, right, low, high = cell
+        if (right - left < 2 and high - low < 2) or len({self._band(one) for one in _corners(cell)}) == 1:
             return [cell]
-        x = [(i, (i + j) // 2), ((i + j) // 2, j)] if j - i > 1 else [(i, j)]
-        y = [(k, (k + l) // 2), ((k + l) // 2, l)] if l - k > 1 else [(k, l)]
+        x = [(left, (left + right) // 2), ((left + right) // 2, right)] if right - left > 1 else [(left, right)]
+        y = [(low, (low + high) // 2), ((low + high) // 2, high)] if high - low > 1 else [(low, high)]
         return [(*one, *other) for one in x for other in y]
 
     def _band(self, at: tuple[int, int]) -> int:
@@ -154,16 +154,16 @@ class Cells:
     def filled(self) -> Floats:
         """Errors of all points, shape (n_y, n_x), those not solved told from the corners of their cell."""
         errors = np.full(self.shape[::-1], np.nan + 0j)
-        for i, j, k, l in self._cells:  # noqa: E741
-            x = np.linspace(0, 1, j - i + 1)[None] if j > i else np.zeros((1, 1))
-            y = np.linspace(0, 1, l - k + 1)[:, None] if l > k else np.zeros((1, 1))
-            a, b, c, d = (self.known[one] for one in ((i, k), (j, k), (i, l), (j, l)))
-            errors[k : l + 1, i : j + 1] = (1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)
+        for left, right, low, high in self._cells:
+            x = np.linspace(0, 1, right - left + 1)[None] if right > left else np.zeros((1, 1))
+            y = np.linspace(0, 1, high - low + 1)[:, None] if high > low else np.zeros((1, 1))
+            a, b, c, d = (self.known[one] for one in ((left, low), (right, low), (left, high), (right, high)))
+            errors[low : high + 1, left : right + 1] = (1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)
         for (i, j), error in self.known.items():
             errors[j, i] = error
         return np.abs(errors)
 
 
 def _corners(cell: tuple[int, int, int, int]) -> list[tuple[int, int]]:
-    i, j, k, l = cell  # noqa: E741
-    return list(dict.fromkeys([(i, k), (j, k), (i, l), (j, l)]))
+    left, right, low, high = cell
+    return list(dict.fromkeys([(left, low), (right, low), (left, high), (right, high)]))
