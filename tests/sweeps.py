@@ -102,6 +102,11 @@ def who(_: int) -> int:
     return os.getpid()
 
 
+def sleep(seconds: int) -> None:
+    """A task that takes so long."""
+    time.sleep(seconds)
+
+
 def threads(_: int) -> tuple[int, int, dict[str, str]]:
     """A task that tells the threads it has, of our own kernels and of BLAS, and the environment."""
     import numpy as np

@@ -12,9 +12,10 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"validity", "sweeping", "study", "report", "table1"},
+    "cli": {"validity", "sweeping", "study", "report", "table1", "equilibrium", "outputs"},
     "table1": {
         "report",
+        "outputs",
         "comparison",
         "equilibrium",
         "models",
@@ -27,6 +28,7 @@ ALLOWED = {
     },
     "validity": {
         "sweeping",
+        "outputs",
         "study",
         "report",
         "comparison",
@@ -39,9 +41,10 @@ ALLOWED = {
         "loading",
         "mesh",
     },
-    "sweeping": {"study", "report", "units"},
+    "sweeping": {"study", "report", "outputs", "units"},
     "study": {
         "calibration",
+        "outputs",
         "report",
         "comparison",
         "misfit",
@@ -98,7 +101,7 @@ ALLOWED = {
         "table",
         "units",
     },
-    "exports": {"equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
+    "exports": {"outputs", "equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
     "equilibrium": {"models", "solvers", "potential", "problem", "mesh", "material"},
     "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
     "solvers": {"linear", "potential"},
@@ -111,6 +114,7 @@ ALLOWED = {
     "material": set(),
     "table": {"units"},
     "units": set(),
+    "outputs": set(),
     "kernels": set(),
     "errors": set(),
     "arrays": set(),

@@ -24,6 +24,7 @@ from tests.sweeps import (
     finished,
     kill_group,
     records,
+    sleep,
     square,
     started,
     threads,
@@ -277,6 +278,7 @@ def test_whatever_dies_no_point_is_lost() -> None:
         assert found.pop("4") == Failure("ValueError: four") and found.pop("5") == Failure("five")
         assert found == {str(number): number**2 for number in (0, 1, 2, 6, 7, 8)}
         wait_until(lambda: len(pool.pids) == 2)
+        assert refuses_whoever_has_no_key(pool)
         scheduler, worker = pool.pids
         done = []
         for key, pid in pool.run({number: number for number in range(40)}, who):
@@ -290,6 +292,38 @@ def test_whatever_dies_no_point_is_lost() -> None:
         assert said == ["the scheduler died: another is started, what was solved is kept"]
         ((_, (ours, blas, around)),) = pool.run({0: 0}, threads)
         assert ours == blas == 1 and around["NUMBA_NUM_THREADS"] == around["OPENBLAS_NUM_THREADS"] == "1"
+
+
+def refuses_whoever_has_no_key(pool: Pool) -> bool:
+    """Whoever could connect to a scheduler or worker could run code as the user who sweeps."""
+    from distributed import Client, Security
+
+    scheduler = psutil.Process(pool.pids[0])
+    listening = {
+        connection.laddr.port
+        for process in (scheduler, *scheduler.children(recursive=True))
+        for connection in process.net_connections()
+        if connection.status == psutil.CONN_LISTEN
+    }
+    address = pool._cluster.address if pool._cluster else ""
+    assert address.startswith("tls://") and int(address.rpartition(":")[2]) in listening and len(listening) > 2
+    for port in listening:
+        for scheme, security in (("tcp", None), ("tls", Security.temporary())):
+            with pytest.raises(OSError):
+                Client(f"{scheme}://127.0.0.1:{port}", timeout=0.5, security=security)  # type: ignore[no-untyped-call]
+    return True
+
+
+def test_a_point_that_takes_too_long_fails(study: Path) -> None:
+    (point,) = plan_sweep(study, {"material.poisson": [0.25]}).points.values()
+    with pytest.raises(TruespringError, match="longer than 1e-09 s: give it more by --timeout"):
+        solve_point((read_text(study), point), 1e-9)
+
+
+@pytest.mark.verification
+def test_a_point_that_never_comes_back_is_killed() -> None:
+    with Pool(1, timeout=0.2) as pool:
+        assert "more memory or time than there is" in dict(pool.run({60: 60}, sleep))[60].reason
 
 
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -479,16 +513,19 @@ def test_a_machine_that_fails_loses_nothing(tmp_path: Path) -> None:
     random = np.random.default_rng()
     told = [written(tmp_path, STUDY), "--vary", "material.poisson=0:0.45:40", "--vary", "mesh.elements=[32,8]"]
     before: dict[str, tuple[int, int]] = {}
-    for _ in range(6):
+    for _ in range(6):  # of 40 points at most 6 times 5, and what is solved while it is killed
         sweep = started(*told, "--out", tmp_path / "out")
-        time.sleep(random.uniform(2, 8))
+        wanted_now = len(before) + int(random.integers(0, 4))
+        wait_until(lambda at=wanted_now: len(list((tmp_path / "out").glob("points/*.json"))) >= at, 300)  # type: ignore[misc]
+        assert sweep.poll() is None, "it runs, and is killed"
         kill_group(sweep)
+        assert sweep.returncode == -signal.SIGKILL
         now = records(tmp_path / "out")
         assert all(now[name] == before[name] for name in before)
         before = now
     found = finished(started(*told, "--out", tmp_path / "out", "--json"))
     wanted = finished(started(*told, "--out", tmp_path / "undisturbed", "--json"))
-    assert 0 < found["n_before"] == len(before) < 40 and unclocked(found["rows"]) == unclocked(wanted["rows"])
+    assert found["n_before"] == len(before) < 40 and unclocked(found["rows"]) == unclocked(wanted["rows"])
 
 
 @pytest.mark.verification

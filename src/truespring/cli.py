@@ -18,8 +18,10 @@ from truespring.errors import TruespringError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from truespring.equilibrium import Path as Equilibria
+    from truespring.outputs import Output
     from truespring.report.result import Result
-    from truespring.study import Realised, Study
+    from truespring.study import Known, Realised, Study
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -29,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         _load()
-        with _threads(options.threads):
+        with _threads(options.threads), ExitStack() as options.reserved:
             code: int = options.verb(options)
             return code
     except TruespringError as error:
@@ -133,6 +135,9 @@ def _add_sweep(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: all cores")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
     verb.add_argument("--retry-failed", action="store_true", help="try points again that have failed before")
+    verb.add_argument(
+        "--timeout", type=_seconds, metavar="S", help="a point that is not solved after so many seconds fails"
+    )
     verb.add_argument("--out", type=Path, default=Path("out/sweep"), metavar="DIR", help="default: out/sweep")
 
 
@@ -226,6 +231,13 @@ def _positive(text: str) -> int:
     return number
 
 
+def _seconds(text: str) -> float:
+    number = float(text)
+    if not 0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number of seconds")
+    return number
+
+
 @contextmanager
 def _threads(limit: int | None) -> Iterator[None]:
     with ExitStack() as stack:
@@ -251,20 +263,22 @@ def _solve(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.report.summary import summary
     from truespring.report.tables import result_tables
-    from truespring.study import read_studies, realised_moduli, run, write, write_overview
+    from truespring.study import read_studies, realised_moduli, run, verify_command, write_overview, write_rest
 
     studies = read_studies(options.study)
-    _make_folders(options.out, studies)
+    _reserve(options, studies)
     console = _console(options)
     results = []
     for study in studies:
         if not console.quiet:
             _print_realised(console, study.stem, realised_moduli(study))
-        with _progress(options) as progress:
-            result = run(study, progress, comparing)
-        results.append(result)
-        with _writing(options.out):
-            write(result, options.out, report=comparing)
+        with _output(study, options.out) as (output, known):
+            with _progress(options) as progress:
+                result = run(study, progress, comparing, known)
+            results.append(result)
+            with _writing(options.out):
+                (options.out / "report.html").unlink(missing_ok=True)  # it is over what was there before
+                write_rest(result, output, verify_command([result], options.out) if comparing else None)
         for part in result_tables(result):
             console.print(part)
     if comparing:
@@ -279,11 +293,32 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
 
 
-def _make_folders(out: Path, studies: "Sequence[Study]") -> None:
-    """Where nothing can be written, say so before anything is solved."""
+@contextmanager
+def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
+    """The output of a study, and what writes each model's own results to it."""
+    from truespring.study import output, write_model
+
     with _writing(out):
-        for study in studies:
-            (out / study.stem).mkdir(parents=True, exist_ok=True)
+        opened = output(study, out)
+
+    def known(name: str, path: "Equilibria") -> None:
+        with _writing(out):
+            write_model(path, opened, name)
+
+    with opened:
+        yield opened, known
+
+
+def _reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> None:
+    """Keep other runs out of the folders of studies, or of --out itself, until the command ends.
+
+    Where nothing can be written, or another run writes, it is said before anything is solved.
+    """
+    from truespring.outputs import Lock
+
+    with _writing(options.out):
+        for folder in [options.out / study.stem for study in studies] or [options.out]:
+            options.reserved.enter_context(Lock(folder))
 
 
 @contextmanager
@@ -312,7 +347,7 @@ def _moduli(options: argparse.Namespace) -> int:
     from truespring.study import read_studies, realised_moduli, realised_values, write_moduli
 
     studies = read_studies(options.study)
-    _make_folders(options.out, studies)
+    _reserve(options, studies)
     console = _console(options)
     values = {}
     for study in studies:
@@ -334,7 +369,7 @@ def _converge(options: argparse.Namespace) -> int:
     studies = read_studies(options.study)
     if not 0 < options.tolerance < 1:
         raise TruespringError(f"--tolerance {options.tolerance:g}: a relative error between 0 and 1 is wanted")
-    _make_folders(options.out, studies)
+    _reserve(options, studies)
     console = _console(options)
     found: dict[str, Any] = {}
     for study in studies:
@@ -359,8 +394,7 @@ def _compare(options: argparse.Namespace) -> int:
     probe = read_probe(options.probe)
     if options.tolerance is not None and not 0 < options.tolerance < 1:
         raise TruespringError(f"--tolerance {options.tolerance:g}: a relative error between 0 and 1 is wanted")
-    with _writing(options.out):
-        options.out.mkdir(parents=True, exist_ok=True)
+    _reserve(options)
     with _progress(options) as progress:
         advance = None if progress is None else lambda text, share: progress("reading", text, share)
         results = list(compare_sources(sources, probe, options.tolerance, advance))
@@ -385,7 +419,7 @@ def _export(options: argparse.Namespace) -> int:
     studies = read_studies(options.study)
     for study in studies:  # what is wrong is said before any is solved
         springs_of(study, options.to, options.model)
-    _make_folders(options.out, studies)
+    _reserve(options, studies)
     console = _console(options)
     values: dict[str, Any] = {}
     converged = True
@@ -415,8 +449,7 @@ def _sweep(options: argparse.Namespace) -> int:
             raise TruespringError(f"--vary {key}: is given twice: give all of its values at once")
         vary[key] = values
     plan = plan_sweep(options.study, vary, options.lhs, options.seed, options.points)
-    with _writing(options.out):
-        options.out.mkdir(parents=True, exist_ok=True)
+    _reserve(options)
     console = _console(options)
     try:
         with _counting(options, "points") as (advance, say), _writing(options.out):
@@ -427,6 +460,7 @@ def _sweep(options: argparse.Namespace) -> int:
                 options.scheduler,
                 threads=options.threads or 1,
                 retry_failed=options.retry_failed,
+                timeout=options.timeout,
                 progress=advance,
                 report=say,
             )
@@ -448,7 +482,7 @@ def _sweep(options: argparse.Namespace) -> int:
 def _as_typed(options: argparse.Namespace) -> str:
     """The command line that does the same."""
     told = ["truespring", "sweep", options.study]
-    for name in ("vary", "lhs", "seed", "points", "workers", "scheduler", "threads", "out"):
+    for name in ("vary", "lhs", "seed", "points", "workers", "scheduler", "threads", "timeout", "out"):
         value = getattr(options, name)
         for one in value if isinstance(value, list) else [value]:
             if one is not None and (name != "seed" or options.lhs):
@@ -472,7 +506,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 
     study, *others = read_studies([options.study, *options.case, *options.held_out])
     cases, held_out = others[: len(options.case)], others[len(options.case) :]
-    _make_folders(options.out, [study])
+    _reserve(options, [study])
     weight = {} if options.regularisation is None else {"regularisation": options.regularisation}
     with _progress(options) as progress:
         advance = None if progress is None else lambda text, share: progress(study.stem, "calibration", share)
@@ -513,7 +547,7 @@ def _map(options: argparse.Namespace) -> int:
     from truespring.validity import map_validity, read_range, validity_values, write_validity
 
     (study,) = read_studies([options.study])
-    _make_folders(options.out, [study])
+    _reserve(options, [study])
     y = options.y or ("depth" if options.x == "load" else "none")
     with _counting(options, "paths") as (advance, _):
         found = map_validity(
@@ -575,8 +609,7 @@ def _rules(options: argparse.Namespace) -> int:
 def _table1(options: argparse.Namespace) -> int:
     from truespring.table1 import measure_table, write_table
 
-    with _writing(options.out):
-        options.out.mkdir(parents=True, exist_ok=True)
+    _reserve(options)
     dims = (2, 3) if options.dim is None else (options.dim,)
     with _progress(options) as progress:
         advance = None if progress is None else lambda what, share: progress("table1", what, share)

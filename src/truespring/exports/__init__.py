@@ -17,6 +17,7 @@ from truespring.exports.exported import solve_springs as solve_springs
 from truespring.exports.mujoco import mujoco
 from truespring.exports.sofa import sofa
 from truespring.models import SpringModel, SpringNetwork
+from truespring.outputs import Output
 from truespring.problem import Problem
 
 #: The content of each file by its name: text, or bytes.
@@ -130,7 +131,8 @@ def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]
 
 def write_files(files: Files, folder: FilePath) -> tuple[FilePath, ...]:
     """Write files into a folder, which is made where it is not there; return them."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for file, content in files.items():
-        (folder / file).write_bytes(content.encode() if isinstance(content, str) else content)
+    with Output(folder, next(iter(files))) as output:
+        for file, content in files.items():
+            (output.staging / file).write_bytes(content.encode() if isinstance(content, str) else content)
+        output.publish()
     return tuple(folder / file for file in files)

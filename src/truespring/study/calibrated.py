@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import Any
 
+from truespring.outputs import Output
 from truespring.report.calibration import (
     calibration_values,
     draw_calibration,
@@ -40,8 +41,13 @@ def calibrated_values(found: Calibrated) -> dict[str, Any]:
 
 def write_calibrated(found: Calibrated, out: FilePath, command: str) -> tuple[FilePath, ...]:
     """Write calibrated.toml, its springs as CSV, calibrate.json, figures and report.html into out/STEM; return them."""
-    folder = out / found.study.stem
-    folder.mkdir(parents=True, exist_ok=True)
+    with Output(out / found.study.stem, "calibrate.json") as output:
+        files = _write(found, output.staging, command)
+        output.publish()
+    return tuple(output.folder / file.name for file in files)
+
+
+def _write(found: Calibrated, folder: FilePath, command: str) -> tuple[FilePath, ...]:
     springs, volume, study = folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv", folder / f"{NAME}.toml"
     tables = write_given(found.calibration.model, springs, volume)
     study.write_text(calibrated_study(found, folder, [file.name for file in tables]), encoding="utf-8")

@@ -13,6 +13,7 @@ from truespring.comparison import TOLERANCE, Comparison, compare
 from truespring.equilibrium import Path
 from truespring.errors import StudyError, TruespringError
 from truespring.misfit import displacement_misfit, same_place
+from truespring.outputs import Output, write_whole
 from truespring.report.curves import write_curves
 from truespring.report.result import Result
 from truespring.report.series import write_difference
@@ -169,9 +170,9 @@ def write_comparisons(results: Sequence[Result], out: FilePath, texts: Sequence[
         write_comparison(result, out if len(results) == 1 else out / result.file, command)
     report = out / "report.html"
     if len(results) > 1:
-        from truespring.report.page import write_page
+        from truespring.report.page import render_page
 
-        write_page(results, report, command)
+        write_whole(report, render_page(results, command).encode())
     return report
 
 
@@ -180,10 +181,11 @@ def write_comparison(result: Result, folder: FilePath, command: str) -> None:
     from truespring.report.figures import save_figures
     from truespring.report.page import write_page
 
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(difference(result), indent=2, allow_nan=False)
-    (folder / "comparison.json").write_text(text + "\n", encoding="utf-8")
-    write_curves(result, folder / "curves.csv")
-    write_difference(next(iter(result.comparisons.values())), folder / "difference.vtu")
-    save_figures(result, folder / "figures")
-    write_page([result], folder / "report.html", command)
+    with Output(folder, "comparison.json") as output:
+        text = json.dumps(difference(result), indent=2, allow_nan=False)
+        (output.staging / "comparison.json").write_text(text + "\n", encoding="utf-8")
+        write_curves(result, output.staging / "curves.csv")
+        write_difference(next(iter(result.comparisons.values())), output.staging / "difference.vtu")
+        save_figures(result, output.staging / "figures")
+        write_page([result], output.staging / "report.html", command)
+        output.publish()

@@ -2,9 +2,7 @@
 
 import dataclasses
 import json
-import re
 import shlex
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -31,6 +29,7 @@ from truespring.models import (
     model_warnings,
     moduli,
 )
+from truespring.outputs import Output, write_whole
 from truespring.problem import Problem
 from truespring.reference import Program
 from truespring.report.curves import moved_supports, write_curves, write_reactions
@@ -42,6 +41,9 @@ from truespring.study.read import Entry, Study, read_study
 
 #: Called with study, model and the load factor reached, for a progress bar.
 Progress = Callable[[str, str, float], None]
+
+#: Called with the name of a model and its path as soon as that is known.
+Known = Callable[[str, Path], None]
 
 
 def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
@@ -63,8 +65,11 @@ def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
     return studies
 
 
-def run(study: Study, progress: Progress | None = None, comparing: bool = True) -> Result:
-    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached."""
+def run(study: Study, progress: Progress | None = None, comparing: bool = True, known: Known | None = None) -> Result:
+    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached.
+
+    `known` is told each path before the next model is solved.
+    """
     paths: dict[str, Path] = {}
     for name, entry in study.entries.items():
 
@@ -75,6 +80,8 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
         paths[name] = follow(study, entry, report)
         if progress and not isinstance(entry, Path):
             progress(study.stem, name, 1.0)
+        if known:
+            known(name, paths[name])
     model = paths[study.model]
     probe = most_moved(model) if study.probe is None else study.probe
     names = study.references if comparing else ()
@@ -172,12 +179,16 @@ def _material(material: Material) -> dict[str, float]:
 
 def write_moduli(study: Study, realised: Sequence[Realised], out: FilePath) -> FilePath | None:
     """Write moduli.json and a picture of Young's modulus by direction into out/STEM; return the picture, if any."""
-    folder = out / study.stem
-    folder.mkdir(parents=True, exist_ok=True)
-    values = {one.name: realised_values(one) for one in realised}
-    (folder / "moduli.json").write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    if not realised:
-        return None
+    with Output(out / study.stem, "moduli.json") as output:
+        values = {one.name: realised_values(one) for one in realised}
+        text = json.dumps(values, indent=2, allow_nan=False)
+        (output.staging / "moduli.json").write_text(text + "\n", encoding="utf-8")
+        picture = _draw_moduli(study, realised, output.staging / "figures") if realised else None
+        output.publish()
+    return None if picture is None else out / study.stem / "figures" / picture.name
+
+
+def _draw_moduli(study: Study, realised: Sequence[Realised], folder: FilePath) -> FilePath:
     from truespring.report.young import save_young
 
     labels = [one.springs.label for one in realised]
@@ -187,7 +198,7 @@ def write_moduli(study: Study, realised: Sequence[Realised], out: FilePath) -> F
         for moduli in [one.by_material[0][1]]
     }
     within = " in plane strain" if isinstance(study.problem.section, PlaneStrain) else ""
-    return save_young(several, f"material{within}", folder / "figures")
+    return save_young(several, f"material{within}", folder)
 
 
 def rule_values() -> dict[str, dict[str, Any]]:
@@ -205,64 +216,58 @@ def rule_values() -> dict[str, dict[str, Any]]:
     }
 
 
+def output(study: Study | Result, out: FilePath) -> Output:
+    """Return the output of a study, in out/STEM."""
+    return Output(out / study.stem, "summary.json")
+
+
 def write(result: Result, out: FilePath, report: bool = True) -> None:
-    """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures too."""
-    folder = out / result.stem
-    folder.mkdir(parents=True, exist_ok=True)
-    _clear(folder)
+    """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures and a page too."""
+    with output(result, out) as own:
+        for name, path in result.paths.items():
+            write_model(path, own, name)
+        write_rest(result, own, verify_command([result], out) if report else None)
+
+
+def write_model(path: Path, output: Output, name: str) -> None:
+    """Write what a model alone leaves, its VTU series and STL, as soon as it is solved."""
+    write_series(path, output.staging, name)
+    write_stl(path, output.staging / f"deformed_{name}.stl")
+
+
+def write_rest(result: Result, output: Output, command: str | None) -> None:
+    """Write what all models leave together and publish it; figures and a page, which tells the `command`, with one."""
+    folder = output.staging
     write_curves(result, folder / "curves.csv")
-    (folder / "reactions.csv").unlink(missing_ok=True)
     if moved_supports(result.problem):
         write_reactions(result, folder / "reactions.csv")
-    text = json.dumps(summary(result), indent=2, allow_nan=False)
-    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     if result.problem.mesh.element != "line":
         write_mesh(result.problem.mesh, folder / "mesh.vtu")
-    for name, path in result.paths.items():
-        write_series(path, folder, name)
-        write_stl(path, folder / f"deformed_{name}.stl")
-    if report:
+    if command is not None:
         from truespring.report.figures import save_figures
         from truespring.report.page import write_page
 
         save_figures(result, folder / "figures")
-        write_page([result], folder / "report.html", _command([result], out))
-
-
-def _clear(folder: FilePath) -> None:
-    """Remove what a former run of the study left, so that no model of then stands beside those of now."""
-    try:
-        former = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["models"]
-        names = [name for name in former if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)]
-    except (OSError, ValueError, KeyError, TypeError):
-        return
-    figures = [*_FIGURES, *(f"{one}_{what}_{other}" for one in names for other in names for what in ("over", "error"))]
-    left = [folder / "report.html"]
-    left += [folder / "figures" / f"{figure}.{kind}" for figure in figures for kind in ("png", "svg")]
-    for name in names:
-        left += [folder / f"{name}.pvd", folder / f"deformed_{name}.stl", *(folder / name).glob(f"{name}_*.vtu")]
-    for file in left:
-        file.unlink(missing_ok=True)
-    for name in ("figures", *names):
-        if (folder / name).is_dir() and not any((folder / name).iterdir()):
-            (folder / name).rmdir()
-
-
-_FIGURES = ("undeformed", "curves", "reactions", "error", "moduli")
+        write_page([result], folder / "report.html", command)
+    text = json.dumps(summary(result), indent=2, allow_nan=False)
+    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    output.publish()
 
 
 def write_overview(results: Sequence[Result], out: FilePath) -> None:
     """Write out/report.html over all studies, each written before; over one alone, its own page once more."""
+    from truespring.report.page import render_page
+
     if len(results) == 1:
-        shutil.copyfile(out / results[0].stem / "report.html", out / "report.html")
-        return
-    from truespring.report.page import write_page
+        page = (out / results[0].stem / "report.html").read_bytes()
+    else:
+        page = render_page(results, verify_command(results, out)).encode()
+    write_whole(out / "report.html", page)
 
-    write_page(results, out / "report.html", _command(results, out))
 
-
-def _command(results: Sequence[Result], out: FilePath) -> str:
-    return shlex.join(["truespring", "verify", *(str(result.file) for result in results), "--out", str(out)])
+def verify_command(studies: Sequence[Study | Result], out: FilePath) -> str:
+    """Return the command line that verifies studies."""
+    return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])
 
 
 def plan(study: Study) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from truespring.equilibrium import Path, Status, solve
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
+from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
 from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
@@ -172,9 +173,11 @@ def _folder(text: str, file: FilePath) -> FilePath:
     """The folder of a study, or the only one in a folder of several."""
     if (file / "summary.json").is_file():
         return file
-    inner = sorted(one.parent for one in file.glob("*/summary.json"))
+    inner = sorted(one.parent for one in file.glob("*/summary.json") if one.parent.name != UNFINISHED)
     if len(inner) != 1:
         several = f"; it holds those of {', '.join(str(one) for one in inner)}" if inner else ""
+        if (file / UNFINISHED).is_dir():
+            several += f"; a run was stopped there, what it left is in {file / UNFINISHED}: run it again"
         raise StudyError(f"{text}: truespring wrote no study into this folder (no summary.json){several}")
     return inner[0]
 

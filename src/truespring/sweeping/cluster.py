@@ -2,9 +2,13 @@
 
 That process starts a Dask scheduler and workers of one thread each, writes the scheduler's address to its standard
 output, and stops at the end of its standard input. Workers that die are started again, however often.
+
+Whoever can connect to a Dask scheduler or worker can run code as its user. So all connections are encrypted by a key
+of this cluster alone, of which they need to know: it is made for it, kept in memory, and told over standard input.
 """
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -32,11 +36,14 @@ class LocalCluster:
 
     Attributes:
         address: where the scheduler listens.
+        security: of distributed, with the key without which nobody can connect.
         pid: of the process that holds the scheduler and watches over its workers, which are its children.
     """
 
     def __init__(self, workers: int) -> None:
         """Start it; raise TruespringError with what it said where it does not come up."""
+        certificate, key = _new_key()
+        self.security = _security(certificate, key)
         self._said: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the cluster)
         # Not -m: workers would import again what was run, and with it more than they need.
         command = [sys.executable, "-P", "-c", f"from truespring.sweeping.cluster import serve; serve({workers})"]
@@ -49,7 +56,10 @@ class LocalCluster:
             env={**os.environ, **_ONE_THREAD, "PYTHONPATH": paths},
         )
         self.pid = self._process.pid
-        assert self._process.stdout is not None
+        assert self._process.stdin is not None and self._process.stdout is not None
+        with suppress(BrokenPipeError):  # it ended: what it said is told below
+            self._process.stdin.write(json.dumps([certificate, key]).encode() + b"\n")
+            self._process.stdin.flush()
         self.address = self._process.stdout.readline().decode().strip()
         if not self.address:
             self._process.wait()
@@ -85,13 +95,16 @@ async def _serve(workers: int) -> None:
     import dask
     from distributed import Nanny, Scheduler
 
+    security = _security(*json.loads(sys.stdin.buffer.readline()))
     # A worker gets the next point when it has done one: whoever waits at a worker that dies is not blamed for it.
     dask.config.set({"distributed.scheduler.worker-saturation": 1.0, "distributed.scheduler.allowed-failures": 1})
+    # Pages that tell of the cluster have no key: there are none.
+    dask.config.set({"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []})
 
     async def nanny() -> Any:
-        return await Nanny(scheduler.address, nthreads=1, host="127.0.0.1", memory_limit=0)
+        return await Nanny(scheduler.address, nthreads=1, host="127.0.0.1", memory_limit=0, security=security)
 
-    async with Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler:
+    async with Scheduler(host="127.0.0.1", port=0, dashboard=False, security=security) as scheduler:
         nannies = [_Watched(one) for one in await asyncio.gather(*(nanny() for _ in range(workers)))]
         sys.stdout.write(f"{scheduler.address}\n")
         sys.stdout.flush()
@@ -104,6 +117,28 @@ async def _serve(workers: int) -> None:
                         await one.nanny.close(timeout=1)
                         nannies[place] = _Watched(await nanny())
         await asyncio.gather(*(one.nanny.close(timeout=2) for one in nannies), return_exceptions=True)
+
+
+def _new_key() -> tuple[str, str]:
+    """A certificate and its key, made for one cluster."""
+    from distributed import Security
+
+    make: Any = Security.temporary  # its methods have no types
+    made = make()
+    return made.tls_ca_file, made.tls_client_key
+
+
+def _security(certificate: str, key: str) -> Any:
+    """What takes connections of holders of the key only, and makes such, for every part of a cluster."""
+    from distributed import Security
+
+    make: Any = Security
+    certificates = {f"tls_{part}_cert": certificate for part in _PARTS}
+    keys = {f"tls_{part}_key": key for part in _PARTS}
+    return make(require_encryption=True, tls_ca_file=certificate, **certificates, **keys)
+
+
+_PARTS = ("client", "scheduler", "worker")
 
 
 class _Watched:

@@ -4,6 +4,7 @@ import itertools
 import logging
 import os
 import queue
+import threading
 import time
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -69,6 +70,7 @@ class Pool:
         scheduler: address of any Dask cluster, such as "tcp://10.0.0.1:8786"; its workers are taken instead.
         threads: of BLAS and of our own kernels, in each worker.
         patience: how long a scheduler may be out of reach [s].
+        timeout: after how long a worker that is still at one point is killed [s]; None is never.
         report: told in words what goes on beside the points.
     """
 
@@ -79,6 +81,7 @@ class Pool:
         *,
         threads: int = 1,
         patience: float = 60.0,
+        timeout: float | None = None,
         report: Report | None = None,
     ) -> None:
         """Start the workers, or connect; raise TruespringError where neither can be."""
@@ -87,7 +90,7 @@ class Pool:
             raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one")
         if workers is not None and workers < 1:
             raise TruespringError(f"workers = {workers} is not allowed: 1 or more, or None for as many as cores")
-        self.scheduler, self.threads, self.patience = scheduler, threads, patience
+        self.scheduler, self.threads, self.patience, self.timeout = scheduler, threads, patience, timeout
         self.workers = workers
         self._report = report or (lambda _: None)
         self._cluster: LocalCluster | None = None
@@ -169,7 +172,7 @@ class Pool:
         ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         try:
             made = client.map(
-                _Guarded(task, self.threads),
+                _Guarded(task, self.threads, self.timeout),
                 [points[key] for key in keys],
                 key=[(group, number) for number in range(len(keys))],
                 pure=False,
@@ -230,13 +233,15 @@ class Pool:
 
             self._cluster = LocalCluster(self.workers or CPU_COUNT)
         address = self.scheduler or (self._cluster.address if self._cluster else "")
+        security = self._cluster.security if self._cluster else None
         deadline = time.monotonic() + patience
         while self._client is None:
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")  # versions that differ: what matters fails, and says so
                     connected: Any = Client
-                    self._client = connected(address, timeout=max(1.0, min(5.0, deadline - time.monotonic())))
+                    timeout = max(1.0, min(5.0, deadline - time.monotonic()))
+                    self._client = connected(address, timeout=timeout, security=security)
             except ValueError as error:
                 raise TruespringError(
                     f"scheduler {address!r}: is no address such as tcp://10.0.0.1:8786: {error}"
@@ -252,16 +257,30 @@ class Pool:
 
 
 _KEPT = "what was solved is kept, and the same command goes on with it"
-_KILLED = "every worker that tried it was killed: perhaps it needs more memory than there is, or a library crashed"
+_KILLED = (
+    "every worker that tried it was killed: perhaps it needs more memory or time than there is, or a library crashed"
+)
 
 
 class _Guarded:
-    """The task as workers run it: with threads limited, and failures as values, which always find their way back."""
+    """The task as workers run it: threads and time limited, failures as values, which always find their way back."""
 
-    def __init__(self, task: Callable[[Any], Any], threads: int) -> None:
-        self.task, self.threads = task, threads
+    def __init__(self, task: Callable[[Any], Any], threads: int, timeout: float | None) -> None:
+        self.task, self.threads, self.timeout = task, threads, timeout
 
     def __call__(self, value: Any) -> Any:
+        if self.timeout is None:
+            return self._result(value)
+        # Nothing else ends a library that does not return; whoever watches over the worker starts another one.
+        end = threading.Timer(self.timeout, os._exit, (1,))
+        end.daemon = True
+        end.start()
+        try:
+            return self._result(value)
+        finally:
+            end.cancel()
+
+    def _result(self, value: Any) -> Any:
         from threadpoolctl import threadpool_limits
 
         from truespring.kernels.threads import set_threads
@@ -314,10 +333,11 @@ class _Quiet:
 def require_dask() -> None:
     """Raise TruespringError with the way out where what sweeps need is not installed."""
     try:
+        import cryptography
         import distributed
         import polars
     except ImportError as error:
         raise TruespringError(
             f"{error.name} is not installed: sweeps need it; pip install 'truespring[sweep]'"
         ) from None
-    del distributed, polars
+    del cryptography, distributed, polars

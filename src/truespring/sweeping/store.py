@@ -1,30 +1,15 @@
 """Records of points, each whole or not there at all, however the process ends that writes them."""
 
 import json
-import os
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from truespring.outputs import write_whole
+
 # What a killed process left half written is of no use after so long [s].
 _STALE = 3600.0
-
-
-def write_whole(file: Path, content: bytes) -> None:
-    """Write a file whole: under another name in its folder, down to the disk, then renamed."""
-    beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    with beside.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    beside.replace(file)
-    if hasattr(os, "O_DIRECTORY"):  # the name, too, is to outlive the machine
-        folder = os.open(file.parent, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
 
 
 class Store:

@@ -2,20 +2,22 @@
 
 import math
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.errors import TruespringError
+from truespring.outputs import Lock, Output
 from truespring.report.summary import summary
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
 from truespring.sweeping.plan import Plan, Point, digests, make_plan
 from truespring.sweeping.pool import Failure, Pool, Report, require_dask
-from truespring.sweeping.store import CONVERGED, FAILED, Store, write_whole
+from truespring.sweeping.store import CONVERGED, FAILED, Store
 from truespring.sweeping.table import rows_of, table_of, write_table
 from truespring.sweeping.values import choose, read_points
 
@@ -24,6 +26,10 @@ if TYPE_CHECKING:
 
 #: Called with the points done, those of them that failed, and all.
 Progress = Callable[[int, int, int], None]
+
+
+# A worker that does not see that its time is over is killed so much later, after twice the time [s].
+_GRACE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +75,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry_failed: bool = False,
+    timeout: float | None = None,
 ) -> "polars.DataFrame":
     """Solve a study with many values of its keys; return a table, a row a point, sorted by them.
 
@@ -84,12 +91,13 @@ def sweep(
         workers: processes on this machine, by default as many as cores.
         scheduler: address of a Dask cluster to take instead.
         retry_failed: try points again that have failed.
+        timeout: after how long a point that is not solved yet fails [s]; None is never.
     """
     plan = plan_sweep(study, vary, lhs, seed, points)
     if out is None:
         with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
-            return table_of(run_sweep(plan, Path(folder), workers, scheduler).rows)
-    done = run_sweep(plan, Path(out), workers, scheduler, retry_failed=retry_failed)
+            return table_of(run_sweep(plan, Path(folder), workers, scheduler, timeout=timeout).rows)
+    done = run_sweep(plan, Path(out), workers, scheduler, retry_failed=retry_failed, timeout=timeout)
     write_sweep(done, Path(out))
     return table_of(done.rows)
 
@@ -120,26 +128,30 @@ def run_sweep(
     *,
     threads: int = 1,
     retry_failed: bool = False,
+    timeout: float | None = None,
     progress: Progress | None = None,
     report: Report | None = None,
 ) -> Sweep:
     """Solve every point of a plan that has no record in `out` yet, and keep each record as soon as it is there."""
-    store = Store(out)
-    found = {record["point"]: record for record in store.read()}
-    records: dict[str, Mapping[str, Any]] = {
-        name: record
-        for name, record in found.items()
-        if name in plan.points and not (retry_failed and record["status"] == FAILED)
-    }
-    notes = tuple(_notes(plan, found, records))
-    if report:
-        for note in notes:
-            report(note)
-    left = {name: point for name, point in plan.points.items() if name not in records}
-    n_before = len(records)
-    if left:
-        _Tally(plan, store, records, progress).solve(left, Pool(workers, scheduler, threads=threads, report=report))
-    return Sweep(plan, {name: records[name] for name in plan.points}, n_before, notes)
+    with Lock(out / "points"):
+        store = Store(out)
+        found = {record["point"]: record for record in store.read()}
+        records: dict[str, Mapping[str, Any]] = {
+            name: record
+            for name, record in found.items()
+            if name in plan.points and not (retry_failed and record["status"] == FAILED)
+        }
+        notes = tuple(_notes(plan, found, records))
+        if report:
+            for note in notes:
+                report(note)
+        left = {name: point for name, point in plan.points.items() if name not in records}
+        n_before = len(records)
+        if left:
+            hard = None if timeout is None else 2 * timeout + _GRACE
+            pool = Pool(workers, scheduler, threads=threads, timeout=hard, report=report)
+            _Tally(plan, store, records, progress).solve(left, pool, partial(solve_point, timeout=timeout))
+        return Sweep(plan, {name: records[name] for name in plan.points}, n_before, notes)
 
 
 class _Tally:
@@ -151,11 +163,11 @@ class _Tally:
         self.plan, self.store, self.records, self.progress = plan, store, records, progress
         self.n_failed = sum(record["status"] == FAILED for record in records.values())
 
-    def solve(self, points: Mapping[str, Point], pool: Pool) -> None:
+    def solve(self, points: Mapping[str, Point], pool: Pool, task: Callable[[Any], Any]) -> None:
         self.tell()
         with pool:
             asked = {name: (self.plan.text, point) for name, point in points.items()}
-            for name, outcome in pool.run(asked, solve_point):
+            for name, outcome in pool.run(asked, task):
                 record = {**self._head(points[name]), **_outcome(outcome)}
                 self.store.write(record)
                 self.records[name] = record
@@ -176,11 +188,20 @@ class _Tally:
         }
 
 
-def solve_point(asked: tuple[StudyText, Point]) -> dict[str, Any]:
-    """Solve one point, on a worker, and return its summary, with the stored energy of each model [J]."""
+def solve_point(asked: tuple[StudyText, Point], timeout: float | None = None) -> dict[str, Any]:
+    """Solve one point, on a worker, and return its summary, with the stored energy of each model [J].
+
+    Raises TruespringError where it takes longer than `timeout` [s].
+    """
     text, point = asked
     _refuse_other_than_planned(text, point)
-    result = run(text.study(point.changes))
+    started = time.monotonic()
+
+    def in_time(*_: object) -> None:
+        if timeout is not None and time.monotonic() - started > timeout:
+            raise TruespringError(f"it took longer than {timeout:g} s: give it more by --timeout, or fewer elements")
+
+    result = run(text.study(point.changes), in_time)
     found = summary(result)
     for name, path in result.paths.items():
         energy = path.states[-1].energy if path.states else math.nan
@@ -236,13 +257,15 @@ def _is_of(record: Mapping[str, Any], plan: Plan) -> bool:
 
 
 def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:
-    """Write sweep.csv, sweep.parquet and report.html, each whole; return the first.
+    """Write sweep.csv, sweep.parquet and report.html; return the first.
 
     The page tells how to run it again: the command line, where it was one.
     """
     from truespring.report.sweeps import render_sweep
 
-    table = write_table(done.rows, out)
     page = render_sweep(done.plan.text.file, done.plan.text.tables.get("title"), done.plan.keys, done.rows, command)
-    write_whole(out / "report.html", page.encode())
-    return table
+    with Output(out, "sweep.csv") as output:
+        write_table(done.rows, output.staging)
+        (output.staging / "report.html").write_text(page, encoding="utf-8")
+        output.publish()
+    return out / "sweep.csv"

@@ -1,12 +1,9 @@
 """The tidy table of a sweep: a row a point, a column for each varied key and each figure of the summary."""
 
-import io
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from truespring.sweeping.store import write_whole
 
 if TYPE_CHECKING:
     import polars
@@ -109,11 +106,8 @@ def _column(values: Sequence[Any]) -> tuple[list[Any], Any]:
     ], polars.String
 
 
-def write_table(rows: Sequence[Mapping[str, Any]], out: Path) -> Path:
-    """Write sweep.csv and sweep.parquet, each whole; return the first."""
+def write_table(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Write sweep.csv and sweep.parquet into a folder."""
     table = table_of(rows)
-    parquet = io.BytesIO()
-    table.write_parquet(parquet)
-    write_whole(out / "sweep.parquet", parquet.getvalue())
-    write_whole(out / "sweep.csv", table.write_csv().encode())
-    return out / "sweep.csv"
+    table.write_parquet(folder / "sweep.parquet")
+    table.write_csv(folder / "sweep.csv")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from truespring.models import LAWS
+from truespring.outputs import Output
 from truespring.report.figures import Drawing
 from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent, significant
@@ -50,10 +51,14 @@ def write_validity(validity: Validity, out: FilePath, command: str | None = None
 
     `command` is what does it again, where it was a command line.
     """
-    folder = out / validity.stem
-    (folder / "figures").mkdir(parents=True, exist_ok=True)
-    for former in (folder / "figures").glob("validity_*"):
-        former.unlink()
+    with Output(out / validity.stem, "validity.json") as output:
+        _write(validity, output.staging, command)
+        output.publish()
+    return {name: output.folder / name for name in ("validity.json", "validity.csv", "figures", "report.html")}
+
+
+def _write(validity: Validity, folder: FilePath, command: str | None) -> None:
+    (folder / "figures").mkdir()
     text = json.dumps(validity_values(validity), indent=1, allow_nan=False)
     (folder / "validity.json").write_text(text + "\n", encoding="utf-8")
     with (folder / "validity.csv").open("w", newline="", encoding="utf-8") as stream:
@@ -68,7 +73,6 @@ def write_validity(validity: Validity, out: FilePath, command: str | None = None
         (folder / "figures" / f"{name}.png").write_bytes(drawing.png)
         (folder / "figures" / f"{name}.svg").write_bytes(drawing.svg)
     (folder / "report.html").write_text(_page(validity, drawings, command), encoding="utf-8")
-    return {name: folder / name for name in ("validity.json", "validity.csv", "figures", "report.html")}
 
 
 def rows(validity: Validity) -> Iterator[dict[str, Any]]:
