@@ -298,7 +298,7 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
     dim = max((block.dim for block in cells), default=0)
     if dim < 2:
         there = f"there are only {listed(counts)}" if counts else "there are no elements"
-        raise MeshError(f"{there}: {_joined(_SUPPORTED, hint)}")
+        raise MeshError(f"{there}: {_joined(hint, _SUPPORTED)}")
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
     unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
@@ -322,14 +322,14 @@ def _in_their_dimensions(positions: Floats, kind: str, hint: str) -> Floats:
     if spans.min() <= _FLAT * np.linalg.norm(spans):
         raise MeshError(
             f"the {kind}s lie in a plane of constant {'xyz'[spans.argmin()]}: "
-            + _joined("turn the body, of a plane one z is constant", hint)
+            + _joined(hint, "of a plane body z is constant: turn it")
         )
     raise MeshError(
         f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
         + _joined(
-            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra: fill a closed "
-            "surface with these in a mesher",
             hint,
+            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra, with which a "
+            "mesher fills a closed surface",
         )
     )
 
