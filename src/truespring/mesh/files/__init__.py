@@ -11,6 +11,7 @@ from truespring.mesh.files.inp import read_inp
 from truespring.mesh.files.vtk import read_vtk
 from truespring.mesh.files.vtu import read_vtu
 from truespring.mesh.mesh import Mesh
+from truespring.opening import read_file
 
 _READERS: dict[str, Callable[[bytes], Contents]] = {
     ".msh": read_msh,
@@ -57,14 +58,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
 
 
 def _bytes(file: Path) -> bytes:
-    if file.is_dir():
-        raise MeshError(f"{file} is a folder: give the mesh file itself")
-    try:
-        data = file.read_bytes().removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
-    except FileNotFoundError:
-        raise MeshError(f"{file} does not exist: check the path") from None
-    except OSError as error:
-        raise MeshError(f"{file} cannot be read: {error.strerror}") from None
+    data = read_file(file, MeshError).removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
     if not data.strip():
         raise MeshError(f"{file} is empty")
     return data
