@@ -46,6 +46,7 @@ _OTHERS = (
     *("AcquisitionDate", "AcquisitionTime", "CompressionLevel", "ElementToIntensityFunctionSlope"),
     "ElementToIntensityFunctionOffset",
 )
+_FREE = ("Comment", "Name", "ElementDataFile")  # of any text
 # A header is shorter.
 _LONGEST = 2**16
 
@@ -90,6 +91,8 @@ def _header(data: bytes) -> tuple[dict[str, str], int]:
         begin = end
         if not line:
             continue
+        if "=" in value and key in _READ + _OTHERS and key not in _FREE:
+            raise MeshError(f"the header has two '=' in the line of {key}: is it damaged? {SAVE_ANEW}")
         if key in header:
             raise MeshError(f"the header has {key[:40]} twice; {SAVE_ANEW}")
         near = [] if key in _READ + _OTHERS else close_words(key, _READ)

@@ -65,6 +65,7 @@ _SPELLINGS = {
     **{"blocksize": "block size", "axismins": "axis mins", "axismaxs": "axis maxs", "oldmin": "old min"},
     **{"oldmax": "old max", "sampleunits": "sample units"},
 }
+_VECTOR = r"\([^()]*\)"
 _LONGEST = 2**22  # a header is shorter: Slicer writes hundreds of segments into it
 
 
@@ -183,8 +184,8 @@ def _axes_in_space(fields: Mapping[str, str], sizes: tuple[int, ...]) -> Any:
     """Return which axes lie in space: the others have no direction, or are of kind list."""
     is_place = np.ones(len(sizes), dtype=bool)
     if "space directions" in fields:
-        words = re.findall(r"none|\([^)]*\)", fields["space directions"])
-        if len(words) != len(sizes):
+        words = re.findall(rf"none|{_VECTOR}", fields["space directions"])
+        if len(words) != len(sizes) or "".join("".join(words).split()) != "".join(fields["space directions"].split()):
             raise MeshError(f"'space directions' has {len(words)} axes, there are {len(sizes)}; {SAVE_ANEW}")
         is_place = np.array([word != "none" for word in words])
     elif len(sizes) > 3 and "kinds" in fields:
@@ -207,7 +208,7 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
             f"the space '{space[:40]}' is not read; {', '.join(name for name in _SPACES if '-' in name)} are"
         )
     if "space directions" in fields:
-        axes = np.array([_vector(text, dim) for text in re.findall(r"\([^)]*\)", fields["space directions"])]).T
+        axes = np.array([_vector(text, dim) for text in re.findall(_VECTOR, fields["space directions"])]).T
         spacing = np.linalg.norm(axes, axis=0)
         direction = signs[:, None] * axes / np.where(spacing > 0, spacing, 1.0)
     else:
@@ -233,7 +234,9 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
 
 
 def _vector(text: str, dim: int) -> Floats:
-    return np.array(numbers(text.strip("() ").replace(",", " "), dim, text))
+    if not re.fullmatch(rf"{_VECTOR}", text):
+        raise MeshError(f"'{text[:40]}' is no vector, such as (1,0,0); {SAVE_ANEW}")
+    return np.array(numbers(text[1:-1].replace(",", " "), dim, text))
 
 
 def _segments(keys: Mapping[str, str]) -> tuple[Segment, ...]:
