@@ -52,8 +52,9 @@ class Fem:
         law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
         element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals
             and hexahedra), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with
-            nodes in the middle of the edges. None takes linear ones in the plane; in 3D, where these
-            would lock, at a Poisson's ratio above 0.4, the other that the mesh allows.
+            nodes in the middle of the edges. None takes quadratic ones on triangles and tetrahedra, since linear
+            ones are too stiff in bending at any Poisson's ratio; mean dilatation on quadrilaterals and hexahedra
+            where linear ones lock, above 0.4 in plane strain and in 3D; and linear ones elsewhere.
     """
 
     law: str
@@ -78,7 +79,7 @@ class Fem:
         """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
         finer = _finer(problem)
         if self.element is None:
-            return finer if problem.mesh.dim == 3 and locks(problem) else "linear"
+            return finer if finer == "quadratic" or locks(problem) else "linear"
         if self.element not in ("linear", finer):
             raise ModelError(
                 f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements; "
@@ -92,8 +93,8 @@ class Fem:
             return ()
         largest = max(material.poisson for material in problem.materials)
         return (
-            f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff in bending; "
-            f'element = "{_finer(problem)}" makes them of a kind that does not',
+            f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
+            f'element = "{_finer(problem)}", the default here, does not lock',
         )
 
     def potential(self, problem: Problem) -> "FemPotential":
@@ -122,8 +123,8 @@ def locking_warnings(problem: Problem) -> tuple[str, ...]:
         return ()
     largest = max(material.poisson for material in problem.materials)
     return (
-        f"at a Poisson's ratio of {largest:g} these elements lock, as linear ones of FEM do: they are too stiff in "
-        'bending; kind = "fem" has elements that do not',
+        f"at a Poisson's ratio of {largest:g} these elements lock, as linear ones of FEM do: they are too stiff; "
+        'kind = "fem" has elements that do not',
     )
 
 
