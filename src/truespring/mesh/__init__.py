@@ -11,7 +11,10 @@ from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.measures import corner_measures as corner_measures
 from truespring.mesh.measures import element_corner_measures as element_corner_measures
+from truespring.mesh.measures import quadrature as quadrature
 from truespring.mesh.mesh import Mesh as Mesh
+from truespring.mesh.middles import SecondOrder as SecondOrder
+from truespring.mesh.middles import edge_numbers as edge_numbers
 from truespring.mesh.refine import refined as refined
 from truespring.mesh.selections import Box as Box
 from truespring.mesh.selections import Near as Near

@@ -33,6 +33,8 @@ class Mesh:
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
         notes: what should be known of a mesh that was read, in words.
+        middles: where the nodes between the ends of each of `edges` are [m], shape (n_edges, dim), of triangles and
+            tetrahedra of second order; None where edges are straight. Elements of first order have none of them.
 
     Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
     twice, or a node belongs to no element.
@@ -44,6 +46,7 @@ class Mesh:
     node_groups: Mapping[str, Ints] = field(default_factory=dict)
     element_groups: Mapping[str, Ints] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    middles: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.element not in ELEMENT_KINDS:
@@ -59,6 +62,8 @@ class Mesh:
         object.__setattr__(self, "node_groups", _groups(self.node_groups, self.n_nodes, "node"))
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
         self._check()
+        if self.middles is not None:
+            object.__setattr__(self, "middles", self._checked_middles(self.middles))
 
     def __repr__(self) -> str:
         return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
@@ -87,6 +92,14 @@ class Mesh:
             twice = np.ones(len(self.elements), dtype=bool)
             twice[distinct_rows(ascending(self.elements.T)).first] = False
             self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
+
+    def _checked_middles(self, middles: Floats) -> Floats:
+        if self.element not in ("triangle", "tetrahedron"):
+            raise MeshError(f"middles are of triangles and tetrahedra, not of {self.element} elements")
+        try:
+            return frozen_floats(middles, self.edges.shape[:1] + (self.dim,), "middles")
+        except ValueError as error:
+            raise MeshError(str(error)) from None
 
     @property
     def _degenerate(self) -> Floats:

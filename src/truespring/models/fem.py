@@ -252,8 +252,7 @@ class FemPotential:
         section = self.problem.section
         assert section is not None  # fem_potential refuses bodies without one
         corner_slopes, slopes, weights = self._reference
-        corners = self.mesh.elements[first:last]
-        places = self.mesh.nodes[corners]
+        places = self.nodes[self.elements[first:last, : corner_slopes.shape[1]]]
         gradients = np.empty((len(places), *slopes.shape))
         volumes = np.empty((len(places), len(weights)))
         known = (places, corner_slopes, slopes, section.thickness * weights)
