@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
 from truespring.mesh.facets import facet_nodes
 from truespring.mesh.forms import Forms, find_forms
@@ -37,6 +38,8 @@ class Mesh:
             lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
             becomes one: the facets' nodes.
         notes: what should be known of a mesh that was read, in words.
+        middles: where the nodes between the ends of each of `edges` are [m], shape (n_edges, dim), of triangles and
+            tetrahedra of second order; None where edges are straight. Elements of first order have none of them.
 
     Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
     twice, or a node belongs to no element.
@@ -49,6 +52,7 @@ class Mesh:
     element_groups: Mapping[str, Ints] = field(default_factory=dict)
     facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    middles: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.element not in ELEMENT_KINDS:
@@ -66,6 +70,8 @@ class Mesh:
         nodes = {name: np.unique(self.facet_nodes(facets)) for name, facets in self.facet_groups.items()}
         object.__setattr__(self, "node_groups", _groups({**nodes, **self.node_groups}, self.n_nodes, "node"))
         self._check()
+        if self.middles is not None:
+            object.__setattr__(self, "middles", self._checked_middles(self.middles))
 
     def __repr__(self) -> str:
         return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
@@ -94,6 +100,21 @@ class Mesh:
             twice = np.ones(len(self.elements), dtype=bool)
             twice[distinct_rows(ascending(self.elements.T)).first] = False
             self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
+
+    def _checked_middles(self, middles: Floats) -> Floats:
+        if self.element not in ("triangle", "tetrahedron"):
+            raise MeshError(f"middles are of triangles and tetrahedra, not of {self.element} elements")
+        try:
+            frozen = frozen_floats(middles, (len(self.edges), self.dim), "middles")
+        except ValueError as error:
+            raise MeshError(str(error)) from None
+        keys = self.edges[:, 0] * self.n_nodes + self.edges[:, 1]  # ascending, as edges are
+        of_elements = np.searchsorted(keys, self.pair_keys(self.kind.edges).T)
+        places = np.concatenate([self.nodes[self.elements], frozen[of_elements]], axis=1)
+        shape = CELL_SHAPES["triangle6" if self.element == "triangle" else "tetra10"]
+        folded = shape.smallest_jacobian(places) <= 0
+        self._refuse(folded, "elements", "folded by the nodes in the middle of their edges", lambda: self.centres)
+        return frozen
 
     @property
     def _degenerate(self) -> Floats:
