@@ -15,8 +15,8 @@ import numpy as np
 from truespring.equilibrium import Path, Status, solve
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
-from truespring.outputs import UNFINISHED
 from truespring.opening import read_file
+from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
 from truespring.reference import Placing, Program, format_of, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
