@@ -79,7 +79,8 @@ def decisive(displacement: float, supports: Sequence[SupportError]) -> Decisive:
         errors.append(Decisive(_or_nan(one.force_error), "force", one.mine.name))
         errors.append(Decisive(_or_nan(one.torque_error), "torque", one.mine.name))
     known = [one for one in errors if not np.isnan(one.error)]
-    return max(known, key=lambda one: one.error) if known else Decisive(float("nan"), "")
+    # Errors that differ by rounding are equal.
+    return max(known, key=lambda one: float(f"{one.error:.6g}")) if known else Decisive(float("nan"), "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -101,7 +101,7 @@ class Objective:
         """Return dJ/dc by the adjoint, one linear system a level whatever the number of unknowns, shape (n,).
 
         With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
-        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces of supports r = G (f - F) - y, which depends on c by itself
+        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends on c by itself
         too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
         """
         seen = self._seen(values)
@@ -114,7 +114,7 @@ class Objective:
             for one in group:
                 scaled = (self._weights / one.observation.scale) ** 2 * _misfit(one)
                 back = (one.observation.rows.T @ scaled).reshape(tangent.shape)
-                if one.observation.quantity == "force":
+                if one.observation.quantity != "displacement":
                     direct += back
                     right += tangent.apply(back)
                 else:
@@ -135,7 +135,7 @@ class Objective:
             moves = np.stack([-tangent.solve(push.reshape(tangent.shape)).ravel() for push in pushes], axis=1)
             for one in group:
                 change = moves
-                if one.observation.quantity == "force":
+                if one.observation.quantity != "displacement":
                     pulled = [tangent.apply(move.reshape(tangent.shape)).ravel() for move in moves.T]
                     change = np.stack(pulled, axis=1) + pushes.T
                 blocks[id(one)] = self._weights / one.observation.scale * (one.observation.rows @ change)
