@@ -18,6 +18,8 @@ _VANISHING, _IDLE = 1e-3, 0.1
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _EQUAL = 1e-9
 
+Rows = sparse.csr_array[Any, tuple[int, int]]
+
 
 @dataclass(frozen=True, eq=False)
 class SupportForce:
@@ -92,7 +94,7 @@ def _holders(problem: Problem) -> Floats:
     return holders
 
 
-def resultant_rows(problem: Problem, support: int, positions: Floats, load_factor: float) -> tuple[Any, Any]:
+def resultant_rows(problem: Problem, support: int, positions: Floats, load_factor: float) -> tuple[Rows, Rows]:
     """Return what makes force and torque of a support from the reactions of all nodes, at given positions.
 
     Sparse, shape (dim, n_dof) and (1 or 3, n_dof), for reactions of shape (n_dof,); arguments as support_forces.
@@ -106,7 +108,7 @@ def resultant_rows(problem: Problem, support: int, positions: Floats, load_facto
     torques = _cross(np.repeat(arms, len(units), axis=0), forces.reshape(-1, dim))
     size = problem.mesh.nodes.size
 
-    def rows(values: Floats) -> Any:
+    def rows(values: Floats) -> Rows:
         several, columns = values.T, dofs.ravel()
         place = np.repeat(np.arange(len(several)), len(columns))
         return sparse.csr_array((several.ravel(), (place, np.tile(columns, len(several)))), shape=(len(several), size))

@@ -186,7 +186,8 @@ class LoadCase:
         """What sums the reactions of the support that moves most, whose force a curve tells, shape (dim, n_dof)."""
         support = leading_support(self.problem)
         assert support is not None  # a motion drives the body
-        return resultant_rows(self.problem, support, self.problem.mesh.nodes, level)[0]
+        force, _ = resultant_rows(self.problem, support, self.problem.mesh.nodes, level)
+        return force
 
     def _probe(self, node: int) -> Rows:
         dim = self.problem.mesh.dim
