@@ -178,10 +178,17 @@ def _two_lines(result: Result, name: str) -> str:
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
-def plot(title: str, x_label: str, y_label: str, curves: Sequence[Curve], to_right: float | None = None) -> Area:
+def plot(
+    title: str,
+    x_label: str,
+    y_label: str,
+    curves: Sequence[Curve],
+    to_right: float | None = None,
+    far: bool = False,
+) -> Area:
     """Curves with their names at their ends, moved apart where they would meet.
 
-    The axes end at 0 or below and, with `to_right`, span 0 to that.
+    The axes end at 0 or below, but for values that lie `far` from 0, and, with `to_right`, span 0 to that.
     """
     from matplotlib.lines import Line2D
 
@@ -193,7 +200,7 @@ def plot(title: str, x_label: str, y_label: str, curves: Sequence[Curve], to_rig
     sheet = Sheet(max(5.9, left + 3.2 + right), bottom + height + top, title)
     low, high = _span([curve.y for curve in curves])
     x = _span([curve.x for curve in curves]) if to_right is None else (0.0, to_right)
-    y = (min(low, 0.0) if to_right is None else 0.0, high)
+    y = (low if far else min(low, 0.0) if to_right is None else 0.0, high)
     area = Area(sheet, left, bottom, sheet.width - left - right, height, x, y)
     draw_frame(area, x_label, y_label)
     draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)

@@ -1,14 +1,15 @@
 """Tables for a terminal, as rich renderables: moduli before a solve, status and errors after it."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
+from truespring.report.settling import settling_rows
 from truespring.report.summary import difference
 from truespring.report.supports import support_rows
 from truespring.report.verdict import verdict
-from truespring.settling import Settling
+from truespring.settling import Refinement
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -129,15 +130,11 @@ _DIFFERENCES = {
 }
 
 
-def settling_table(title: str, several: Iterable[Settling]) -> "Table":
-    """Return what quantities come to on finer meshes: value, change, order, extrapolated value, error."""
+def settling_table(title: str, found: Refinement) -> "Table":
+    """Return what quantities come to on finer meshes: value, order, extrapolated value, error, and what they tell."""
     table = _table(title, "model", "", "value", "order", "at h = 0", "error", "")
-    for one in several:
-        order = "-" if one.order is None else f"{one.order:.2f}"
-        limit = "-" if one.extrapolated is None else f"{one.extrapolated:.6g}"
-        error = "-" if one.error is None else f"{one.error:.2%}"
-        value = f"{one.values[-1]:.6g} {one.unit}"
-        table.add_row(one.model, one.quantity, value, order, limit, error, "settled" if one.settled else "")
+    for row in settling_rows(found):
+        table.add_row(*row)
     return table
 
 
