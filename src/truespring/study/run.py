@@ -31,8 +31,9 @@ from truespring.models import (
 )
 from truespring.outputs import Output, write_whole
 from truespring.problem import Problem
+from truespring.reactions import moved_supports
 from truespring.reference import Program
-from truespring.report.curves import moved_supports, write_curves, write_reactions
+from truespring.report.curves import write_curves, write_reactions
 from truespring.report.result import Result
 from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
@@ -242,7 +243,7 @@ def write_rest(result: Result, output: Output, command: str | None) -> None:
     if moved_supports(result.problem):
         write_reactions(result, folder / "reactions.csv")
     if result.problem.mesh.element != "line":
-        write_mesh(result.problem.mesh, folder / "mesh.vtu")
+        write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
     if command is not None:
         from truespring.report.figures import save_figures
         from truespring.report.page import write_page
