@@ -338,7 +338,7 @@ def _converge(options: argparse.Namespace) -> int:
     console = _console(options)
     found: dict[str, Any] = {}
     for study in studies:
-        for told in converge(study.file, options.tolerance, options.meshes):
+        for told in converge(study, options.tolerance, options.meshes):
             found[study.stem] = told
             with _writing(options.out):
                 write_settling(told, options.out / study.stem)

@@ -19,7 +19,7 @@ from truespring.study.run import follow
 
 
 def converge(
-    file: str | Path,
+    study: Study | str | Path,
     tolerance: float = 0.01,
     most: int = 5,
     report: Callable[[Study, str], None] | None = None,
@@ -30,11 +30,12 @@ def converge(
     probe's displacement along each axis, the stored energy, and the reaction where motion drives the body. Raises
     StudyError where the mesh cannot be refined.
     """
+    given = study if isinstance(study, Study) else read_study(study)
     nodes: list[int] = []
     values: dict[tuple[str, str, str], list[float]] = {}
     place = None
     for halvings in range(most):
-        study = read_study(file, halvings)
+        study = given.finer(halvings) if halvings else given
         nodes.append(study.problem.mesh.n_nodes)
         models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Equilibria)}
         if not models:
