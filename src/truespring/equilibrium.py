@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -9,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.errors import ModelError, ProblemError
+from truespring.errors import ModelError, ProblemError, TruespringError, one_line
 from truespring.mesh import Grid, Shell, Surface, select
 from truespring.mesh.selections import AXES
 from truespring.models import (
@@ -83,6 +84,7 @@ class State:
             under displacement control the share of the displacement, not a number at a critical point.
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
+        reason: why no balance was looked for beyond it, in words, where it was not.
     """
 
     load_factor: float
@@ -102,6 +104,7 @@ class State:
     critical: str = ""
     mode: Floats | None = None
     level: float = math.nan
+    reason: str = ""
 
     def __repr__(self) -> str:
         return (
@@ -235,7 +238,8 @@ def solve(
     `solver` is Newton, which takes the load up in steps and keeps to stable states, or DisplacementControl or
     ArcLength, which go on past limit points, through unstable states too.
     `model` is Springs, Fem, or a potential such as a SpringNetwork, which is taken as it is (the
-    problem then needs no material). A failure is not an exception: see Path.status and Path.best.
+    problem then needs no material). A failure is not an exception: see Path.status and Path.best;
+    what a library raises on the way ends the path, and so does a TimeoutError that `report` raises.
     Raises ModelError where the model does not fit the problem.
     """
     if not isinstance(model, Potential) and not hasattr(model, "potential"):
@@ -257,6 +261,8 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
         )
     if isinstance(model, SpringNetwork):
         refuse_mechanism(model, problem.loading.held)
+    if isinstance(solver, DisplacementControl):
+        refuse_control(problem, solver)
     linear = isinstance(model, Fem | MassTensor) and not LAWS[model.law].finite
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
     if linear:
@@ -272,17 +278,18 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
             follow = solver.follow(potential, loading, _weights(problem, potential, solver), report)
         case ArcLength():
             follow = solver.follow(potential, loading, report)
-    found = list(follow)
+    found, broken = _followed(follow, potential, loading)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
+    label, kind = _named(model)
     return Path(
         problem=problem,
-        label="springs" if isinstance(model, SpringNetwork) else getattr(model, "label", type(model).__name__),
-        kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
+        label=label,
+        kind=kind,
         states=states,
-        status=_status(states, best, linear, isinstance(solver, Newton)),
-        warnings=(*known, *_path_warnings(states, best, linear, isinstance(solver, Newton))),
+        status=Status.NOT_CONVERGED if broken else _status(states, best, linear, isinstance(solver, Newton)),
+        warnings=(*known, *broken, *_path_warnings(states, best, linear, isinstance(solver, Newton))),
         best=best,
         potential=potential,
         n_unknowns=int((~loading.held).sum()),
@@ -290,11 +297,90 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
     )
 
 
-def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
-    """What makes the controlled displacement of those of all nodes, shape (n_nodes, dim): a mean."""
+def _followed(
+    follow: Iterator[Equilibrium], potential: Potential, loading: Loading
+) -> tuple[list[Equilibrium], tuple[str, ...]]:
+    """The states up to where the path or an exception ends, at least that at rest; and what is to be said of it."""
+    found: list[Equilibrium] = []
+    try:
+        for one in follow:
+            found.append(one)
+    except TruespringError:
+        raise
+    except (ArithmeticError, ValueError, RuntimeError, MemoryError, TimeoutError) as error:  # as numpy and SciPy raise
+        at = found[-1].load_factor if found else 0.0
+        broken = (f"stopped beyond load factor {at:.6g}: {error_words(error)}; {Status.NOT_CONVERGED.advice}",)
+        return found or [_rest(potential.nodes)], broken
+    return found, ()
+
+
+def error_words(error: BaseException) -> str:
+    """Return what an exception says, in one line: its kind too where it is not meant for the reader."""
+    if isinstance(error, MemoryError):
+        return "out of memory: take fewer elements"
+    text = one_line(str(error))
+    return text if isinstance(error, TruespringError | TimeoutError) else f"{type(error).__name__}: {text}"
+
+
+def _rest(nodes: Floats) -> Equilibrium:
+    """The body without load, of whose stability nothing is known."""
+    still = np.zeros_like(nodes)
+    return Equilibrium(0.0, nodes, still, still, 0.0, 0, 0.0, converged=True)
+
+
+def _named(model: object) -> tuple[str, str]:
+    """The label and the kind of a model."""
+    if isinstance(model, SpringNetwork):
+        return "springs", "springs"
+    return getattr(model, "label", type(model).__name__), getattr(model, "kind", "potential")
+
+
+def unsolved(problem: Problem, model: object, error: BaseException) -> Path:
+    """Return the path of a model that an exception ended before anything was known: the body at rest, and why."""
+    label, kind = _named(model)
+    nodes = problem.mesh.nodes
+    rest = _rest(nodes)
+    still = rest.internal_force
+    state = State(
+        load_factor=0.0,
+        positions=nodes,
+        all_positions=nodes,
+        displacement=still,
+        reaction=still,
+        applied_force=np.zeros(problem.mesh.dim),
+        energy=0.0,
+        iterations=0,
+        residual=0.0,
+        negative_eigenvalues=None,
+        branched=False,
+        area_ratio=1.0,
+        stretch=None,
+        level=0.0,
+    )
+    return Path(
+        problem=problem,
+        label=label,
+        kind=kind,
+        states=(state,),
+        status=Status.NOT_CONVERGED,
+        warnings=(f"not solved: {error_words(error)}",),
+        n_unknowns=int((~problem.loading.held).sum()),
+    )
+
+
+def refuse_control(problem: Problem, control: DisplacementControl) -> None:
+    """Raise ProblemError where a support dictates what is to be controlled, or the body has no such direction."""
     axes = AXES[: problem.mesh.dim]
     if control.direction not in axes:
         raise ProblemError(f"direction = {control.direction!r}: allowed are {', '.join(axes)}")
+    nodes = select(problem.mesh, control.on)  # type: ignore[arg-type]
+    if problem.loading.held[nodes, axes.index(control.direction)].any():
+        raise ProblemError("the displacement that is controlled is held by a support: choose another")
+
+
+def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
+    """What makes the controlled displacement of those of all nodes, shape (n_nodes, dim): a mean."""
+    axes = AXES[: problem.mesh.dim]
     weights = np.zeros(potential.nodes.shape)
     nodes = select(problem.mesh, control.on)  # type: ignore[arg-type]
     weights[nodes, axes.index(control.direction)] = 1.0 / len(nodes)
@@ -327,6 +413,7 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         critical=found.critical,
         mode=None if found.mode is None else found.mode[:n_nodes],
         level=_level(found),
+        reason=found.reason,
         area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
@@ -361,7 +448,8 @@ def _path_warnings(
         good = [state.load_factor for state in states if not bad or state.load_factor < bad[0]]
         last = f"{good[-1]:.6g}" if good else "none"
         warnings.append(
-            f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
+            best.reason
+            or f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
             f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.equilibrium import Path, Solver
+from truespring.equilibrium import Path, Solver, refuse_control
 from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest, one_line, shown
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
@@ -263,7 +263,9 @@ class _Builder:
             with self.at("solver", "on"):
                 select(problem.mesh, table.on)
             with self.at("solver"):
-                return DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
+                control = DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
+                refuse_control(problem, control)
+                return control
         if table.control == "arc-length":
             with self.at("solver", "linear"):
                 return ArcLength(table.load_steps, table.max_steps, **past)

@@ -120,9 +120,7 @@ def _selection(value: Any) -> Selection:
 
 def _point(value: Any) -> tuple[float, ...]:
     if not isinstance(value, list) or len(value) not in (2, 3):
-        raise TruespringError(
-            f'{shown(value)} is no point: wanted are coordinates such as ["160 mm", "20 mm"]'
-        )
+        raise TruespringError(f'{shown(value)} is no point: wanted are coordinates such as ["160 mm", "20 mm"]')
     return tuple(to_si(coordinate, "length") for coordinate in value)
 
 
