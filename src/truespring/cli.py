@@ -3,17 +3,20 @@
 import argparse
 import gc
 import importlib
+import io
 import json
+import math
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truespring.errors import TruespringError
+from truespring.errors import TruespringError, one_line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,6 +31,46 @@ CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 converged, 1 not, 2 the input is wrong."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed before the command began: what is opened next would take its place
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):  # what a terminal cannot show is no reason to stop
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = _run_verb(arguments)
+    except SystemExit as end:  # of the parser, which has said why
+        return _said(end.code if isinstance(end.code, int) else WRONG_INPUT, end)
+    return _said(code)
+
+
+def _said(code: int, end: SystemExit | None = None) -> int:
+    """Return the exit code, but 1 for 0 where standard output did not take all that was said; raise `end`, if any."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        unsaid = _unsaid(error)
+        return code or unsaid
+    if end is not None:
+        raise end
+    return code
+
+
+def _unsaid(error: OSError) -> int:
+    """Say that standard output cannot be written, and throw away what is left, which Python would write at its end."""
+    _say(f"standard output cannot be written: {error.strerror}")
+    with Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    return NOT_CONVERGED
+
+
+def _say(text: str) -> None:
+    """Say something on standard error, if that can be."""
+    with suppress(OSError):
+        print(f"truespring: {text}", file=sys.stderr, flush=True)
+
+
+def _run_verb(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     try:
         _load()
@@ -36,13 +79,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return code
     except TruespringError as error:
         for line in str(error).splitlines():
-            print(f"truespring: {line}", file=sys.stderr)
+            _say(line)
         return WRONG_INPUT
     except MemoryError:
-        print("truespring: out of memory: take fewer elements", file=sys.stderr)
+        _say("out of memory: take fewer elements")
         return NOT_CONVERGED
     except KeyboardInterrupt:
         return INTERRUPTED
+    except OSError as error:
+        if error.filename is None:  # no file of ours: those are named
+            return _unsaid(error)
+        _say(f"{error.filename}: {error.strerror}")
+        return NOT_CONVERGED
+    except Exception as error:
+        if sys.flags.dev_mode:  # python -X dev shows where
+            raise
+        told = f"{type(error).__name__}: {one_line(str(error))}"
+        _say(f"a fault of truespring's own, please report it with the study: {told}")
+        return NOT_CONVERGED
 
 
 def _load() -> None:
@@ -86,6 +140,8 @@ def _parser() -> argparse.ArgumentParser:
     ):
         verb = add(name, run, summary)
         verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+        if name != "moduli":
+            _add_timeout(verb)
     verb = add("converge", _converge, "solve a study on finer and finer meshes until what is watched settles")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
     verb.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relative, default: 0.01")
@@ -116,6 +172,15 @@ def _parser() -> argparse.ArgumentParser:
     add("rules", _rules, "list the stiffness rules: what they realise, and their source", studies=False)
     add("schema", _schema, "print the JSON Schema of a study file", studies=False)
     return parser
+
+
+def _add_timeout(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--timeout",
+        type=_seconds,
+        metavar="SECONDS",
+        help="give a model up after so long; default: never, another program after 3600",
+    )
 
 
 def _add_sweep(verb: argparse.ArgumentParser) -> None:
@@ -201,6 +266,7 @@ def _add_sources(verb: argparse.ArgumentParser) -> None:
         ".frd, .dat, .rst, .vtu, .pvd, .stl, .csv of markers",
     )
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
+    _add_timeout(verb)
     verb.add_argument(
         "--probe", metavar="POINT", help='such as right-middle or "160 mm, 20 mm"; default: what moves most'
     )
@@ -232,10 +298,10 @@ def _positive(text: str) -> int:
 
 
 def _seconds(text: str) -> float:
-    number = float(text)
-    if not 0 < number < float("inf"):
+    seconds = float(text)
+    if not 0 < seconds < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not a positive number of seconds")
-    return number
+    return seconds
 
 
 @contextmanager
@@ -274,7 +340,7 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
             _print_realised(console, study.stem, realised_moduli(study))
         with _output(study, options.out) as (output, known):
             with _progress(options) as progress:
-                result = run(study, progress, comparing, known)
+                result = run(study, progress, comparing, options.timeout, known)
             results.append(result)
             with _writing(options.out):
                 (options.out / "report.html").unlink(missing_ok=True)  # it is over what was there before
@@ -375,7 +441,7 @@ def _converge(options: argparse.Namespace) -> int:
     told_of = [(f"--{name}", str(getattr(options, name))) for name in ("tolerance", "meshes", "out")]
     command = shlex.join(["truespring", "converge", *options.study, *(part for pair in told_of for part in pair)])
     for study in studies:
-        for told in converge(study.file, options.tolerance, options.meshes):
+        for told in converge(study, options.tolerance, options.meshes):
             found[study.stem] = told
             with _writing(options.out):
                 page = write_settling(study.title, study.file, told, options.out / study.stem, command)
@@ -403,7 +469,7 @@ def _compare(options: argparse.Namespace) -> int:
     _reserve(options)
     with _progress(options) as progress:
         advance = None if progress is None else lambda text, share: progress("reading", text, share)
-        results = list(compare_sources(sources, probe, options.tolerance, advance))
+        results = list(compare_sources(sources, probe, options.tolerance, advance, options.timeout))
     with _writing(options.out):
         report = write_comparisons(results, options.out, options.source, told)
     console = _console(options)

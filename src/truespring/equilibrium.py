@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.errors import ModelError, ProblemError
+from truespring.errors import ModelError, ProblemError, TruespringError, one_line
 from truespring.mesh import Grid, Shell, Surface, select
 from truespring.mesh.selections import AXES
 from truespring.models import (
@@ -89,6 +89,7 @@ class State:
         stretch: smallest and largest length over rest length of the springs, None without springs.
         supports: force and torque of each moved support where they were told with the state (read from a file, or
             known on another mesh), None where the reactions tell them: see Path.support_forces.
+        reason: why no balance was looked for beyond it, in words, where it was not.
     """
 
     load_factor: float
@@ -109,6 +110,7 @@ class State:
     mode: Floats | None = None
     level: float = math.nan
     supports: tuple[SupportForce, ...] | None = None
+    reason: str = ""
 
     def __repr__(self) -> str:
         return (
@@ -259,7 +261,8 @@ def solve(
     `solver` is Newton, which takes the load up in steps and keeps to stable states, or DisplacementControl or
     ArcLength, which go on past limit points, through unstable states too.
     `model` is Springs, Fem, or a potential such as a SpringNetwork, which is taken as it is (the
-    problem then needs no material). A failure is not an exception: see Path.status and Path.best.
+    problem then needs no material). A failure is not an exception: see Path.status and Path.best;
+    what a library raises on the way ends the path, and so does a TimeoutError that `report` raises.
     Raises ModelError where the model does not fit the problem.
     """
     if not isinstance(model, Potential) and not hasattr(model, "potential"):
@@ -281,6 +284,8 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
         )
     if isinstance(model, SpringNetwork):
         refuse_mechanism(model, problem.loading.held)
+    if isinstance(solver, DisplacementControl):
+        refuse_control(problem, solver)
     linear = isinstance(model, Fem | MassTensor) and not LAWS[model.law].finite
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
     if linear:
@@ -296,17 +301,19 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
             follow = solver.follow(potential, loading, _weights(problem, potential, solver), report)
         case ArcLength():
             follow = solver.follow(potential, loading, report)
-    found, drowned = _up_to_drowned(problem, follow)
+    found, broken = _followed(follow, potential, loading)
+    found, drowned = _up_to_drowned(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
+    label, kind = _named(model)
     return Path(
         problem=problem,
-        label="springs" if isinstance(model, SpringNetwork) else getattr(model, "label", type(model).__name__),
-        kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
+        label=label,
+        kind=kind,
         states=states,
-        status=_status(states, best, linear, isinstance(solver, Newton)),
-        warnings=(*known, *_path_warnings(states, best, linear, isinstance(solver, Newton), drowned)),
+        status=Status.NOT_CONVERGED if broken else _status(states, best, linear, isinstance(solver, Newton)),
+        warnings=(*known, *broken, *_path_warnings(states, best, linear, isinstance(solver, Newton), drowned)),
         best=best,
         potential=potential,
         n_unknowns=int((~loading.held).sum()),
@@ -340,11 +347,90 @@ def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
     return loading.driven_by_motion and _UNBALANCED * moved > rounding
 
 
-def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
-    """What makes the controlled displacement of those of all nodes, shape (n_nodes, dim): a mean."""
+def _followed(
+    follow: Iterator[Equilibrium], potential: Potential, loading: Loading
+) -> tuple[list[Equilibrium], tuple[str, ...]]:
+    """The states up to where the path or an exception ends, at least that at rest; and what is to be said of it."""
+    found: list[Equilibrium] = []
+    try:
+        for one in follow:
+            found.append(one)
+    except TruespringError:
+        raise
+    except (ArithmeticError, ValueError, RuntimeError, MemoryError, TimeoutError) as error:  # as numpy and SciPy raise
+        at = found[-1].load_factor if found else 0.0
+        broken = (f"stopped beyond load factor {at:.6g}: {error_words(error)}; {Status.NOT_CONVERGED.advice}",)
+        return found or [_rest(potential.nodes)], broken
+    return found, ()
+
+
+def error_words(error: BaseException) -> str:
+    """Return what an exception says, in one line: its kind too where it is not meant for the reader."""
+    if isinstance(error, MemoryError):
+        return "out of memory: take fewer elements"
+    text = one_line(str(error))
+    return text if isinstance(error, TruespringError | TimeoutError) else f"{type(error).__name__}: {text}"
+
+
+def _rest(nodes: Floats) -> Equilibrium:
+    """The body without load, of whose stability nothing is known."""
+    still = np.zeros_like(nodes)
+    return Equilibrium(0.0, nodes, still, still, 0.0, 0, 0.0, converged=True)
+
+
+def _named(model: object) -> tuple[str, str]:
+    """The label and the kind of a model."""
+    if isinstance(model, SpringNetwork):
+        return "springs", "springs"
+    return getattr(model, "label", type(model).__name__), getattr(model, "kind", "potential")
+
+
+def unsolved(problem: Problem, model: object, error: BaseException) -> Path:
+    """Return the path of a model that an exception ended before anything was known: the body at rest, and why."""
+    label, kind = _named(model)
+    nodes = problem.mesh.nodes
+    rest = _rest(nodes)
+    still = rest.internal_force
+    state = State(
+        load_factor=0.0,
+        positions=nodes,
+        all_positions=nodes,
+        displacement=still,
+        reaction=still,
+        applied_force=np.zeros(problem.mesh.dim),
+        energy=0.0,
+        iterations=0,
+        residual=0.0,
+        negative_eigenvalues=None,
+        branched=False,
+        area_ratio=1.0,
+        stretch=None,
+        level=0.0,
+    )
+    return Path(
+        problem=problem,
+        label=label,
+        kind=kind,
+        states=(state,),
+        status=Status.NOT_CONVERGED,
+        warnings=(f"not solved: {error_words(error)}",),
+        n_unknowns=int((~problem.loading.held).sum()),
+    )
+
+
+def refuse_control(problem: Problem, control: DisplacementControl) -> None:
+    """Raise ProblemError where a support dictates what is to be controlled, or the body has no such direction."""
     axes = AXES[: problem.mesh.dim]
     if control.direction not in axes:
         raise ProblemError(f"direction = {control.direction!r}: allowed are {', '.join(axes)}")
+    nodes = select(problem.mesh, control.on)  # type: ignore[arg-type]
+    if problem.loading.held[nodes, axes.index(control.direction)].any():
+        raise ProblemError("the displacement that is controlled is held by a support: choose another")
+
+
+def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
+    """What makes the controlled displacement of those of all nodes, shape (n_nodes, dim): a mean."""
+    axes = AXES[: problem.mesh.dim]
     weights = np.zeros(potential.nodes.shape)
     nodes = select(problem.mesh, control.on)  # type: ignore[arg-type]
     weights[nodes, axes.index(control.direction)] = 1.0 / len(nodes)
@@ -377,6 +463,7 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         critical=found.critical,
         mode=None if found.mode is None else found.mode[:n_nodes],
         level=_level(found),
+        reason=found.reason,
         area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
@@ -412,7 +499,8 @@ def _path_warnings(
         last = f"{good[-1]:.6g}" if good else "none"
         why = _DROWNED if drowned else Status.NOT_CONVERGED.advice
         warnings.append(
-            f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
+            best.reason
+            or f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
             f"last good load factor: {last}; {why}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]

@@ -53,3 +53,20 @@ def nearest(word: str, allowed: Iterable[str]) -> str:
 def close_words(word: str, allowed: Iterable[str]) -> list[str]:
     """Return the allowed word nearest to `word` in a list of one, an empty list where none is near."""
     return difflib.get_close_matches(word, list(allowed), n=1, cutoff=0.5)
+
+
+def shown(value: object, most: int = 80) -> str:
+    """Return a value as Python writes it, for a message: cut in the middle where it is longer than `most`."""
+    if isinstance(value, int) and abs(value) >= 10**most:  # Python refuses to write integers of thousands of digits
+        return f"an integer of more than {most} digits"
+    return _cut(repr(value), most)
+
+
+def one_line(text: str, most: int = 1000) -> str:
+    """Return a message as one line: what does not print is escaped, and it is cut in the middle beyond `most`."""
+    printed = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+    return _cut(printed, most)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]} ... {text[-most // 4 :]}"

@@ -5,7 +5,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
-from truespring.errors import TruespringError
+from truespring.errors import TruespringError, shown
 
 if TYPE_CHECKING:
     import pint
@@ -24,8 +24,14 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "stiffness": ("N/m", '"5 N/mm"'),
 }
 
-# Far beyond any body, and squares of it still are numbers.
-_SMALLEST, _LARGEST = 1e-30, 1e30
+#: The sizes that a quantity may have, in SI: far beyond any body, and their fourth powers are still numbers.
+SMALLEST, LARGEST = 1e-30, 1e30
+
+#: The same in words.
+SIZES = f"of a size from {SMALLEST:g} to {LARGEST:g}"
+
+# No quantity that anyone writes is longer; what is shorter is read at once.
+_LONGEST = 100
 
 
 @cache
@@ -52,11 +58,11 @@ def to_si(value: object, dimension: Dimension) -> float:
         except OverflowError:
             number = math.inf
     else:
-        raise TruespringError(f"{value!r} is not a {dimension}: {allowed}")
+        raise TruespringError(f"{shown(value)} is not a {dimension}: {allowed}")
     if not math.isfinite(number):
         raise TruespringError(f"{value!s:.40} is not finite: {allowed}")
-    if number and not _SMALLEST <= abs(number) <= _LARGEST:
-        raise TruespringError(f"{value!r} is out of range: {allowed}, of a size from {_SMALLEST:g} to {_LARGEST:g}")
+    if number and not SMALLEST <= abs(number) <= LARGEST:
+        raise TruespringError(f"{shown(value)} is out of range: {allowed}, {SIZES}")
     return number
 
 
@@ -94,6 +100,8 @@ _WRONG_CASE: dict[Dimension, tuple[str, str, str, float]] = {
 
 
 def _parse(text: str, unit: str, allowed: str) -> float:
+    if len(text) > _LONGEST:
+        raise TruespringError(f"{shown(text)} has {len(text)} characters, at most {_LONGEST} are read: {allowed}")
     read = _QUANTITY.fullmatch(text)
     if read is None:
         hint = "write a decimal point, not a comma: " if "," in text else ""
@@ -112,3 +120,10 @@ def _parse(text: str, unit: str, allowed: str) -> float:
         raise TruespringError(f"'{text}' is in {error.units1}, not in {unit}: {allowed}") from None
     except pint.UndefinedUnitError:
         raise TruespringError(f"'{text}' has an unknown unit (upper and lower case matter): {allowed}") from None
+    except (
+        pint.PintError,
+        ArithmeticError,
+        ValueError,
+        TypeError,
+    ) as error:  # as of degC
+        raise TruespringError(f"'{text}' cannot be read: {error}: {allowed}") from None

@@ -43,8 +43,10 @@ class Program(Protocol):
         """Raise TruespringError, before anything is solved, where it cannot be run."""
         ...
 
-    def run(self, problem: Problem, solver: Solver, report: Reporter | None = None) -> Path:
-        """Follow the equilibria at the load levels that the solver asks for."""
+    def run(
+        self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
+    ) -> Path:
+        """Follow the equilibria at the load levels that the solver asks for, for `timeout` seconds at most."""
         ...
 
 
@@ -93,10 +95,13 @@ class CalculiX:
         check_springs(problem, network)
         return network
 
-    def run(self, problem: Problem, solver: Solver, report: Reporter | None = None) -> Path:
+    def run(
+        self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
+    ) -> Path:
         """Run ccx in a folder of its own and return the states that it reached, those at rest first.
 
-        A run that does not converge is not an exception: the path ends at the last level reached. Raises ModelError
+        A run that does not converge is not an exception, nor is one that takes longer than `timeout` seconds, by
+        default an hour: the path ends at the last level reached. Raises ModelError
         and ExportError as `check` does.
         """
         self.check(problem, solver)
@@ -115,7 +120,7 @@ class CalculiX:
         with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
             file = FilePath(folder) / "model.inp"
             file.write_text(deck, encoding="utf-8")
-            finished = run_ccx(file, reached=reached)
+            finished = run_ccx(file, reached=reached, timeout=timeout)
             try:
                 found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
             except ReferenceFileError as error:  # as where ccx was ended while it wrote
@@ -203,6 +208,8 @@ class CalculiX:
 
 
 def _said(finished: Finished) -> str:
+    if finished.timeout is not None:
+        return f"nothing, the time of {finished.timeout:g} s was up (--timeout)"
     if finished.errors:
         return f"'{finished.errors[-1]}'"
     return f"nothing (exit code {finished.code}); are its equations singular at rest, a part of the body free to move?"
@@ -215,7 +222,7 @@ def _results(file: FilePath, n_nodes: int) -> list[tuple[Level, Floats]]:
     levels = [
         replace(one, energy=None if one.energy is None else FORCE_UNIT * one.energy) for one in read_dat(file).levels
     ]
-    return list(zip(levels, _forces(file, n_nodes), strict=True))
+    return list(zip(levels, _forces(file, n_nodes), strict=False))  # of a level cut off there are no forces
 
 
 def _forces(file: FilePath, n_nodes: int) -> Iterator[Floats]:

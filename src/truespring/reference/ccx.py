@@ -14,6 +14,9 @@ from truespring.errors import ModelError
 #: Called with the number of the step and the share of it that is done.
 Reached = Callable[[int, float], None]
 
+#: After so long ccx is ended where no other limit is given [s].
+TIMEOUT = 3600.0
+
 # How long to wait before looking again how far ccx is [s].
 _PATIENCE = 0.2
 # Lines of what ccx says of an error that are told.
@@ -42,12 +45,14 @@ class Finished:
         seconds: wall time.
         errors: what it says of each error, in its words.
         efforts: of the steps that it began, by their number from 1; empty without geometric nonlinearity.
+        timeout: the limit that ended it [s], None where it ended by itself.
     """
 
     code: int
     seconds: float
     errors: tuple[str, ...]
     efforts: dict[int, Effort]
+    timeout: float | None = None
 
 
 def find_ccx() -> str:
@@ -58,8 +63,10 @@ def find_ccx() -> str:
     return found
 
 
-def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = None) -> Finished:
-    """Run ccx on a deck in its own folder, which gets what ccx writes.
+def run_ccx(
+    deck: Path, threads: int | None = None, reached: Reached | None = None, timeout: float | None = None
+) -> Finished:
+    """Run ccx on a deck in its own folder, which gets what ccx writes, for `timeout` seconds at most.
 
     `threads` are by default as many as truespring takes. Raises ModelError where ccx is not installed.
     """
@@ -67,7 +74,8 @@ def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = No
 
     program, said = find_ccx(), deck.with_suffix(".txt")
     environment = os.environ | {"OMP_NUM_THREADS": str(threads or n_threads())}
-    started = time.perf_counter()
+    started, limit = time.perf_counter(), TIMEOUT if timeout is None else timeout
+    ended = None
     with said.open("wb") as stream:
         process = subprocess.Popen(
             [program, "-i", deck.stem], cwd=deck.parent, env=environment, stdout=stream, stderr=subprocess.STDOUT
@@ -75,9 +83,12 @@ def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = No
         try:
             while True:
                 try:
-                    process.wait(_PATIENCE)
+                    process.wait(min(_PATIENCE, limit))
                     break
                 except subprocess.TimeoutExpired:
+                    if time.perf_counter() - started > limit:
+                        ended = limit
+                        break
                     if reached and (done := [row for row in _increments(deck) if row.converged]):
                         reached(done[-1].step, done[-1].share)
         finally:
@@ -89,7 +100,7 @@ def run_ccx(deck: Path, threads: int | None = None, reached: Reached | None = No
         before = efforts.get(row.step, Effort(0, 0))
         efforts[row.step] = Effort(before.increments + row.converged, before.iterations + row.iterations)
     errors = tuple(_errors(said.read_text(encoding="utf-8", errors="replace").splitlines()))
-    return Finished(process.returncode, seconds, errors, efforts)
+    return Finished(process.returncode, seconds, errors, efforts, ended)
 
 
 class _Increment(NamedTuple):

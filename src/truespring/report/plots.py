@@ -228,7 +228,7 @@ def plot(
 
 def _stretches(curve: Curve) -> Iterator[tuple[slice, bool]]:
     """Cut a curve into stretches that are stable or not: a step is stable where both its ends are."""
-    if curve.unstable is None or not curve.unstable.any():
+    if curve.unstable is None or not curve.unstable.any() or len(curve.unstable) == 1:
         yield slice(None), False
         return
     steps = curve.unstable[:-1] | curve.unstable[1:]

@@ -23,6 +23,8 @@ _EPS = float(np.finfo(float).eps)
 _NEAR_BEST = 10.0
 # Rounding is estimated for bodies up to so many times their rest size.
 _LARGEST_STRETCH = 100.0
+# An iteration that is so many times the body's size away from rest will not come back, and its energies overflow.
+_LOST = 1e8
 # Linear systems are solved to this share of their right side, and to less only where that ends the iteration.
 _ACCURACY, _FINEST_ACCURACY = 2e-3, 1e-5
 
@@ -45,6 +47,7 @@ class Equilibrium:
         critical: "limit point" or "bifurcation" where stability changes there, else empty.
         mode: the way in which a body gives way at a critical point, largest component 1, shape (n_nodes, dim).
         level: how far the way is gone that the solver was asked for, 0 to 1, where that is not the load factor.
+        reason: why no balance was looked for, in words, where it was not.
         cost: of the path up to here.
     """
 
@@ -62,6 +65,7 @@ class Equilibrium:
     critical: str = ""
     mode: Floats | None = None
     level: float | None = None
+    reason: str = ""
     cost: Cost | None = None
 
 
@@ -231,6 +235,8 @@ class Watch:
 
         A state whose held nodes have not made their motion yet is none to return.
         """
+        if not np.abs(positions - self._balance.potential.nodes).max() <= _LOST * self._balance.size:
+            return False
         internal = self._balance.potential.gradient(positions)
         applied = self._balance.loading.force(positions, self.load_factor)
         self.force, self._scale = self._balance.unbalanced(internal, applied)

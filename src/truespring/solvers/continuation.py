@@ -30,6 +30,8 @@ _WANTED_ITERATIONS = 4
 _STRAIGHT = 0.5
 # A step is cut back to this share of the first one at least.
 _SHORTEST = 2.0**-12
+# Where the first step would take a body so many times its size away, the load does not move what is controlled.
+_FAR = 100.0
 # A critical point where no balance is found is taken for a known state this near, as a share of the step.
 _NEAR = 1e-6
 
@@ -140,6 +142,9 @@ def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Ite
     """Follow equal steps of one displacement, halved where they fail."""
     last = _at_rest(balance)
     yield last.state
+    if reason := _idle(balance, last.state, weights, to / steps):
+        yield _with_cost(balance, replace(last.state, converged=False, residual=np.inf, reason=reason))
+        return
     reached, level, step = 0.0, 1, to / steps
     while last.state.converged and level <= steps:
         wanted = to * (level / steps)
@@ -158,6 +163,21 @@ def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Ite
         if goal == wanted:
             level += 1
         step = np.sign(to) * min(2 * abs(step), abs(to / steps))
+
+
+def _idle(balance: Balance, rest: Equilibrium, weights: Floats, step: float) -> str:
+    """Say that the load does not move what is controlled, where the body at rest answers so; else nothing."""
+    tangent = _tangent(balance, rest, None)
+    if tangent is None:
+        return ""
+    own = abs(float((weights * tangent[0]).sum()))
+    moved = float(np.abs(tangent[0]).max())
+    if abs(step) * moved <= _FAR * balance.size * own:
+        return ""
+    return (
+        f"the load does not move what is controlled: at rest that moves by {own / moved:.1e} of what the node moves "
+        "that moves most; control a displacement along the load, or follow the path by its arc length"
+    )
 
 
 def _along(balance: Balance, first: float, max_steps: int, longest: float) -> Iterator[Equilibrium]:

@@ -1,14 +1,15 @@
 """What a calibration leaves behind: a study like any other with its springs in a file, values, and a page."""
 
+import copy
 import json
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import Any
 
+from truespring.errors import StudyError
 from truespring.outputs import Output
 from truespring.report.calibration import (
     calibration_values,
@@ -16,8 +17,10 @@ from truespring.report.calibration import (
     fitted_sentence,
     render_calibration,
 )
+from truespring.study import schema
 from truespring.study.calibrate import Calibrated
 from truespring.study.given import write_given
+from truespring.study.read import Study
 from truespring.study.toml import toml_text
 
 #: What the calibrated springs are called in the study that is written.
@@ -81,7 +84,7 @@ def calibrated_study(found: Calibrated, folder: FilePath, tables: list[str]) -> 
 
     The comments at its head tell the errors: they are shown with its results, and stand in what it is exported to.
     """
-    study = tomllib.loads(found.study.source)
+    study = _tables(found.study)
     study["title"] = f"{found.study.title}, springs calibrated"
     _move(study.get("mesh", {}), _MESH_FILES, found.study.file.parent, folder)
     for model in study["models"].values():
@@ -101,6 +104,16 @@ def calibrated_study(found: Calibrated, folder: FilePath, tables: list[str]) -> 
         references.append(found.reference)
     study["compare"] = {**compare, "model": name, "references": references}
     return "".join(f"# {line}\n" for line in _head(found)) + "\n" + toml_text(study)
+
+
+def _tables(study: Study) -> dict[str, Any]:
+    """The tables of a study as they were read, with as many elements as its mesh has."""
+    tables = copy.deepcopy(dict(study.text.tables))
+    if study.halvings:
+        if not isinstance(study.table.mesh, schema.RectangleTable | schema.BoxTable):
+            raise StudyError(f"{study.file}: a mesh that was read and made finer cannot be written into a study")
+        tables["mesh"]["elements"] = list(study.table.mesh.elements)
+    return tables
 
 
 def _head(found: Calibrated) -> list[str]:

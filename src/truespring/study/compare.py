@@ -30,13 +30,15 @@ def compare_sources(
     probe: Probe = None,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    timeout: float | None = None,
 ) -> Iterator[Result]:
     """Read or solve all sources and yield each but the first compared with that, as a result to report.
 
-    Probe and tolerance are those of a study among the two where they are not given. Raises TruespringError where a
+    Probe and tolerance are those of a study among the two where they are not given; each model that is solved is given
+    up after `timeout` seconds. Raises TruespringError where a
     file cannot be read, or a body does not lie where that of the reference lies, with what would make it lie there.
     """
-    (first, *others), (reference, *models) = names(sources), _opened(sources, progress)
+    (first, *others), (reference, *models) = names(sources), _opened(sources, progress, timeout)
     for source, name, model in zip(sources[1:], others, models, strict=True):
         refuse_misfit(source, model, sources[0], reference)
         study = source.study or sources[0].study
@@ -79,12 +81,12 @@ def _named(source: Source, folders: int) -> str:
     return f"{path}:{source.model}" if source.model else path
 
 
-def _opened(sources: Sequence[Source], progress: Progress | None) -> list[Path]:
+def _opened(sources: Sequence[Source], progress: Progress | None, timeout: float | None) -> list[Path]:
     """The paths of all sources; STL files last, which are read beside the first other body."""
     opened: dict[int, Path] = {}
     for number, source in sorted(enumerate(sources), key=lambda one: one[1].is_stl):
         beside = opened[min(opened)].problem if opened and source.is_stl else None
-        opened[number] = open_source(source, beside, progress)
+        opened[number] = open_source(source, beside, progress, timeout)
     return [opened[number] for number in range(len(sources))]
 
 

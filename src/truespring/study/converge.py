@@ -21,7 +21,7 @@ from truespring.study.run import follow
 
 
 def converge(
-    file: str | Path,
+    study: Study | str | Path,
     tolerance: float = 0.01,
     most: int = 5,
     report: Callable[[Study, str], None] | None = None,
@@ -33,11 +33,12 @@ def converge(
     each moved support. A mesh on which a model is inverted, unstable or not converged settles nothing. Raises
     StudyError where the mesh cannot be refined.
     """
+    given = study if isinstance(study, Study) else read_study(study)
     attempts: list[Attempt] = []
     values: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
     place = None
     for halvings in range(most):
-        study = read_study(file, halvings)
+        study = given.finer(halvings) if halvings else given
         models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Equilibria)}
         if not models:
             raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")

@@ -5,14 +5,14 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.equilibrium import Path, Solver
-from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest
+from truespring.equilibrium import Path, Solver, refuse_control
+from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest, one_line, shown
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
 from truespring.mesh import (
@@ -62,7 +62,10 @@ class Study:
     """A study file as objects, checked as far as can be without solving.
 
     Attributes:
-        title, file, source: the study's own title, its file as it was named, its text.
+        title: the study's own.
+        text: what it was read from, its tables with the changes that were made.
+        table: its checked values in SI, all defaults filled in; elements are counted as fine as the mesh is.
+        halvings: how often the mesh was made finer than the tables tell.
         problem, solver: what is asked and how it is solved.
         entries: by name, a model to be solved here or by another program, or a path that was read from a file.
         model: the name of the entry that is compared with the others, None where there is nothing to compare.
@@ -72,8 +75,9 @@ class Study:
     """
 
     title: str
-    file: FilePath
-    source: str
+    text: "StudyText"
+    table: schema.StudyTable
+    halvings: int
     problem: Problem
     solver: Solver
     entries: Mapping[str, Entry]
@@ -81,6 +85,20 @@ class Study:
     references: tuple[str, ...]
     probe: int | None
     tolerance: float
+
+    @property
+    def file(self) -> FilePath:
+        """The study's file, as it was named."""
+        return self.text.file
+
+    @property
+    def source(self) -> str:
+        """The text of the file."""
+        return self.text.source
+
+    def finer(self, halvings: int = 1) -> "Study":
+        """Return this study on a mesh of half the size, so many times, from what was read; raise StudyError."""
+        return self.text.study(halvings=self.halvings + halvings)
 
     @property
     def stem(self) -> str:
@@ -94,25 +112,41 @@ class StudyText:
 
     Attributes:
         file, source: the file as it was named, and its text.
-        tables: the text as TOML has it, not yet checked.
+        tables: the text as TOML has it, and what was changed in it, not yet checked.
     """
 
     file: FilePath
     source: str
     tables: Mapping[str, Any]
 
-    def table(self, changes: Mapping[str, Any] | None = None) -> schema.StudyTable:
-        """Return the tables, checked; raise StudyError. Changes are values by key, such as {"load.1.force": [0, 1]}."""
+    def changed(self, changes: Mapping[str, Any]) -> "StudyText":
+        """Return it with other values by key, such as {"load.1.force": [0, 1]}; raise StudyError."""
         try:
-            return schema.StudyTable.model_validate(changed(self.tables, changes) if changes else self.tables)
-        except ValidationError as error:
-            raise StudyError("\n".join(_messages(self.file, error, _line_numbers(self.source)))) from None
+            return replace(self, tables=changed(self.tables, changes))
         except StudyError as error:
             raise StudyError(f"{self.file}: {error}") from None
 
+    def table(self, changes: Mapping[str, Any] | None = None) -> schema.StudyTable:
+        """Return the tables, checked, with other values by key if wanted; raise StudyError."""
+        text = self.changed(changes) if changes else self
+        try:
+            return schema.StudyTable.model_validate(text.tables)
+        except ValidationError as error:
+            raise StudyError("\n".join(_messages(self.file, error, _line_numbers(self.source)))) from None
+
     def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0) -> Study:
         """Return the study, checked as far as can be without solving; raise StudyError."""
-        return _Builder(self.file, self.source, self.table(changes), halvings).study()
+        text = self.changed(changes) if changes else self
+        return _Builder(text, _finer(text.table(), halvings), halvings).study()
+
+
+def _finer(table: schema.StudyTable, halvings: int) -> schema.StudyTable:
+    """Return the tables of a study with elements of half the size, so many times, where it counts them."""
+    mesh = table.mesh
+    if not halvings or not isinstance(mesh, schema.RectangleTable | schema.BoxTable):
+        return table
+    elements = [count * 2**halvings for count in mesh.elements]
+    return table.model_copy(update={"mesh": mesh.model_copy(update={"elements": elements})})
 
 
 def read_text(file: str | FilePath) -> StudyText:
@@ -124,9 +158,43 @@ def read_text(file: str | FilePath) -> StudyText:
         raise StudyError(f"{place}: is not a text file in UTF-8; a study is TOML") from None
     try:
         tables = tomllib.loads(source)
+    except RecursionError:
+        raise StudyError(f"{place}: {_TOO_DEEP}") from None
     except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{place}: is not valid TOML: {error}") from None
+        raise StudyError(f"{place}: is not valid TOML: {one_line(str(error))}") from None
+    except ValueError as error:
+        raise StudyError(_value_error(place, source, error)) from None
+    _refuse_deep(place, tables)
     return StudyText(place, source, tables)
+
+
+def _value_error(file: FilePath, source: str, error: ValueError) -> str:
+    """Say of an integer that Python refuses to read, of thousands of digits, where it stands."""
+    for number, line in enumerate(source.splitlines(), 1):
+        if re.search(r"\d[\d_]{999}", line):
+            keys = [key for key, at in _line_numbers(source).items() if at == number]
+            place = _place(file, keys[0], {keys[0]: number}) if keys else f"{file}:{number}"
+            return f"{place}: an integer of thousands of digits is no value of any key"
+    return f"{file}: is not valid TOML: {one_line(str(error))}"
+
+
+# Tables in tables and lists in lists; no study has more than four.
+_DEEPEST = 20
+_TOO_DEEP = f"lists and tables are nested more than {_DEEPEST} deep: no key of a study takes that"
+
+
+def _refuse_deep(file: FilePath, tables: Mapping[str, Any]) -> None:
+    """Raise StudyError where lists and tables are nested deeper than any key takes; what follows may then recurse."""
+    held: list[Any] = [tables]
+    for _ in range(_DEEPEST):
+        held = [
+            inner
+            for one in held
+            for inner in (one.values() if isinstance(one, Mapping) else one)
+            if isinstance(inner, Mapping | list)
+        ]
+    if held:
+        raise StudyError(f"{file}: {_TOO_DEEP}")
 
 
 def read_study(file: str | FilePath, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
@@ -141,9 +209,9 @@ def read_study(file: str | FilePath, halvings: int = 0, changes: Mapping[str, An
 class _Builder:
     """Makes the objects table by table, so that every error names its table."""
 
-    def __init__(self, file: FilePath, source: str, table: schema.StudyTable, halvings: int) -> None:
-        self.file, self.source, self.table, self.halvings = file, source, table, halvings
-        self.lines = _line_numbers(source)
+    def __init__(self, text: StudyText, table: schema.StudyTable, halvings: int) -> None:
+        self.text, self.table, self.halvings, self.file = text, table, halvings, text.file
+        self.lines = _line_numbers(text.source)
         self.network: SpringNetwork | None = None
 
     @contextmanager
@@ -151,12 +219,13 @@ class _Builder:
         """Name file, line and key in front of any error."""
         try:
             yield
-        except StudyError as error:
-            if str(error).startswith(f"{self.file}:"):  # named already, more closely
-                raise
-            raise StudyError(f"{_place(self.file, key, self.lines)}: {error}") from None
         except TruespringError as error:
-            raise StudyError(f"{_place(self.file, key, self.lines)}: {error}") from None
+            if isinstance(error, StudyError) and str(error).startswith(f"{self.file}:"):  # named already, more closely
+                raise
+            raise StudyError(f"{_place(self.file, key, self.lines)}: {one_line(str(error))}") from None
+        except OSError as error:
+            told = f"{shown(str(error.filename))}: {error.strerror}" if error.filename else str(error)
+            raise StudyError(f"{_place(self.file, key, self.lines)}: {told}") from None
 
     def study(self) -> Study:
         table = self.table
@@ -168,8 +237,9 @@ class _Builder:
             probe = _probe_node(problem.mesh, table.compare.probe)
         return Study(
             title=table.title or self.file.stem,
-            file=self.file,
-            source=self.source,
+            text=self.text,
+            table=table,
+            halvings=self.halvings,
             problem=problem,
             solver=solver,
             entries=entries,
@@ -193,7 +263,9 @@ class _Builder:
             with self.at("solver", "on"):
                 select(problem.mesh, table.on)
             with self.at("solver"):
-                return DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
+                control = DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
+                refuse_control(problem, control)
+                return control
         if table.control == "arc-length":
             with self.at("solver", "linear"):
                 return ArcLength(table.load_steps, table.max_steps, **past)
@@ -253,9 +325,9 @@ class _Builder:
     def mesh(self) -> Mesh:
         match self.table.mesh:
             case schema.RectangleTable() as table:
-                return rectangle(table.size, self.finer(table.elements), table.element, table.diagonal)
+                return rectangle(table.size, table.elements, table.element, table.diagonal)
             case schema.BoxTable() as table:
-                return box(table.size, self.finer(table.elements), table.element)
+                return box(table.size, table.elements, table.element)
             case schema.VoxelsTable() as table:
                 with self.at("mesh", "unit"):
                     scale = _unit(table.unit)
@@ -275,9 +347,6 @@ class _Builder:
                     mesh = read_mesh(self.file.parent / table.file, scale)
                     refuse_too_large(mesh.n_nodes, mesh.dim)
                     return self.halved(mesh)
-
-    def finer(self, elements: list[int]) -> list[int]:
-        return [count * 2**self.halvings for count in elements]
 
     def halved(self, mesh: Mesh) -> Mesh:
         for _ in range(self.halvings):
@@ -436,29 +505,29 @@ def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], i
             return f"{place}: is required and missing"
         case "extra_forbidden":
             allowed = _allowed_keys(error["loc"][:-1])
-            shown = "" if isinstance(value, dict | list) else f" = {value!r}"
-            return f"{place}{shown}: unknown key{nearest(str(key[-1]), allowed)}; allowed: {', '.join(allowed)}"
+            found = "" if isinstance(value, dict | list) else f" = {shown(value)}"
+            return f"{place}{found}: unknown key{nearest(str(key[-1]), allowed)}; allowed: {', '.join(allowed)}"
         case "value_error":
-            return f"{place}: {text.removeprefix('Value error, ')}"
+            return f"{place}: {one_line(text.removeprefix('Value error, '))}"
         case "literal_error":
             expected = error["ctx"]["expected"]
             words = re.findall(r"'([^']*)'", expected)
-            return f"{place} = {value!r}: allowed: {expected}{nearest(str(value), words)}"
+            return f"{place} = {shown(value)}: allowed: {expected}{nearest(shown(value), words)}"
         case "union_tag_invalid" | "union_tag_not_found" if key == ("mesh",):
             given = value.get("shape") if isinstance(value, dict) else value
             if given is None:
                 return f"{place}: shape is required and missing; allowed: rectangle, box; or {_OTHER_MESHES}"
-            close = nearest(str(given), ("rectangle", "box"))
-            return f"{place}.shape = {given!r}{close}; allowed: 'rectangle' or 'box'; or {_OTHER_MESHES}"
+            close = nearest(shown(given), ("rectangle", "box"))
+            return f"{place}.shape = {shown(given)}{close}; allowed: 'rectangle' or 'box'; or {_OTHER_MESHES}"
         case "union_tag_invalid" | "union_tag_not_found":
             given = value.get("kind") if isinstance(value, dict) else value
             kinds = schema.MODEL_KINDS
-            return f"{place}: kind = {given!r}{nearest(str(given), kinds)}; allowed: {', '.join(kinds)}"
+            return f"{place}: kind = {shown(given)}{nearest(shown(given), kinds)}; allowed: {', '.join(kinds)}"
         case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
             return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
         case _:
-            shown = "" if isinstance(value, dict | list) and len(str(value)) > 60 else f" = {value!r}"
-            return f"{place}{shown}: {text[0].lower()}{text[1:]}"
+            found = "" if isinstance(value, dict | list) and len(str(value)) > 60 else f" = {shown(value)}"
+            return f"{place}{found}: {text[0].lower()}{text[1:]}"
 
 
 def _without_tag(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
@@ -494,7 +563,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
 def _place(file: FilePath, key: tuple[str | int, ...], lines: Mapping[tuple[str | int, ...], int]) -> str:
     """File, line of the key or of the nearest table around it, and the key; lists count from 1."""
     known = next((lines[key[:n]] for n in range(len(key), 0, -1) if key[:n] in lines), None)
-    dotted = ".".join(str(part + 1) if isinstance(part, int) else part for part in key)
+    dotted = one_line(".".join(str(part + 1) if isinstance(part, int) else part for part in key), 200)
     return f"{file}:{known}: {dotted}" if known else f"{file}: {dotted}"
 
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shlex
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from truespring.comparison import compare, most_moved
-from truespring.equilibrium import Path, solve
+from truespring.equilibrium import Path, solve, unsolved
 from truespring.errors import StudyError
 from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
@@ -66,9 +67,16 @@ def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
     return studies
 
 
-def run(study: Study, progress: Progress | None = None, comparing: bool = True, known: Known | None = None) -> Result:
+def run(
+    study: Study,
+    progress: Progress | None = None,
+    comparing: bool = True,
+    timeout: float | None = None,
+    known: Known | None = None,
+) -> Result:
     """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached.
 
+    With a `timeout` [s] each model is given up after that long; another program after an hour where none is given.
     `known` is told each path before the next model is solved.
     """
     paths: dict[str, Path] = {}
@@ -78,7 +86,7 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True, 
             if progress:
                 progress(study.stem, name, load_factor)
 
-        paths[name] = follow(study, entry, report)
+        paths[name] = follow(study, entry, report, timeout)
         if progress and not isinstance(entry, Path):
             progress(study.stem, name, 1.0)
         if known:
@@ -106,13 +114,34 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True, 
     )
 
 
-def follow(study: Study, entry: Entry, report: Reporter | None = None) -> Path:
-    """Return the path of an entry of a study: solved here, solved by another program, or as it was read."""
+def follow(study: Study, entry: Entry, report: Reporter | None = None, timeout: float | None = None) -> Path:
+    """Return the path of an entry of a study: solved here, solved by another program, or as it was read.
+
+    Whatever is raised on the way is this model's own: its path is at rest then, and tells why.
+    """
     if isinstance(entry, Path):
         return entry
-    if isinstance(entry, Program):
-        return entry.run(study.problem, study.solver, report)
-    return solve(study.problem, entry, study.solver, report)
+    try:
+        if isinstance(entry, Program):
+            return entry.run(study.problem, study.solver, report, timeout)
+        return solve(study.problem, entry, study.solver, _timed(report, timeout))
+    except Exception as error:
+        return unsolved(study.problem, entry, error)
+
+
+def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
+    """A report that ends the path when the time is up."""
+    if timeout is None:
+        return report
+    end = time.monotonic() + timeout
+
+    def timed(load_factor: float, iteration: int, residual: float) -> None:
+        if time.monotonic() > end:
+            raise TimeoutError(f"the time of {timeout:g} s was up (--timeout)")
+        if report:
+            report(load_factor, iteration, residual)
+
+    return timed
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """The tables of a study file, as pydantic knows them. Numbers are SI; texts carry units."""
 
+import math
 from collections.abc import Callable, Collection
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
@@ -17,10 +18,10 @@ from pydantic import (
     model_validator,
 )
 
-from truespring.errors import TruespringError, nearest
+from truespring.errors import TruespringError, nearest, shown
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
 from truespring.models import ELEMENTS, LAWS, RULES
-from truespring.units import SI_UNITS, Dimension, to_si
+from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
 
 
 def _as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -49,8 +50,9 @@ def _key_of(table: Collection[str]) -> BeforeValidator:
     """Accept the names of a table such as RULES, so that it is the one list of them."""
 
     def check(value: Any) -> Any:
-        if value not in table:
-            raise ValueError(f"{value!r} is unknown{nearest(str(value), table)}; allowed: {', '.join(table)}")
+        if not isinstance(value, str) or value not in table:
+            told = f"{shown(value)} is unknown{nearest(shown(value), table)}"
+            raise ValueError(f"{told}; allowed: {', '.join(table)}")
         return value
 
     return BeforeValidator(check)
@@ -58,7 +60,15 @@ def _key_of(table: Collection[str]) -> BeforeValidator:
 
 def _strict_number(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is not a number")
+        raise ValueError(f"{shown(value)} is not a number")
+    if value == value and abs(value) != math.inf and value and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"{shown(value)} is out of range: a number {SIZES} is wanted, or zero")
+    return value
+
+
+def _file_name(value: Any) -> Any:
+    if isinstance(value, str) and not value.isprintable():
+        raise ValueError(f"{shown(value)} is no name of a file: it has a character that does not print")
     return value
 
 
@@ -78,6 +88,8 @@ PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": l
 SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
 Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
+#: A file, beside the study's own where the name is no absolute one.
+FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
 Direction = Literal["x", "y", "z"]
 
 _SELECTION_FORMS = (
@@ -90,7 +102,7 @@ def _selection(value: Any) -> Selection:
     if isinstance(value, str):
         return value
     if not isinstance(value, dict) or len(value) != 1:
-        raise TruespringError(f"{value!r} is no selection; allowed: {_SELECTION_FORMS}")
+        raise TruespringError(f"{shown(value)} is no selection; allowed: {_SELECTION_FORMS}")
     ((key, what),) = value.items()
     if key in ("x", "y", "z"):
         return Plane(key, to_si(what, "length"))
@@ -100,15 +112,15 @@ def _selection(value: Any) -> Selection:
         if isinstance(what, list) and len(what) in (4, 6):  # the corners in one list
             what = [what[: len(what) // 2], what[len(what) // 2 :]]
         if not isinstance(what, list) or len(what) != 2:
-            raise TruespringError(f"box = {what!r}: two corners are wanted, [[xmin, ymin], [xmax, ymax]]")
+            raise TruespringError(f"box = {shown(what)}: two corners are wanted, [[xmin, ymin], [xmax, ymax]]")
         return Box(_point(what[0]), _point(what[1]))
     known = ("x", "y", "z", "box", "near")
-    raise TruespringError(f"'{key}' is no selection{nearest(key, known)}; allowed: {_SELECTION_FORMS}")
+    raise TruespringError(f"{shown(key)} is no selection{nearest(key, known)}; allowed: {_SELECTION_FORMS}")
 
 
 def _point(value: Any) -> tuple[float, ...]:
     if not isinstance(value, list) or len(value) not in (2, 3):
-        raise TruespringError(f'{value!r} is no point: a list of coordinates such as ["160 mm", "20 mm"] is wanted')
+        raise TruespringError(f'{shown(value)} is no point: wanted are coordinates such as ["160 mm", "20 mm"]')
     return tuple(to_si(coordinate, "length") for coordinate in value)
 
 
@@ -171,14 +183,14 @@ class BoxTable(Table):
 class FileTable(Table):
     """A mesh from a file; mesh files know no units, so `unit` tells their length unit."""
 
-    file: str
+    file: FileName
     unit: str = "m"
 
 
 class VoxelsTable(Table):
     """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
 
-    voxels: str
+    voxels: FileName
     label: int | str
     edge: Length | None = None
     unit: str = "mm"
@@ -187,8 +199,8 @@ class VoxelsTable(Table):
 class NetworkMeshTable(Table):
     """A plain network from two CSV files; the model of kind "network" takes their stiffness."""
 
-    nodes: str
-    springs: str
+    nodes: FileName
+    springs: FileName
 
 
 def _mesh_form(value: Any) -> str | None:
@@ -277,7 +289,7 @@ class SolverTable(Table):
     to: Length | None = None
     max_steps: Annotated[int, Field(ge=1, le=100_000)] = 200
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
-    max_iterations: Annotated[int, Field(ge=1)] = 50
+    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
     method: Literal["auto", "mixed", "line-search"] = "auto"
     linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = "auto"
 
@@ -291,8 +303,8 @@ class StiffnessTable(Table):
     edge: Number | None = None
     diagonal: Number = 0.0
     body: Number = 0.0
-    file: str | None = None
-    volume: str | None = None
+    file: FileName | None = None
+    volume: FileName | None = None
 
     @model_validator(mode="after")
     def _numbers_or_file(self) -> "StiffnessTable":
@@ -387,8 +399,8 @@ class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
     kind: Literal["stl"]
-    file: str
-    undeformed: str | None = None
+    file: FileName
+    undeformed: FileName | None = None
     load_factor: Annotated[Number, Field(gt=0, le=1)] = 1.0
     unit: str = "m"
 

@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.equilibrium import Path, State, Status, solve
+from truespring.equilibrium import Path, State, Status
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
 from truespring.opening import read_file
 from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, torque_axes
-from truespring.reference import Placing, Program, format_of, placed, read_record, read_shell, read_stl
+from truespring.reference import Placing, format_of, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
+from truespring.study.run import follow
 
 #: Called with what is read or solved and the share that is done, for a progress bar.
 Progress = Callable[[str, float], None]
@@ -109,7 +110,9 @@ def find_source(text: str, options: FileOptions) -> Source:
     return Source(text, file, model, options, study)
 
 
-def open_source(source: Source, beside: Problem | None, progress: Progress | None) -> Path:
+def open_source(
+    source: Source, beside: Problem | None, progress: Progress | None, timeout: float | None = None
+) -> Path:
     """Read or solve a source; an STL file is read beside the body of `beside`, where there is one in the plane."""
 
     def report(share: float) -> None:
@@ -118,7 +121,8 @@ def open_source(source: Source, beside: Problem | None, progress: Progress | Non
 
     options = source.options
     if source.study is not None:
-        path = _solved(source.study, str(source.model), report)
+        entry = source.study.entries[str(source.model)]
+        path = follow(source.study, entry, lambda factor, *_: report(factor), timeout)
     elif source.file.is_dir():
         path = _of_folder(source, report)
     elif source.is_stl and beside is not None and beside.mesh.dim == 2 and beside.mesh.element != "line":
@@ -141,15 +145,6 @@ def _known(text: str, model: str, names: Sequence[str]) -> str:
     if model not in names:
         raise StudyError(f"{text}: '{model}' is not among the models{nearest(model, names)}: {', '.join(names)}")
     return model
-
-
-def _solved(study: Study, name: str, report: Callable[[float], None]) -> Path:
-    entry = study.entries[name]
-    if isinstance(entry, Path):
-        return entry
-    if isinstance(entry, Program):
-        return entry.run(study.problem, study.solver, lambda factor, *_: report(factor))
-    return solve(study.problem, entry, study.solver, lambda factor, *_: report(factor))
 
 
 def _of_folder(source: Source, report: Callable[[float], None]) -> Path:

@@ -7,7 +7,7 @@ from truespring.mesh import Mesh, box, nearest_node, rectangle, refined, refuse_
 from truespring.models import Fem
 from truespring.models.fem import locks
 from truespring.problem import Problem
-from truespring.study import Study, read_text, schema
+from truespring.study import Study, schema
 from truespring.validity.loads import LOADS, Asked, LoadType, scaled, standard
 
 # Element counts off a whole number by less are whole.
@@ -43,7 +43,7 @@ class Body:
     @staticmethod
     def of(study: Study) -> "Body":
         """Return the body of a study; raise StudyError where it is none of elements."""
-        table = read_text(study.file).table().mesh
+        table = study.table.mesh
         shape = table if isinstance(table, schema.RectangleTable | schema.BoxTable) else None
         problem = study.problem
         if problem.material is None or problem.mesh.element == "line":
