@@ -146,7 +146,7 @@ def test_a_series_has_one_mesh_at_rest(problem: ts.Problem, tmp_path: Path) -> N
         "names no file": "<VTKFile><Collection/></VTKFile>",
         'has timestep="soon"': text.replace('timestep="1.0"', 'timestep="soon"'),
         "names 'body/body_0009.vtu', which is not there": text.replace("body_0002", "body_0009"),
-        "vtu files are read": text.replace("body_0002.vtu", "body_0002.pvtu"),
+        r"names 'body/body_0002.vti'; files that end in .vtu, .vtk": text.replace("body_0002.vtu", "body_0002.vti"),
         "time 1 is there twice: merge": text.replace('timestep="0.5"', 'timestep="1.0"'),
     }
     for message, damaged in wrong.items():

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from truespring.equilibrium import Path as Equilibria
 from truespring.errors import ReferenceFileError, nearest
+from truespring.mesh.files.vtk_file import VTK_SUFFIXES
 from truespring.reference.checks import refuse_unreadable
 from truespring.reference.dat import read_dat
 from truespring.reference.frd import read_frd
@@ -23,9 +24,7 @@ READERS: MappingProxyType[str, tuple[Callable[..., Record], frozenset[str]]] = M
     {
         ".frd": (read_frd, frozenset()),
         ".dat": (read_dat, frozenset({"mesh"})),
-        ".vtu": (read_vtk_result, _VTK),
-        ".vtk": (read_vtk_result, _VTK),
-        ".pvd": (read_vtk_result, _VTK),
+        **dict.fromkeys((".vtu", ".vtk", ".pvd", *VTK_SUFFIXES), (read_vtk_result, _VTK)),
         ".rst": (read_rst, frozenset()),
         ".csv": (read_markers, frozenset({"undeformed"})),
         ".stl": (read_stl_pair, frozenset({"undeformed"})),
@@ -50,8 +49,8 @@ def read_result(
     """Read a result that another program wrote as a path that can be compared with others.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers, or a .stl file with the body at rest.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m].
@@ -79,8 +78,8 @@ def read_record(
     """Read a result that another program wrote; its suffix tells the format.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers or a .stl file.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers or a .stl file.
         field: of VTK files, the name of the displacement.
         undeformed: of tables of markers and STL files, the file with the state at rest.
         mesh: of .dat files, the deck with nodes and elements.

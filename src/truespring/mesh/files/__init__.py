@@ -8,16 +8,23 @@ from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.vtk import read_vtk
-from truespring.mesh.files.vtu import read_vtu
+from truespring.mesh.files.vtk_file import VTK_SUFFIXES, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
 
-_READERS: dict[str, Callable[[bytes], Contents]] = {
-    ".msh": read_msh,
-    ".inp": read_inp,
-    ".vtu": read_vtu,
-    ".vtk": read_vtk,
+Reader = Callable[[bytes, Path], Contents]
+
+
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
+
+
+# By suffix: from the file and the folder that it lies in.
+_READERS: dict[str, Reader] = {
+    ".msh": _alone(read_msh),
+    ".inp": _alone(read_inp),
+    **dict.fromkeys(VTK_SUFFIXES, read_vtk),
 }
 
 
@@ -26,7 +33,8 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
 
     .msh: gmsh 2 to 2.2 and 4.1, text and binary. Physical groups become groups; one without a name is
     called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    first spelling. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
@@ -52,7 +60,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
         raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
     data = _bytes(file)
     try:
-        return reader(data).mesh(scale)
+        return reader(data, file.parent).mesh(scale)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 
