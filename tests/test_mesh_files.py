@@ -700,7 +700,7 @@ def test_a_count_of_cells_that_does_not_match(tmp_path: Path) -> None:
     grid(tmp_path, CUBE, [("hexahedron", np.array([range(8)]))])
     file = tmp_path / "grid.vtu"
     file.write_bytes(file.read_bytes().replace(b'NumberOfCells="1"', b'NumberOfCells="2"'))
-    with pytest.raises(MeshError, match="array 'offsets' of <Cells> is damaged: .* wanted are 16"):
+    with pytest.raises(MeshError, match=r"array 'offsets' of <Cells> is damaged: .* wanted are 16"):
         read_mesh(file)
 
 
