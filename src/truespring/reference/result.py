@@ -13,6 +13,7 @@ from truespring.opening import open_file
 from truespring.reference.checks import refuse_unreadable
 from truespring.reference.dat import is_dat, read_dat
 from truespring.reference.frd import is_frd, read_frd
+from truespring.reference.joining import joined
 from truespring.reference.markers import read_markers
 from truespring.reference.placing import Placing, placed
 from truespring.reference.record import Reading, Record
@@ -133,4 +134,5 @@ def read_record(
     if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
         refuse_unreadable(file)
     record = READERS[key].read(file, reading, **given)
+    record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

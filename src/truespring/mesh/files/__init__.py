@@ -36,7 +36,7 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
 )
 
 
-def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
+def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) -> Mesh:
     """Read a mesh file; its content tells the format, else its suffix.
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
@@ -54,6 +54,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
     Args:
         file: the mesh file.
         scale: the file's unit of length [m].
+        join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
     where the file cannot be read, is damaged or cut off, or holds no body of one kind of element.
@@ -72,7 +73,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
         )
     try:
         contents = FORMATS[key].read(data)
-        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale)
+        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 
