@@ -100,7 +100,7 @@ def test_the_displacement_is_named_where_it_is_not_plain(tmp_path: Path) -> None
     np.testing.assert_array_equal(read_vtk_result(file, field="Displacement").levels[0].displacement, moved)
     write_grid(file, "DISP")
     assert len(read_record(file).levels) == 1
-    with pytest.raises(ReferenceFileError, match=r"field is not for \.csv files, but for \.vtu, \.vtk, \.pvd"):
+    with pytest.raises(ReferenceFileError, match=r"field is not for \.csv files, but for \.vtu, \.vtk, .*, \.pvd"):
         read_record(tmp_path / "markers.csv", field="DISP")
 
 

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, ReferenceFileError, nearest
-from truespring.mesh.files.vtk_file import VTK_SUFFIXES, read_vtk_grid
+from truespring.mesh.files.heads import HEAD, format_by_head, is_vtk_xml
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk_grid
 from truespring.mesh.files.vtk_grid import Grid, contents
 from truespring.mesh.files.vtk_pieces import one_grid
 from truespring.mesh.files.vtu import root_of
-from truespring.opening import file_beside, read_file
+from truespring.opening import file_beside, open_file, read_file
 from truespring.reference.checks import checked, refuse_unreadable
 from truespring.reference.components import DISPLACEMENTS, components
 from truespring.reference.record import Level, Reading, Record
@@ -22,6 +23,8 @@ from truespring.reference.vtk_cells import named, refuse_unknown
 
 # Three numbers by these names are a displacement, as Elmer writes it.
 _ALONE = "uvw"
+
+_KINDS = {**VTK_FORMATS, ".pvd": is_vtk_xml("Collection")}
 
 
 class _Part(NamedTuple):
@@ -49,8 +52,8 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
     Returns a record whose kind is the file's suffix. Raises ReferenceFileError where a file is damaged, the
     displacement is not found, or the files of a series do not share points and cells.
     """
-    kind = file.suffix.lower().lstrip(".")
     refuse_unreadable(file)
+    kind = _kind(file)
     parts, notes = _series(file) if kind == "pvd" else ([_Part(1.0, "", file)], [])
     first: Record | None = None
     levels: list[Level] = []
@@ -72,6 +75,13 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
     return checked(Record(file, kind, first.points, first.cells, tuple(levels), notes=tuple(notes)))
 
 
+def _kind(file: Path) -> str:
+    """The format of a file without the point: by its content, else its suffix."""
+    with open_file(file, ReferenceFileError) as stream:
+        head = stream.read(HEAD)
+    return (format_by_head(file.suffix, head, _KINDS) or ".vtu").lstrip(".")
+
+
 def _series(file: Path) -> tuple[list[_Part], list[str]]:
     """Return the files of a .pvd file in the order of their times, and what should be known of it."""
     try:
@@ -87,10 +97,8 @@ def _series(file: Path) -> tuple[list[_Part], list[str]]:
         told = f"{file}: DataSet {number}"
         time = _time(entry.get("timestep", str(number)), told)
         name = entry.get("file", "")
-        if Path(name).suffix.lower() not in VTK_SUFFIXES:
-            raise ReferenceFileError(
-                f"{told} names '{name[:80]}'; files that end in {', '.join(VTK_SUFFIXES)} are read"
-            )
+        if Path(name).suffix.lower() not in VTK_FORMATS:
+            raise ReferenceFileError(f"{told} names '{name[:80]}'; files that end in {', '.join(VTK_FORMATS)} are read")
         one = file_beside(file.parent, name, ReferenceFileError, f"{told} ")
         part = entry.get("part", "0")
         if (time, part) in known:

@@ -1,26 +1,29 @@
 """Any of VTK's files, by what it holds: legacy or XML, and XML that names its pieces in files beside it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
+from truespring.mesh.files.heads import Recognises, is_vtk, is_vtk_xml
 from truespring.mesh.files.vtk import read_legacy_grid
 from truespring.mesh.files.vtk_grid import Grid, contents
 from truespring.mesh.files.vtk_pieces import one_grid
 from truespring.mesh.files.vtu import GRIDS, read_grids, root_of
 from truespring.opening import file_beside, read_file
 
-#: Suffixes of the files that hold a grid, and of those that name its pieces.
-VTK_SUFFIXES = (".vtu", ".vtk", ".vtp", ".vts", ".vtr", ".pvtu", ".pvtp", ".pvts", ".pvtr")
+_TYPES = {".vtu": "UnstructuredGrid", ".vtp": "PolyData", ".vts": "StructuredGrid", ".vtr": "RectilinearGrid"}
+
+#: By suffix, of the files that hold a grid and of those that name its pieces: what tells that a file is one.
+VTK_FORMATS: Mapping[str, Recognises] = {
+    ".vtu": is_vtk_xml(_TYPES[".vtu"]),
+    ".vtk": is_vtk,
+    **{suffix: is_vtk_xml(kind) for suffix, kind in _TYPES.items()},
+    **{f".p{suffix[1:]}": is_vtk_xml(f"P{kind}") for suffix, kind in _TYPES.items()},
+}
 
 # A file may not name more pieces.
 _MOST_PIECES = 100_000
-
-
-def recognises(head: bytes) -> bool:
-    """Tell whether a file that begins so is one of VTK's."""
-    head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    return head[:14].lower() == b"# vtk datafile" or (head[:1] == b"<" and b"<VTKFile" in head[:2000])
 
 
 def read_vtk(data: bytes, folder: Path) -> Contents:
