@@ -80,6 +80,12 @@ HEADS = {
 }
 
 
+for suffix, kind in ((".vtp", "PolyData"), (".vts", "StructuredGrid"), (".vtr", "RectilinearGrid")):
+    HEADS[suffix] = f'<VTKFile type="{kind}">\n'.encode()
+for suffix in (".vtu", ".vtp", ".vts", ".vtr"):
+    HEADS[f".p{suffix[1:]}"] = HEADS[suffix].replace(b'type="', b'type="P')
+
+
 @pytest.mark.parametrize("key", HEADS)
 def test_every_format_of_results_is_recognised_by_itself_alone(tmp_path: Path, key: str) -> None:
     assert [known for known, form in READERS.items() if form.recognises(HEADS[key])] == [key]

@@ -200,9 +200,7 @@ def _add_sweep(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--workers", type=_positive, metavar="N", help="processes on this machine, default: all cores")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to take instead: tcp://10.0.0.1:8786")
     verb.add_argument("--retry-failed", action="store_true", help="try points again that have failed before")
-    verb.add_argument(
-        "--timeout", type=_seconds, metavar="S", help="a point that is not solved after so many seconds fails"
-    )
+    _add_timeout(verb)
     verb.add_argument("--out", type=Path, default=Path("out/sweep"), metavar="DIR", help="default: out/sweep")
 
 

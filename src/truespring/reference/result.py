@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 from truespring.equilibrium import Path as Equilibria
 from truespring.errors import ReferenceFileError, nearest
-from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, read_as
+from truespring.mesh.files.vtk_file import VTK_FORMATS
 from truespring.opening import open_file
 from truespring.reference.checks import refuse_unreadable
 from truespring.reference.dat import is_dat, read_dat
 from truespring.reference.frd import is_frd, read_frd
+from truespring.reference.joining import joined
 from truespring.reference.markers import read_markers
 from truespring.reference.placing import Placing, placed
 from truespring.reference.record import Reading, Record
@@ -36,8 +38,7 @@ READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".frd": Format(is_frd, read_frd),
         ".dat": Format(is_dat, read_dat, frozenset({"mesh"})),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtk_result, _FIELD),
-        ".vtk": Format(is_vtk, read_vtk_result, _FIELD),
+        **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
         ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
         ".rst": Format(is_rst, read_rst),
         ".csv": Format(lambda head: False, read_markers, _REST),  # any table: its suffix tells
@@ -73,8 +74,8 @@ def read_result(
     """Read a result that another program wrote as a path that can be compared with others.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers, or a .stl file with the body at rest.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m].
@@ -102,8 +103,8 @@ def read_record(
     """Read a result that another program wrote; its content tells the format, else its suffix.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers or a .stl file.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers or a .stl file.
         field: of VTK files, the name of the displacement.
         undeformed: of tables of markers and STL files, the file with the state at rest.
         mesh: of .dat files, the deck with nodes and elements.
@@ -133,4 +134,5 @@ def read_record(
     if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
         refuse_unreadable(file)
     record = READERS[key].read(file, reading, **given)
+    record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

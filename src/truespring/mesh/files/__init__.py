@@ -10,38 +10,44 @@ from typing import NamedTuple
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, read_as
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.vtk import read_vtk
-from truespring.mesh.files.vtu import read_vtu
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
 
+Reader = Callable[[bytes, Path], Contents]
+
+
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
+
 
 class Format(NamedTuple):
-    """How files of a format begin, and what reads them."""
+    """How files of a format begin, and what reads them: their bytes, and the folder that they lie in."""
 
     recognises: Recognises
-    read: Callable[[bytes], Contents]
+    read: Reader
 
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(is_msh, read_msh),
-        ".inp": Format(is_inp, read_inp),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtu),
-        ".vtk": Format(is_vtk, read_vtk),
+        ".msh": Format(is_msh, _alone(read_msh)),
+        ".inp": Format(is_inp, _alone(read_inp)),
+        **{suffix: Format(recognises, read_vtk) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
 
-def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
+def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) -> Mesh:
     """Read a mesh file; its content tells the format, else its suffix.
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
     called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    first spelling. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
@@ -54,6 +60,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
     Args:
         file: the mesh file.
         scale: the file's unit of length [m].
+        join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
     where the file cannot be read, is damaged or cut off, or holds no body of one kind of element.
@@ -71,8 +78,8 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
             "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
         )
     try:
-        contents = FORMATS[key].read(data)
-        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale)
+        contents = FORMATS[key].read(data, file.parent)
+        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 

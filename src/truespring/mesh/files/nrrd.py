@@ -82,7 +82,7 @@ def read_nrrd(file: Path) -> Labels:
     if dtype.itemsize > 1 and fields.get("encoding", "").lower() not in _TEXTS:
         dtype = dtype.newbyteorder(_endian(_wanted(fields, "endian")))
     refuse_large(sizes, dtype)
-    values = _values(fields, _stored(file, fields, data[begin:]), dtype, sizes)
+    values = _values(fields, _stored(file.parent, fields, data[begin:]), dtype, sizes)
     is_place = _axes_in_space(fields, sizes)
     spacing, origin, direction = _places(fields, is_place)
     # Layers, where there are any, become the last axis.
@@ -137,18 +137,18 @@ def _endian(text: str) -> Literal["<", ">"]:
     return "<" if text.lower() == "little" else ">"
 
 
-def _stored(file: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
+def _stored(folder: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
     """Return what is stored of the voxels, without what the header tells to skip."""
     name = fields.get("data file")
     if name is None:
         data = behind
     elif name.split()[:1] == ["LIST"]:
         names = [line.strip() for line in behind.decode("utf-8", errors="replace").splitlines() if line.strip()]
-        return b"".join(_skipped(fields, data_beside(file, one)) for one in names)
+        return b"".join(_skipped(fields, data_beside(folder, one)) for one in names)
     elif "%" in name:
         raise MeshError(f"'data file' is a pattern, '{name[:40]}': list the files (data file: LIST)")
     else:
-        data = data_beside(file, name)
+        data = data_beside(folder, name)
     return _skipped(fields, data)
 
 
