@@ -19,19 +19,22 @@ from truespring.opening import read_file
 
 
 class Format(NamedTuple):
-    """How files of a format begin, and what reads them."""
+    """How files of a format begin, what reads them, and how a file that cannot be read may be mended."""
 
     recognises: Recognises
     read: Callable[[bytes], Contents]
+    again: str = ""
 
+
+_PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(is_msh, read_msh),
+        ".msh": Format(is_msh, read_msh, "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"),
         ".inp": Format(is_inp, read_inp),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtu),
-        ".vtk": Format(is_vtk, read_vtk),
+        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtu, _PARAVIEW),
+        ".vtk": Format(is_vtk, read_vtk, _PARAVIEW),
     }
 )
 
@@ -71,8 +74,12 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
             f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
             "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
         )
+    form = FORMATS[key]
     try:
-        contents = FORMATS[key].read(data)
+        contents = form.read(data)
+    except MeshError as error:
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", form.again]))) from None
+    try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
