@@ -25,18 +25,26 @@ def _alone(read: Callable[[bytes], Contents]) -> Reader:
 
 
 class Format(NamedTuple):
-    """How files of a format begin, and what reads them: their bytes, and the folder that they lie in."""
+    """How files of a format begin, what reads them, and how a file that cannot be read may be mended.
+
+    Readers take the bytes of a file and the folder that it lies in.
+    """
 
     recognises: Recognises
     read: Reader
+    again: str = ""
 
+
+_PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(is_msh, _alone(read_msh)),
+        ".msh": Format(
+            is_msh, _alone(read_msh), "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
+        ),
         ".inp": Format(is_inp, _alone(read_inp)),
-        **{suffix: Format(recognises, read_vtk) for suffix, recognises in VTK_FORMATS.items()},
+        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
@@ -77,8 +85,12 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
             f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
             "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
         )
+    form = FORMATS[key]
     try:
-        contents = FORMATS[key].read(data, file.parent)
+        contents = form.read(data, file.parent)
+    except MeshError as error:
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", form.again]))) from None
+    try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
