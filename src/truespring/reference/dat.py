@@ -63,7 +63,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)
     try:
-        contents = read_inp(deck.read_bytes())
+        contents = read_inp(deck.read_bytes(), deck.parent)
     except OSError as error:
         raise ReferenceFileError(f"{deck} cannot be read: {error.strerror}") from None
     except MeshError as error:
@@ -199,8 +199,7 @@ def _record(file: Path, deck: Contents, increments: Sequence[_Increment]) -> Rec
     ]
     kept, notes = without_modes(levels, [one.is_mode for one in moved])
     cells = {
-        name: rows_of(deck.node_numbers, nodes[:, (0, 2, 1)] if name == "line3" else nodes, f"a {name}", file)
-        for name, nodes in named(deck.cells, file).items()  # the middle of a line stands between its ends
+        name: rows_of(deck.node_numbers, nodes, f"a {name}", file) for name, nodes in named(deck.cells, file).items()
     }
     names = tuple(map(str, deck.node_numbers.tolist()))
     return Record(file, "dat", deck.points, cells, kept, names, (*notes, *_notes(moved, levels, deck)))

@@ -7,25 +7,37 @@ from pathlib import Path
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.inp import read_inp
+from truespring.mesh.files.inp import is_inp, read_inp
 from truespring.mesh.files.vtk import read_vtk
 from truespring.mesh.files.vtu import read_vtu
 from truespring.mesh.mesh import Mesh
 
-_READERS: dict[str, Callable[[bytes], Contents]] = {
-    ".msh": read_msh,
+Reader = Callable[[bytes, Path], Contents]
+
+
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
+
+
+# By suffix: from the file and the folder that it lies in.
+_READERS: dict[str, Reader] = {
+    ".msh": _alone(read_msh),
     ".inp": read_inp,
-    ".vtu": read_vtu,
-    ".vtk": read_vtk,
+    ".vtu": _alone(read_vtu),
+    ".vtk": _alone(read_vtk),
 }
 
 
 def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
-    """Read a mesh file; its suffix tells the format.
+    """Read a mesh file; its suffix tells the format, but a deck of Abaqus or CalculiX is known by what it holds.
 
     .msh: gmsh 2 to 2.2 and 4.1, text and binary. Physical groups become groups; one without a name is
-    called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    called by its number. .inp: Abaqus and CalculiX, with parts, instances and included files in the deck's
+    folder or below. NSET, ELSET and SURFACE become groups, in their first spelling: those of the assembly by
+    their name, those of an instance as INSTANCE.NAME, and by their name where no other scope has it; an NSET
+    stands before an ELSET of one name where nodes are asked for. Elements that no body is made of are left
+    out. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
@@ -51,7 +63,7 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
         raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
     data = _bytes(file)
     try:
-        return reader(data).mesh(scale)
+        return (read_inp if is_inp(data) else reader)(data, file.parent).mesh(scale)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 

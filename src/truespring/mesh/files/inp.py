@@ -5,7 +5,7 @@ https://www.dhondt.de, and *PART, *INSTANCE and *ASSEMBLY in that of Abaqus.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -91,9 +91,8 @@ class _Deck:
         key = found(self._parts, name)
         if key is None:
             known = [scope.name for scope in self._parts.values()]
-            raise card.error(
-                f"there is no part '{bare(name)[:40]}'{nearest(bare(name), known)}; there are {', '.join(known) or 'none'}"
-            )
+            there = f"{nearest(bare(name), known)}; there are {', '.join(known) or 'none'}"
+            raise card.error(f"there is no part '{bare(name)[:40]}'{there}")
         return self._parts[key]
 
     def contents(self, lines: Lines) -> Contents:
@@ -104,13 +103,7 @@ class _Deck:
         scopes = [one.scope for one in assembly.placed.values()]
         left_out = totals(scopes)
         if not assembly.nodes.numbers.size or not assembly.cells:
-            what = f": {counted(left_out)} are left out" if left_out else ""
-            missing = "*ELEMENT" if assembly.nodes.numbers.size else "*NODE"
-            raise MeshError(
-                f"there is no {missing} of a body{what}; a body is made of {READ}"
-                if left_out
-                else f"there is no {missing}: {'a deck of a body has them' if missing == '*NODE' else _FLAT}"
-            )
+            raise MeshError(_no_body(assembly, left_out))
         groups = _Groups(assembly)
         notes = [note for scope in scopes for note in scope.notes]
         if left_out:
@@ -128,6 +121,14 @@ class _Deck:
         )
 
 
+def _no_body(assembly: Assembly, left_out: Mapping[str, int]) -> str:
+    if not assembly.nodes.numbers.size and not left_out:
+        return "there is no *NODE: is this the whole deck, and does it include the file of its mesh?"
+    what = f": {counted(left_out)} {'is' if sum(left_out.values()) == 1 else 'are'} none" if left_out else ""
+    turned = "; an axisymmetric body is read where it is meshed in 3D" if any(t.startswith("CAX") for t in left_out) else ""
+    return f"there is no *ELEMENT of a body{what}; a body is made of {READ}{turned}"
+
+
 def _lower(assembly: Assembly) -> Iterator[str]:
     dim = max(dimension(block.kind) for block in assembly.cells)
     lower = Counter[str]()
@@ -136,3 +137,82 @@ def _lower(assembly: Assembly) -> Iterator[str]:
             lower[block.kind] += len(block.numbers)
     if lower:
         yield f"{listed(lower)} are not of the body and only carry sets"
+
+
+def _unused(parts: dict[str, Scope], instances: dict[str, tuple[Scope, Move | None]]) -> Iterator[str]:
+    """Name the parts without an instance."""
+    used = {id(nodes) for scope, _ in instances.values() for nodes in scope.nodes}
+    unused = [part.name for part in parts.values() if part.nodes and not used & set(map(id, part.nodes))]
+    if unused:
+        yield f"{'parts' if unused[1:] else 'part'} {', '.join(unused)} without an instance: left out"
+
+
+class _Groups:
+    """The sets and surfaces of a deck by the names of groups.
+
+    Those of the assembly, or of a flat deck, have their own name. Those of an instance are called INSTANCE.NAME, and by
+    their own name too where no other scope has one of that name.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._assembly = assembly
+        self._surfaces = Surfaces(assembly)
+        self.nodes: dict[str, Ints] = {}
+        self.cells: dict[str, Ints] = {}
+        self.facets: dict[str, Ints] = {}
+        self.notes: list[str] = []
+        scopes = sorted(assembly.placed.values(), key=lambda one: one.scope.name != "")
+        owners = Counter(key.upper() for one in scopes for key in one.scope.names)
+        hidden: list[str] = []
+        for one in scopes:
+            for key, name in one.scope.names.items():
+                names = [name]
+                if one.scope.name:
+                    names.insert(0, f"{one.scope.name}.{name}")
+                    if owners[key.upper()] > 1:
+                        hidden.append(names[0])
+                        names.pop()
+                self._take(one, key, names)
+        if hidden:
+            self.notes.append(f"names that several scopes have are told by their instance: {', '.join(hidden)}")
+
+    def _take(self, owner: Placed, key: str, names: list[str]) -> None:
+        """Take the sets and the surface of a key under some names."""
+        scope = owner.scope
+        surface = scope.surfaces.get(key)
+        if surface and surface.of_nodes:
+            members = [self._assembly.named(owner, row.on, "NSET") for row in surface.rows]
+            self._put(self.nodes, names, np.concatenate([*members, np.zeros(0, dtype=np.int64)]))
+        elif surface:
+            self._put_facets(owner, key, names)
+        if key in scope.sets["NSET"]:
+            self._put(self.nodes, names, self._assembly.set_members(owner, "NSET", key))
+        if key in scope.sets["ELSET"] and not (key in scope.internal and self._put_side(owner, key, names)):
+            self._put(self.cells, names, self._assembly.set_members(owner, "ELSET", key))
+
+    @staticmethod
+    def _put(groups: dict[str, Ints], names: list[str], members: Ints) -> None:
+        for name in names:
+            groups[name] = members
+
+    def _put_facets(self, owner: Placed, key: str, names: list[str]) -> None:
+        try:
+            self._put(self.facets, names, self._surfaces.facets(owner, owner.scope.surfaces[key]))
+        except MeshError as error:
+            self.notes.append(f"surface '{names[0]}' is left out: {error}")
+
+    def _put_side(self, owner: Placed, key: str, names: list[str]) -> bool:
+        """Take an internal set that a surface gives one label as facets: a program made it to name them."""
+        rows = [
+            row
+            for surface in owner.scope.surfaces.values()
+            for row in surface.rows
+            if not surface.of_nodes and row.label and key_of(row.on.name) == key
+        ]
+        if len({row.label for row in rows}) != 1:
+            return False
+        try:
+            self._put(self.facets, names, self._surfaces.row(owner, rows[0]))
+        except MeshError:
+            return False
+        return True

@@ -3,24 +3,33 @@
 Source: "Assembly definition" in the manual of Abaqus.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.files.contents import places
 from truespring.mesh.files.inp_cards import Card, Lines, bare, fields
 from truespring.mesh.files.inp_elements import dimension
-from truespring.mesh.files.inp_scopes import Elements, Named, Nodes, Numbers, Part, Range, Scope, found, key_of
+from truespring.mesh.files.inp_scopes import (
+    Elements,
+    Named,
+    Nodes,
+    Numbers,
+    Part,
+    Range,
+    Scope,
+    found,
+    joined_nodes,
+    key_of,
+)
 
 #: A coordinate beyond this was damaged, whatever the unit; its square still is a number.
 _FAR = 1e30
-
-_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -65,20 +74,21 @@ def _rotation(axis: Floats, angle: float) -> Floats:
 
 
 class Placed(NamedTuple):
-    """A scope in its place; its numbers plus these are those of the whole."""
+    """A scope in its place.
+
+    Attributes:
+        scope: what it holds.
+        nodes, elements: by its own numbers, without those that are left out.
+        numbers, left_out: of nodes (NSET) and elements (ELSET): what there is, and what is left out.
+        add: what its numbers of nodes and elements are raised by in the whole.
+    """
 
     scope: Scope
     nodes: Nodes
     elements: tuple[Elements, ...]
-    left_out: Ints
-    add_node: int
-    add_element: int
-
-    def numbers(self, kind: str) -> Ints:
-        """Return the scope's own numbers of nodes (NSET) or elements (ELSET)."""
-        if kind == "NSET":
-            return self.nodes.numbers
-        return np.concatenate([*(block.numbers for block in self.elements), self.left_out, _NONE])
+    numbers: Mapping[str, Ints]
+    left_out: Mapping[str, Ints]
+    add: Mapping[str, int]
 
 
 class Assembly:
@@ -103,30 +113,33 @@ class Assembly:
 
     def _place(self, scope: Scope, move: Move | None, is_root: bool) -> None:
         nodes = self._nodes(scope)
-        if is_root and self.placed:
-            nodes = self._without_reference_points(nodes, scope)
         if move:
             nodes = nodes._replace(points=move(nodes.points))
+        is_kept = np.ones(len(nodes.numbers), dtype=bool)
+        if is_root and self.placed:
+            is_kept = self._refuse_reference_points(nodes, scope)
         elements = tuple(self._elements(scope, nodes))
-        left_out = np.concatenate([*(one for ones in scope.left_out.values() for one in ones), _NONE])
-        known = np.concatenate([*(block.numbers for block in elements), left_out])
-        add_node, add_element = _above(self._used("NSET"), nodes.numbers), _above(self._used("ELSET"), known)
-        if add_node or add_element:
+        numbers = {"NSET": nodes.numbers[is_kept], "ELSET": _joined(block.numbers for block in elements)}
+        left_out = {
+            "NSET": nodes.numbers[~is_kept],
+            "ELSET": _joined(numbers for ones in scope.left_out.values() for numbers in ones),
+        }
+        add = {kind: _above(self._used(kind), numbers[kind]) for kind in numbers}
+        if any(add.values()):
             what = f"instance {scope.name}" if scope.name else "the assembly"
             self.notes.append(
-                f"{add_node} is added to the numbers of nodes of {what}, and {add_element} to those of its elements"
+                f"{add['NSET']} is added to the numbers of nodes of {what}, and {add['ELSET']} to those of its elements"
             )
-        self.placed[key_of(scope.name)] = Placed(scope, nodes, elements, left_out, add_node, add_element)
+        self.placed[key_of(scope.name)] = Placed(scope, nodes.of(is_kept), elements, numbers, left_out, add)
 
     def _used(self, kind: str) -> Ints:
-        add = {"NSET": "add_node", "ELSET": "add_element"}[kind]
-        return np.concatenate([*(one.numbers(kind) + getattr(one, add) for one in self.placed.values()), _NONE])
+        return _joined(one.numbers[kind] + one.add[kind] for one in self.placed.values())
 
     def _nodes(self, scope: Scope) -> Nodes:
         """Return the nodes of all cards; raise MeshError where one is there twice at two places, or is none."""
         if not scope.nodes:
-            return Nodes(_NONE, np.zeros((0, 3)), _NONE)
-        nodes = Nodes(*(np.concatenate(column) for column in zip(*scope.nodes, strict=True)))
+            return joined_nodes([])
+        nodes = joined_nodes(scope.nodes)
         lost = ~np.asarray((np.abs(nodes.points) < _FAR).all(axis=1))
         if lost.any():
             row = int(lost.argmax())
@@ -143,26 +156,26 @@ class Assembly:
                 raise MeshError(f"{at}: node {nodes.numbers[row]} is there twice, at two places: take one out")
         if again.size:
             self.notes.append(f"{len(again)} nodes are there twice at one place, and were taken once")
-            nodes = Nodes(*(np.delete(column, again, axis=0) for column in nodes))
+            nodes = nodes.of(np.isin(np.arange(len(nodes.numbers)), first))
         return nodes
 
-    def _without_reference_points(self, nodes: Nodes, scope: Scope) -> Nodes:
-        """Leave out the nodes of an assembly that no element has; say how many."""
-        used = np.concatenate([*(block.nodes.ravel() for block in scope.elements), _NONE])
-        kept = np.isin(nodes.numbers, used)
-        if not kept.all():
-            first = int(kept.argmin())
+    def _refuse_reference_points(self, nodes: Nodes, scope: Scope) -> Bools:
+        """Return which nodes of an assembly some element has; say how many none has."""
+        is_kept = np.isin(nodes.numbers, _joined(block.nodes.ravel() for block in scope.elements))
+        count = int((~is_kept).sum())
+        if count:
+            first = int(is_kept.argmin())
             self.notes.append(
-                f"{(~kept).sum()} reference point{'s' * ((~kept).sum() > 1)} of the assembly, which no element has, "
-                f"{'were' if (~kept).sum() > 1 else 'was'} left out; the first is its node {nodes.numbers[first]} at "
+                f"{count} reference point{'s' if count > 1 else ''} of the assembly, of no element, left out; the "
+                f"first is its node {nodes.numbers[first]} at "
                 f"({', '.join(f'{value:.6g}' for value in nodes.points[first])}) in the file's unit"
             )
-        return Nodes(*(column[kept] for column in nodes))
+        return np.asarray(is_kept)
 
     def _elements(self, scope: Scope, nodes: Nodes) -> Iterator[Elements]:
         """Yield the elements of a scope; raise MeshError where one is there twice or names a node that is not."""
-        numbers = np.concatenate([*(block.numbers for block in scope.elements), _NONE])
-        lines = np.concatenate([*(block.places for block in scope.elements), _NONE])
+        numbers = _joined(block.numbers for block in scope.elements)
+        lines = _joined(block.places for block in scope.elements)
         is_first = np.zeros(len(numbers), dtype=bool)
         is_first[np.unique(numbers, return_index=True)[1]] = True
         if not is_first.all():
@@ -198,14 +211,13 @@ class Assembly:
         """Return the numbers of a set in the whole; `within` are the sets that it is looked up for."""
         parts = owner.scope.sets[kind][key]
         if id(parts) in within:  # it names itself
-            return _NONE
+            return _joined([])
         within = (*within, id(parts))
-        return np.concatenate([*(one for part in parts for one in self._members(owner, kind, key, part, within)), _NONE])
+        return _joined(one for part in parts for one in self._members(owner, kind, key, part, within))
 
     def _members(self, owner: Placed, kind: str, key: str, part: Part, within: tuple[int, ...]) -> Iterator[Ints]:
         for member in part.members:
-            place = member.place if not isinstance(member, Numbers) else int(member.places[0]) if len(member[0]) else 0
-            scope = self.owner(part.instance, place) if part.instance else self._plain(owner)
+            scope = self.owner(part.instance, part.place) if part.instance else self._plain(owner)
             if isinstance(member, Named):
                 yield self.named(scope, member, kind, within)
             else:
@@ -217,18 +229,18 @@ class Assembly:
         return alone[0] if not (owner.scope.name or self._explicit) and len(alone) == 1 else owner
 
     def _numbers(self, owner: Placed, kind: str, member: Numbers | Range, name: str) -> Ints:
-        known = owner.numbers(kind)
-        add = owner.add_node if kind == "NSET" else owner.add_element
+        known, left_out = owner.numbers[kind], owner.left_out[kind]
         if isinstance(member, Range):
-            inside = (known >= member.first) & (known <= member.last) & ((known - member.first) % member.step == 0)
-            if not inside.any():
+            found = known[member.has(known)]
+            if not found.size and not member.has(left_out).any():
                 self._lose(name, member.first, member.place, 1)
-            return np.asarray(known[inside] + add)
-        lost = places(known, member.numbers) < 0
+            return np.asarray(found + owner.add[kind])
+        there = places(known, member.numbers) >= 0
+        lost = ~there & ~np.isin(member.numbers, left_out)
         if lost.any():
             first = int(lost.argmax())
             self._lose(name, int(member.numbers[first]), int(member.places[first]), int(lost.sum()))
-        return np.asarray(member.numbers[~lost] + add)
+        return np.asarray(member.numbers[there] + owner.add[kind])
 
     def _lose(self, name: str, number: int, place: int, count: int) -> None:
         first, where, so_far = self._lost.get(name, (number, place, 0))
@@ -237,8 +249,8 @@ class Assembly:
     def lost(self) -> list[str]:
         """Say what sets name that is not there."""
         return [
-            f"set '{name}' names {count} number{'s' * (count > 1)} that {'are' if count > 1 else 'is'} not in the file, "
-            f"the first is {number} in {self._lines.at(place)}: left out"
+            f"set '{name}' names {count} that {'are' if count > 1 else 'is'} not in the file and left out, the first "
+            f"is number {number} in {self._lines.at(place)}"
             for name, (number, place, count) in self._lost.items()
         ]
 
@@ -274,13 +286,13 @@ class Assembly:
                 yield from self._readings(owner, name[at + 1 :])
 
     def _nodes_of(self, elements: Ints) -> Ints:
-        return np.concatenate([*(block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.cells), _NONE])
+        return _joined(block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.cells)
 
     @cached_property
     def cells(self) -> list[Elements]:
         """The elements of all scopes by the numbers of the whole."""
         return [
-            block._replace(numbers=block.numbers + one.add_element, nodes=block.nodes + one.add_node)
+            block._replace(numbers=block.numbers + one.add["ELSET"], nodes=block.nodes + one.add["NSET"])
             for one in self.placed.values()
             for block in one.elements
         ]
@@ -288,17 +300,22 @@ class Assembly:
     @cached_property
     def nodes(self) -> Nodes:
         """The nodes of all scopes by the numbers of the whole."""
-        moved = [one.nodes._replace(numbers=one.nodes.numbers + one.add_node) for one in self.placed.values()]
-        return Nodes(*(np.concatenate(column) for column in zip(*moved, strict=True)))
+        return joined_nodes(
+            [one.nodes._replace(numbers=one.nodes.numbers + one.add["NSET"]) for one in self.placed.values()]
+        )
 
     def all_elements(self, owner: Placed) -> Ints:
         """Return all elements of a scope by the numbers of the whole; around instances those of all."""
         scopes = [owner] if owner.scope.name else list(self.placed.values())
-        return np.concatenate([*(one.numbers("ELSET") + one.add_element for one in scopes), _NONE])
+        return _joined(one.numbers["ELSET"] + one.add["ELSET"] for one in scopes)
+
+
+def _joined(arrays: Iterable[Ints]) -> Ints:
+    return np.concatenate([np.zeros(0, dtype=np.int64), *arrays])
 
 
 def _above(used: Ints, numbers: Ints) -> int:
-    """Return what makes numbers larger than all that are used: 0 where none are."""
+    """Return what raises numbers above all that are used: 0 where none are."""
     if not used.size or not numbers.size:
         return 0
     return max(0, int(used.max()) - int(numbers.min()) + 1)

@@ -162,7 +162,7 @@ class Card:
 
 
 def cards(lines: Lines) -> Iterator[Card]:
-    """Yield the cards of a deck; raise MeshError where it ends within a step, or is no deck.
+    """Yield the cards of a deck; raise MeshError where it is none. Where it may be cut off, a note says so.
 
     A line that begins with * is a keyword, whatever the one before it ended with.
     """
@@ -192,9 +192,7 @@ def cards(lines: Lines) -> Iterator[Card]:
         raise MeshError("there is no keyword such as *NODE")
     yield card
     if in_step:
-        raise MeshError(
-            "a *STEP has no *END STEP: the file is cut off; if the mesh is whole, end the step or take it out"
-        )
+        lines.notes.append("a *STEP has no *END STEP: the file may be cut off there, behind its mesh")
     last = card.places[-1] if card.places else card.place
     if last in lines.open_ends and card.keyword in _OF_THE_MESH:
         lines.notes.append(f"{lines.at(last)} is the last one and has no line end: it may be cut off there")
@@ -232,6 +230,7 @@ def fields(row: bytes) -> list[bytes]:
 
 
 def decoded(data: bytes) -> str:
+    """Return text as UTF-8, else as Latin 1, as older programs write it."""
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
@@ -239,4 +238,5 @@ def decoded(data: bytes) -> str:
 
 
 def bare(name: str) -> str:
+    """Return a name without its quotation marks."""
     return name.strip().strip("\"'")

@@ -6,13 +6,13 @@ one name. What a set names is looked up when the whole deck is read (`inp_assemb
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.files.inp_cards import Card, bare, decoded, fields
 from truespring.mesh.files.inp_elements import READ, ElementType, dimension, element_type, is_of_a_body
@@ -26,6 +26,21 @@ class Nodes(NamedTuple):
     numbers: Ints
     points: Floats
     places: Ints
+
+    def of(self, which: Bools) -> "Nodes":
+        """Return some of them."""
+        return Nodes(self.numbers[which], self.points[which], self.places[which])
+
+
+def joined_nodes(nodes: Sequence[Nodes]) -> Nodes:
+    """Return the nodes of several cards as those of one."""
+    none = Nodes(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+    every = [none, *nodes]
+    return Nodes(
+        np.concatenate([one.numbers for one in every]),
+        np.concatenate([one.points for one in every]),
+        np.concatenate([one.places for one in every]),
+    )
 
 
 class Elements(NamedTuple):
@@ -53,6 +68,11 @@ class Range(NamedTuple):
     step: int
     place: int
 
+    def has(self, numbers: Ints) -> Bools:
+        """Tell which numbers are in the range."""
+        inside = (numbers >= self.first) & (numbers <= self.last)
+        return np.asarray(inside & ((numbers - self.first) % self.step == 0))
+
 
 class Named(NamedTuple):
     """A member that is named: a set, or by its instance a set, a node or an element of that ("Part-1-1.5")."""
@@ -63,10 +83,11 @@ class Named(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Members that a card adds to a set, and the instance that it says they are of, "" for the card's own scope."""
+    """Members that a card adds to a set, the instance that it says they are of ("" for its own scope), and where."""
 
     instance: str
     members: tuple[Numbers | Range | Named, ...]
+    place: int
 
 
 class SurfaceRow(NamedTuple):
@@ -151,7 +172,7 @@ class Scope:
         at = [[*(one if one.strip() else b"0" for one in row[1:]), *[b"0"] * (4 - len(row))] for row in rows]
         points = card.reals(at, card.places, "a coordinate").reshape(-1, 3)
         self.nodes.append(Nodes(numbers, points, np.array(card.places)))
-        self._extend("NSET", card, Part("", (Numbers(numbers, np.array(card.places)),)))
+        self._extend("NSET", card, Part("", (Numbers(numbers, np.array(card.places)),), card.place))
 
     def _add_elements(self, card: Card) -> None:
         name = card.parameters.get("TYPE", "").strip().upper()
@@ -166,7 +187,7 @@ class Scope:
             table, places = _whole_elements(card, name, type_.n_nodes)
             numbers = table[:, 0]
             self.elements.append(Elements(name, type_.kind, numbers, table[:, 1:], places))
-        self._extend("ELSET", card, Part("", (Numbers(numbers, np.full(len(numbers), card.place)),)))
+        self._extend("ELSET", card, Part("", (Numbers(numbers, np.full(len(numbers), card.place)),), card.place))
 
     def _add_lines(self, card: Card, name: str, type_: ElementType | None) -> Ints:
         """Take elements of lines, which may carry sets, and count all others; return the numbers of both."""
@@ -196,7 +217,7 @@ class Scope:
             members += _listed(card, kind)
         if "INTERNAL" in parameters:
             self.internal.add(key_of(parameters[kind]))
-        self._extend(kind, card, Part(instance, tuple(members)))
+        self._extend(kind, card, Part(instance, tuple(members), card.place))
 
     def _extend(self, kind: str, card: Card, part: Part) -> None:
         name = card.parameters.get(kind, "")

@@ -57,7 +57,7 @@ class Surfaces:
         """Return the faces of elements of the body; without a label those that no other element shares."""
         if not label:
             owners, _, count = self._all
-            return owners[np.isin(owners[:, 0], block.numbers) & (count == 1)]
+            return np.asarray(owners[np.isin(owners[:, 0], block.numbers) & (count == 1)])
         face = re.fullmatch(r"[SE]([1-9])", label)
         number = int(face[1]) if face else 0
         if is_shell(block.type):  # a plane body: its edges
