@@ -583,9 +583,14 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
             "plate_triangles_22.msh",
             "\n1 1 2 1 7 ",
             "\n1 21 2 1 7 ",
-            "line 93: an element of gmsh's type 21 .* is not supp",
+            "line 93: an element of gmsh's type 21 is not supported.* mesh with Mesh.ElementOrder = 1 or 2",
         ),
-        ("plate_triangles_22.msh", "2.2 0 8", "1.0 0 8", r"version 1.0 of \.msh is not read, 2.2 and 4.1 are"),
+        (
+            "plate_triangles_22.msh",
+            "2.2 0 8",
+            "1.0 0 8",
+            r"version 1.0 of \.msh is not read; .*gmsh FILE -0 -format msh41",
+        ),
         (
             "plate_triangles_22.msh",
             "$Nodes",
@@ -594,7 +599,7 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
         ),
         ("plate_triangles_22.msh", "$EndNodes", "$EndNode", r"line 90: \$EndNodes is wanted here"),
         ("plate_triangles_22.msh", '1 1 "clamped"', "1 1 clamped", "line 6: a physical group is dimension, number"),
-        ("plate_quads_41.msh", "$Entities", "$PartitionedEntities", "line 10: a partitioned mesh is not supported"),
+        ("plate_quads_41.msh", "$Entities", "$PartitionedEntities", "line 11: .PartitionedEntities takes 1 numbers"),
         ("plate_quads_41.msh", "$Elements", "$Other", r"line 311: \$EndOther is missing: the file is cut off"),
         ("plate_quads_41.msh", "$MeshFormat", "$Mesh", r"this is no \.msh file"),
         (

@@ -1,6 +1,7 @@
 """Tables in CSV files, whose columns have names and units."""
 
 import csv
+import io
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import MeshError, TruespringError, nearest
+from truespring.opening import read_file
 from truespring.units import Dimension, to_si
 
 
@@ -55,16 +57,14 @@ class Table:
 
     def _read(self) -> tuple[list[list[str]], list[int]]:
         """Return the rows that are not blank, and their lines."""
+        data = read_file(self._file, self._error)
         rows, lines = [], []
         try:
-            with self._file.open(newline="", encoding="utf-8-sig") as stream:
-                reader = csv.reader(stream)
-                for row in reader:
-                    if any(cell.strip() for cell in row):
-                        rows.append(row)
-                        lines.append(reader.line_num)
-        except OSError as error:
-            raise self._error(f"{self._file} cannot be read: {error.strerror}") from None
+            reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+            for row in reader:
+                if any(cell.strip() for cell in row):
+                    rows.append(row)
+                    lines.append(reader.line_num)
         except (UnicodeDecodeError, csv.Error) as error:
             raise self._error(f"{self._file} is no CSV file: {error}") from None
         return rows, lines

@@ -14,6 +14,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.inp import read_inp
+from truespring.opening import read_file
 from truespring.reference.checks import checked, refuse_repeated, refuse_unreadable, rows_of, without_modes
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.scan import CHUNK, Scan, scanning
@@ -63,9 +64,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)
     try:
-        contents = read_inp(deck.read_bytes(), deck.parent)
-    except OSError as error:
-        raise ReferenceFileError(f"{deck} cannot be read: {error.strerror}") from None
+        contents = read_inp(read_file(deck, ReferenceFileError), deck)
     except MeshError as error:
         raise ReferenceFileError(f"{deck}: {error}") from None
     refuse_repeated(contents.node_numbers, "*NODE", deck)

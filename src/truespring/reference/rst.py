@@ -17,6 +17,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ReferenceFileError
 from truespring.mesh.files.contents import places
+from truespring.opening import open_file
 from truespring.reference.checks import checked, refuse_unreadable, without_modes
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import sized
@@ -62,11 +63,8 @@ def read_rst(file: Path, reading: Reading | None = None) -> Record:
 
 def _header(file: Path) -> tuple[int, bool]:
     """Return the number of result sets, and whether they are modes; raise where the file does not fit its header."""
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(4 * _WORDS)
-    except OSError as error:
-        raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
+    with open_file(file, ReferenceFileError) as stream:
+        data = stream.read(4 * _WORDS)
     order = ">" if data[:4] == (100).to_bytes(4, "big") else "<"
     words = np.frombuffer(data[: len(data) // 4 * 4], f"{order}i4").astype(np.int64)
     if len(words) < 3 or words[0] != 100 or words[2] != _RESULTS:

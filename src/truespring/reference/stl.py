@@ -12,6 +12,7 @@ from truespring.equilibrium import Path, State, Status
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
 from truespring.mesh.selections import AXES
+from truespring.opening import read_file
 from truespring.problem import Problem
 from truespring.reference.placing import Placing, told_state, unproven
 
@@ -130,14 +131,7 @@ def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
 
 
 def _bytes(file: pathlib.Path) -> bytes:
-    if file.is_dir():
-        raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
-    try:
-        data = file.read_bytes()
-    except FileNotFoundError:
-        raise ReferenceFileError(f"{file} does not exist: check the path") from None
-    except (OSError, ValueError) as error:  # a path may hold what no file system takes
-        raise ReferenceFileError(f"{file} cannot be read ({error}): check the path and its permissions") from None
+    data = read_file(file, ReferenceFileError)
     if not data.strip():
         raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")
     return data

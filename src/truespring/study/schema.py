@@ -179,7 +179,7 @@ class VoxelsTable(Table):
     """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
 
     voxels: str
-    label: int
+    label: int | str
     edge: Length | None = None
     unit: str = "mm"
 

@@ -11,16 +11,17 @@ from truespring.mesh.files.inp import is_inp, read_inp
 from truespring.mesh.files.vtk import read_vtk
 from truespring.mesh.files.vtu import read_vtu
 from truespring.mesh.mesh import Mesh
+from truespring.opening import read_file
 
 Reader = Callable[[bytes, Path], Contents]
 
 
 def _alone(read: Callable[[bytes], Contents]) -> Reader:
     """Return a reader of files that name no others."""
-    return lambda data, folder: read(data)
+    return lambda data, file: read(data)
 
 
-# By suffix: from the file and the folder that it lies in.
+# By suffix: from what a file holds, and where it lies.
 _READERS: dict[str, Reader] = {
     ".msh": _alone(read_msh),
     ".inp": read_inp,
@@ -63,20 +64,13 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
         raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
     data = _bytes(file)
     try:
-        return (read_inp if is_inp(data) else reader)(data, file.parent).mesh(scale)
+        return (read_inp if is_inp(data) else reader)(data, file).mesh(scale)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 
 
 def _bytes(file: Path) -> bytes:
-    if file.is_dir():
-        raise MeshError(f"{file} is a folder: give the mesh file itself")
-    try:
-        data = file.read_bytes().removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
-    except FileNotFoundError:
-        raise MeshError(f"{file} does not exist: check the path") from None
-    except OSError as error:
-        raise MeshError(f"{file} cannot be read: {error.strerror}") from None
+    data = read_file(file, MeshError).removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
     if not data.strip():
         raise MeshError(f"{file} is empty")
     return data

@@ -83,6 +83,7 @@ class Contents:
             `facets` of ELEMENT_KINDS, shape (n, 2).
         node_lines: where the nodes stand in a text file, shape (n,).
         notes: what should be known of the file, in words.
+        hint: what its program may have left out where there is no body, and how it writes that.
     """
 
     node_numbers: Ints
@@ -93,6 +94,7 @@ class Contents:
     facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     node_lines: Ints | None = None
     notes: tuple[str, ...] = ()
+    hint: str = ""
 
     def mesh(self, scale: float) -> Mesh:
         """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none."""
@@ -102,13 +104,13 @@ class Contents:
     def _mesh(self, scale: float) -> Mesh:
         self._check_nodes()
         cells = _by_kind(self.cells)
-        body = _body(cells)
+        body = _body(cells, self.hint)
         for block in cells:
             self._check_cells(block)
         kind = body[0].kind
         corners = self._rows(np.concatenate([block.corners for block in body]))
         nodes = np.unique(corners)
-        positions = _in_their_dimensions(self.points[nodes] * scale, kind)
+        positions = _in_their_dimensions(self.points[nodes] * scale, kind, self.hint)
         elements = np.searchsorted(nodes, corners)
         is_turned = _is_inverted(positions, elements, kind)
         facet_groups, facet_notes = self._facet_groups(cells, body, nodes, elements)
@@ -293,14 +295,15 @@ def _lines(cells: Sequence[Cells]) -> Ints | None:
     return np.concatenate(lines) if len(lines) == len(cells) else None
 
 
-def _body(cells: Sequence[Cells]) -> list[Cells]:
+def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
     """Return the blocks of the highest dimension; raise MeshError where they are no body of one kind of element."""
     counts = Counter[str]()
     for block in cells:
         counts[block.kind] += len(block.nodes)
     dim = max((block.dim for block in cells), default=0)
     if dim < 2:
-        raise MeshError(f"{f'there are only {listed(counts)}' if counts else 'there are no elements'}: {_SUPPORTED}")
+        there = f"there are only {listed(counts)}" if counts else "there are no elements"
+        raise MeshError(f"{there}: {_joined(hint, _SUPPORTED)}")
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
     unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
@@ -310,16 +313,30 @@ def _body(cells: Sequence[Cells]) -> list[Cells]:
     return [block for block in cells if block.dim == dim]
 
 
-def _in_their_dimensions(positions: Floats, kind: str) -> Floats:
+def _joined(*advice: str) -> str:
+    return "; ".join(filter(None, advice))
+
+
+def _in_their_dimensions(positions: Floats, kind: str, hint: str) -> Floats:
     if ELEMENT_KINDS[kind].dim == 3:
         return positions
+    spans = np.ptp(positions, axis=0)
+    if spans[2] <= _FLAT * np.linalg.norm(spans):
+        return positions[:, :2]
     z = positions[:, 2]
-    if np.ptp(z) > _FLAT * np.linalg.norm(np.ptp(positions, axis=0)):
+    if spans.min() <= _FLAT * np.linalg.norm(spans):
         raise MeshError(
-            f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
-            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra"
+            f"the {kind}s lie in a plane of constant {'xyz'[spans.argmin()]}: "
+            + _joined(hint, "of a plane body z is constant: turn it")
         )
-    return positions[:, :2]
+    raise MeshError(
+        f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
+        + _joined(
+            hint,
+            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra, with which a "
+            "mesher fills a closed surface",
+        )
+    )
 
 
 def _is_inverted(positions: Floats, elements: Ints, kind: str) -> Bools:

@@ -30,16 +30,16 @@ def is_inp(data: bytes) -> bool:
     return first[:1] == b"*" and first[1:2].isalpha()
 
 
-def read_inp(data: bytes, folder: Path | None = None) -> Contents:
+def read_inp(data: bytes, file: Path | None = None) -> Contents:
     """Read a .inp file; raise MeshError where it is damaged or makes its mesh in a way that is not read.
 
     Args:
-        data: the file.
-        folder: where it lies: files that it includes are read there or below, and nowhere else.
+        data: what the file holds.
+        file: where it lies: files that it includes are read in its folder or below, and nowhere else.
     """
     if b"\0" in data:
         raise MeshError("this is no .inp file: it is binary, not text")
-    lines = Lines(data, folder)
+    lines = Lines(data, file)
     deck = _Deck()
     for card in cards(lines):
         deck.add(card)
@@ -125,7 +125,8 @@ def _no_body(assembly: Assembly, left_out: Mapping[str, int]) -> str:
     if not assembly.nodes.numbers.size and not left_out:
         return "there is no *NODE: is this the whole deck, and does it include the file of its mesh?"
     what = f": {counted(left_out)} {'is' if sum(left_out.values()) == 1 else 'are'} none" if left_out else ""
-    turned = "; an axisymmetric body is read where it is meshed in 3D" if any(t.startswith("CAX") for t in left_out) else ""
+    is_turned = any(name.startswith("CAX") for name in left_out)
+    turned = "; an axisymmetric body is to be meshed in 3D" if is_turned else ""
     return f"there is no *ELEMENT of a body{what}; a body is made of {READ}{turned}"
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from truespring.errors import MeshError
 from truespring.mesh.files.text import Rows, integers, reals, word
+from truespring.opening import file_beside, read_file
 
 # How deep files include files, and how many there are at most.
 _DEEPEST, _MOST = 16, 1000
@@ -34,12 +35,12 @@ class Lines:
         open_ends: places of last lines that have no line end.
     """
 
-    def __init__(self, data: bytes, folder: Path | None) -> None:
+    def __init__(self, data: bytes, file: Path | None) -> None:
         self.notes: list[str] = []
         self.open_ends: set[int] = set()
-        self._folder = None if folder is None else folder.resolve()
+        self._file = file
         self._names = [""]
-        self._open: list[tuple[Path, Iterator[tuple[int, bytes]]]] = [(Path(), self._of(0, data))]
+        self._open: list[tuple[Path | None, Iterator[tuple[int, bytes]]]] = [(file, self._of(0, data))]
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
         """Yield place and text of each line that is neither blank nor a comment."""
@@ -73,29 +74,17 @@ class Lines:
 
         Names are relative to that folder, in files that are included, too: as both programs have it.
         """
-        if self._folder is None:
+        if self._file is None:
             raise MeshError("files are included by a deck that is read from a file")
-        try:
-            path = (self._folder / name.replace("\\", "/")).resolve()
-            inside = path.is_relative_to(self._folder)
-            is_file = inside and path.is_file()
-        except (OSError, ValueError):  # a text that no file can be called
-            inside = is_file = False
-        if not inside:
-            raise MeshError("only files in the deck's folder, or below it, are read: copy it there and name it so")
-        if not is_file:
-            raise MeshError("there is no such file in the deck's folder: put it there, or take the line out")
+        path = file_beside(self._file, name, MeshError)
         if path in [one for one, _ in self._open]:
             raise MeshError("this file includes itself: take the line out")
         if len(self._open) > _DEEPEST or len(self._names) > _MOST:
             raise MeshError(f"files are included {_DEEPEST} deep and {_MOST} times at most: write them into one")
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise MeshError(f"this file cannot be read: {error.strerror}") from None
+        data = read_file(path, MeshError)
         if b"\0" in data:
             raise MeshError("this file is binary, not text")
-        self._names.append(path.relative_to(self._folder).as_posix())
+        self._names.append(path.relative_to(self._file.parent).as_posix())
         self._open.append((path, self._of(len(self._names) - 1, data.removeprefix(b"\xef\xbb\xbf"))))
 
 
@@ -207,7 +196,7 @@ def _follow(card: Card, in_step: bool) -> None:
     try:
         card.deck.include(name)
     except MeshError as error:
-        full = card.error(f"'{name[:80]}' is not read: {error}")
+        full = card.error(str(error))
         if not in_step:
             raise full from None
         card.deck.notes.append(str(full))
