@@ -310,13 +310,13 @@ def test_nodes_without_an_element_are_left_out_and_named(tmp_path: Path) -> None
 
 
 def test_nodes_at_one_place_are_named(tmp_path: Path) -> None:
-    torn = TWO_QUADS.replace("*ELEMENT", "12, 1, 0\n13, 1, 1.0000000001\n*ELEMENT").replace(
-        "2, 2, 5, 6, 3", "2, 12, 5, 6, 13"
+    torn = TWO_QUADS.replace("*ELEMENT", "12, 1, 0\n13, 1, 1.0000000001\n7, 3, 0\n8, 3, 1\n*ELEMENT").replace(
+        "2, 2, 5, 6, 3\n", "2, 12, 5, 6, 13\n3, 5, 7, 8, 6\n"
     )
     (note,) = deck(tmp_path, torn).notes
     assert note == (
-        "4 of 8 nodes share their place with another one, the first are nodes 2 and 12 at (1, 0) m: "
-        "the mesh may be torn there"
+        "4 of 10 nodes share their place with another one, the first are nodes 2 and 12 at (1, 0) m: "
+        "the mesh may be torn there; join = true joins them"
     )
     assert not deck(tmp_path, torn.replace("1.0000000001", "1.0001").replace("12, 1, 0", "12, 1.01, 0")).notes
 
@@ -701,7 +701,10 @@ def test_a_count_of_cells_that_does_not_match(tmp_path: Path) -> None:
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match=r"mesh\.stl: a mesh file ends in \.msh, \.inp, \.vtu, \.vtk, not in '\.stl'"):
+    (tmp_path / "mesh.stl").write_text("solid a\nfacet normal 0 0 1\n")
+    with pytest.raises(
+        MeshError, match=r"mesh\.stl: a mesh file ends in \.msh, .*, not in '\.stl', and .*meshio convert"
+    ):
         read_mesh(tmp_path / "mesh.stl")
     with pytest.raises(MeshError, match=r"none\.msh does not exist"):
         read_mesh(tmp_path / "none.msh")

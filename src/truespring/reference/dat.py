@@ -28,6 +28,11 @@ _DISPLACEMENT, _FORCE, _ENERGY = "displacements", "total force", "total internal
 _ID_WIDTH, _REAL_WIDTH = 10, 14
 
 
+def is_dat(head: bytes) -> bool:
+    """Whether one of the first lines of a file heads a table of CalculiX."""
+    return any(_HEAD.fullmatch(line) for line in head.splitlines())
+
+
 def read_dat(file: Path, reading: Reading | None = None, mesh: Path | None = None) -> Record:
     """Read the displacements in a .dat file of CalculiX.
 

@@ -41,6 +41,12 @@ _MODES = (1, 2)  # buckling and modal analysis
 _AGAIN = "copy it again from where Ansys wrote it"
 
 
+def is_rst(head: bytes) -> bool:
+    """Whether a file begins as Ansys' results do."""
+    words = (np.frombuffer(head[:12], f"{order}i4") for order in "<>" if len(head) >= 12)
+    return any(word[0] == 100 and word[2] == _RESULTS for word in words)
+
+
 def read_rst(file: Path, reading: Reading | None = None) -> Record:
     """Read the nodal displacement of all result sets in a .rst file of Ansys.
 

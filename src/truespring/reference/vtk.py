@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, ReferenceFileError, nearest
+from truespring.mesh.files.heads import HEAD, format_by_head, is_vtk, is_vtk_xml
 from truespring.mesh.files.vtk import Grid, contents, read_legacy_grid
 from truespring.mesh.files.vtu import read_grid
+from truespring.opening import open_file
 from truespring.reference.checks import checked, refuse_unreadable
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import named, refuse_unknown
@@ -19,7 +21,8 @@ from truespring.reference.vtk_cells import named, refuse_unknown
 # What other programs call the displacement, in small letters.
 _NAMES = ("displacement", "displacements", "u", "disp")
 
-_GRIDS: Mapping[str, Callable[[bytes], Grid]] = {".vtu": read_grid, ".vtk": read_legacy_grid}
+_GRIDS: Mapping[str, Callable[[bytes], Grid]] = {"vtu": read_grid, "vtk": read_legacy_grid}
+_KINDS = {".vtu": is_vtk_xml("UnstructuredGrid"), ".vtk": is_vtk, ".pvd": is_vtk_xml("Collection")}
 
 
 def read_vtk_result(file: Path, reading: Reading | None = None, field: str | None = None) -> Record:
@@ -38,8 +41,8 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
     Returns a record of kind "vtu", "vtk" or "pvd". Raises ReferenceFileError where a file is damaged, the displacement
     is not found, or the files of a series do not share points and cells.
     """
-    kind = file.suffix.lower().lstrip(".")
     refuse_unreadable(file)
+    kind = _kind(file)
     series = _series(file) if kind == "pvd" else [(1.0, file)]
     first: Record | None = None
     levels: list[Level] = []
@@ -53,6 +56,13 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
             reading(number / len(series))
     assert first is not None  # _series holds one at least
     return checked(Record(file, kind, first.points, first.cells, tuple(levels)))
+
+
+def _kind(file: Path) -> str:
+    """The format of a file without the point: by its content, else its suffix."""
+    with open_file(file, ReferenceFileError) as stream:
+        head = stream.read(HEAD)
+    return (format_by_head(file.suffix, head, _KINDS) or ".vtu").lstrip(".")
 
 
 def _series(file: Path) -> list[tuple[float, Path]]:
@@ -91,7 +101,7 @@ def _series(file: Path) -> list[tuple[float, Path]]:
 def _grid(file: Path) -> Grid:
     refuse_unreadable(file)
     try:
-        return _GRIDS[file.suffix.lower()](file.read_bytes())
+        return _GRIDS.get(_kind(file), read_grid)(file.read_bytes())
     except OSError as error:
         raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
     except MeshError as error:

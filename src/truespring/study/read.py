@@ -272,7 +272,7 @@ class _Builder:
                 with self.at("mesh", "unit"):
                     scale = _unit(table.unit)
                 with self.at("mesh", "file"):
-                    mesh = read_mesh(self.file.parent / table.file, scale)
+                    mesh = read_mesh(self.file.parent / table.file, scale, table.join)
                     refuse_too_large(mesh.n_nodes, mesh.dim)
                     return self.halved(mesh)
 

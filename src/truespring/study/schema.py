@@ -169,10 +169,14 @@ class BoxTable(Table):
 
 
 class FileTable(Table):
-    """A mesh from a file; mesh files know no units, so `unit` tells their length unit."""
+    """A mesh from a file; mesh files know no units, so `unit` tells their length unit.
+
+    `join` makes nodes at one place one; by default where no two elements share a node.
+    """
 
     file: str
     unit: str = "m"
+    join: bool | None = None
 
 
 class VoxelsTable(Table):

@@ -17,7 +17,7 @@ from truespring.errors import ReferenceFileError, StudyError, TruespringError, n
 from truespring.mesh import read_mesh
 from truespring.opening import read_file
 from truespring.problem import Problem
-from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
+from truespring.reference import Placing, Program, format_of, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
 
@@ -61,7 +61,7 @@ class Source:
     @property
     def is_stl(self) -> bool:
         """Whether it is an STL file, which is read beside the other body."""
-        return self.file.suffix.lower() == ".stl"
+        return format_of(self.file) == ".stl"
 
 
 def find_sources(texts: Sequence[str], given: Given) -> list[Source]:

@@ -2,38 +2,49 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.inp import is_inp, read_inp
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.inp import read_inp
 from truespring.mesh.files.vtk import read_vtk
 from truespring.mesh.files.vtu import read_vtu
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
 
-Reader = Callable[[bytes, Path], Contents]
+
+class Format(NamedTuple):
+    """How files of a format begin, and what reads them."""
+
+    recognises: Recognises
+    read: Callable[[bytes, Path], Contents]
 
 
-def _alone(read: Callable[[bytes], Contents]) -> Reader:
+def _alone(read: Callable[[bytes], Contents]) -> Callable[[bytes, Path], Contents]:
     """Return a reader of files that name no others."""
     return lambda data, file: read(data)
 
 
-# By suffix: from what a file holds, and where it lies.
-_READERS: dict[str, Reader] = {
-    ".msh": _alone(read_msh),
-    ".inp": read_inp,
-    ".vtu": _alone(read_vtu),
-    ".vtk": _alone(read_vtk),
-}
+#: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
+FORMATS: MappingProxyType[str, Format] = MappingProxyType(
+    {
+        ".msh": Format(is_msh, _alone(read_msh)),
+        ".inp": Format(is_inp, read_inp),
+        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), _alone(read_vtu)),
+        ".vtk": Format(is_vtk, _alone(read_vtk)),
+    }
+)
 
 
-def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
-    """Read a mesh file; its suffix tells the format, but a deck of Abaqus or CalculiX is known by what it holds.
+def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) -> Mesh:
+    """Read a mesh file; its content tells the format, else its suffix.
 
-    .msh: gmsh 2 to 2.2 and 4.1, text and binary. Physical groups become groups; one without a name is
+    .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
     called by its number. .inp: Abaqus and CalculiX, with parts, instances and included files in the deck's
     folder or below. NSET, ELSET and SURFACE become groups, in their first spelling: those of the assembly by
     their name, those of an instance as INSTANCE.NAME, and by their name where no other scope has it; an NSET
@@ -43,13 +54,15 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
     The elements of the highest dimension are the body, in the file's order; cells of a lower one only
-    carry groups. A group of elements is one of their nodes, too; where several have one name, the nodes
-    are united. Cells of second order become their corners, elements that all are inverted are mirrored,
-    nodes without an element are left out: the mesh's notes say so. A plane body loses its z.
+    carry groups: those of one dimension less are facets of the elements that they bound. A group of
+    elements or facets is one of their nodes, too; where several have one name, the nodes are united.
+    Cells of second order become their corners, inverted elements are mirrored, nodes without an element
+    are left out: the mesh's notes say so. A plane body loses its z.
 
     Args:
         file: the mesh file.
         scale: the file's unit of length [m].
+        join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
     where the file cannot be read, is damaged or cut off, or holds no body of one kind of element.
@@ -57,14 +70,18 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
     mostly with a note on nodes that no element has.
     """
     file = Path(file)
-    reader = _READERS.get(file.suffix.lower())
-    if reader is None:
-        raise MeshError(f"{file}: a mesh file ends in {', '.join(_READERS)}, not in '{file.suffix}'")
     if not (math.isfinite(scale) and scale > 0):
         raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
     data = _bytes(file)
+    key = format_by_head(file.suffix, data, {suffix: form.recognises for suffix, form in FORMATS.items()})
+    if key is None:
+        raise MeshError(
+            f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
+            "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
+        )
     try:
-        return (read_inp if is_inp(data) else reader)(data, file).mesh(scale)
+        contents = FORMATS[key].read(data, file)
+        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 

@@ -2,13 +2,14 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.facets import facet_nodes, find_facets, folded, mirrored_facets
+from truespring.mesh.joining import merged
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
 from truespring.mesh.mesh import Mesh
 
@@ -38,7 +39,7 @@ _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave 
 _FAR = 1e30
 
 # Shares of the body's diameter.
-_SAME_PLACE = 1e-9  # nodes this near are at one place
+_SAME_PLACE = 1e-7  # nodes this near are at one place: as near as float32 tells
 _FLAT = 1e-6  # a body this thin lies in a plane: files carry six digits or more
 
 
@@ -96,17 +97,24 @@ class Contents:
     notes: tuple[str, ...] = ()
     hint: str = ""
 
-    def mesh(self, scale: float) -> Mesh:
-        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none."""
-        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
-            return self._mesh(scale)
+    def mesh(self, scale: float, join: bool | None = None) -> Mesh:
+        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none.
 
-    def _mesh(self, scale: float) -> Mesh:
+        `join` makes nodes at one place one; by default where no two elements share a node.
+        """
+        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
+            return self._mesh(scale, join)
+
+    def _mesh(self, scale: float, join: bool | None) -> Mesh:
         self._check_nodes()
         cells = _by_kind(self.cells)
         body = _body(cells, self.hint)
         for block in cells:
             self._check_cells(block)
+        if join is not False:
+            whole = self._joined(body, always=bool(join))
+            if whole is not self:
+                return whole._mesh(scale, join=False)
         kind = body[0].kind
         corners = self._rows(np.concatenate([block.corners for block in body]))
         nodes = np.unique(corners)
@@ -172,6 +180,30 @@ class Contents:
                 left = "no load acts on them" if n_lost < len(facets) else "they are taken for their nodes alone"
                 notes.append(f"{n_lost} of {len(facets)} facets of group '{name}' bound no element of the body: {left}")
         return groups, notes
+
+    def _joined(self, body: Sequence[Cells], always: bool) -> "Contents":
+        """Return the contents with nodes at one place as one, if always or where no two elements share a node."""
+        used = self._rows(np.concatenate([block.nodes.ravel() for block in body]))
+        if not always and len(np.unique(used)) < len(used):
+            return self
+        near = _SAME_PLACE * float(np.linalg.norm(np.ptp(self.points[used], axis=0)))
+        first, place = merged(self.points, near)
+        n_before, n_after = len(np.unique(used)), len(np.unique(place[used]))
+        if n_after == n_before:
+            return self
+        number = self.node_numbers[first][place]  # of each node, the one that it becomes
+        why = "were joined" if always else "were joined, for no two elements share a node"
+        return replace(
+            self,
+            node_numbers=self.node_numbers[first],
+            points=self.points[first],
+            cells=[replace(block, nodes=number[self._rows(block.nodes)]) for block in self.cells],
+            node_groups={
+                name: np.unique(number[_found(self.node_numbers, group)]) for name, group in self.node_groups.items()
+            },
+            node_lines=None if self.node_lines is None else self.node_lines[first],
+            notes=(*self.notes, f"{n_before} nodes that stand at {n_after} places {why}"),
+        )
 
     def _rows(self, node_numbers: Ints) -> Ints:
         return places(self.node_numbers, node_numbers)
@@ -376,7 +408,8 @@ def _coincident(positions: Floats, numbers: Ints) -> list[str]:
     other = next(node for node in nearest[first] if node != first)
     return [
         f"{len(twins)} of {len(positions)} nodes share their place with another one, the first are nodes "
-        f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there"
+        f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there; "
+        "join = true joins them"
     ]
 
 

@@ -24,12 +24,6 @@ _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
 _FLAT = "write the deck flat, with its nodes and elements as *NODE and *ELEMENT (in Abaqus/CAE: File, Export)"
 
 
-def is_inp(data: bytes) -> bool:
-    """Tell whether a file looks like a deck: its first line that is no comment is a keyword of one."""
-    first = next((line.strip() for line in data[:10_000].splitlines() if line.strip()[:2] not in (b"", b"**")), b"")
-    return first[:1] == b"*" and first[1:2].isalpha()
-
-
 def read_inp(data: bytes, file: Path | None = None) -> Contents:
     """Read a .inp file; raise MeshError where it is damaged or makes its mesh in a way that is not read.
 
