@@ -13,9 +13,10 @@ import numpy as np
 from truespring.arrays import Ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.files.contents import Cells, Contents, listed
-from truespring.mesh.files.inp_assembly import Assembly, Move, Placed, read_move
+from truespring.mesh.files.inp_assembly import Assembly, Placed
 from truespring.mesh.files.inp_cards import Card, Lines, bare, cards
 from truespring.mesh.files.inp_elements import READ, dimension
+from truespring.mesh.files.inp_move import Move, read_move
 from truespring.mesh.files.inp_scopes import Scope, counted, found, key_of, totals
 from truespring.mesh.files.inp_surfaces import Surfaces
 
@@ -47,6 +48,7 @@ class _Deck:
         self._root = Scope("")
         self._parts: dict[str, Scope] = {}
         self._instances: dict[str, tuple[Scope, Move | None]] = {}
+        self._used: set[str] = set()  # keys of parts that instances are made of
         self._here = self._root
 
     def add(self, card: Card) -> None:
@@ -87,6 +89,7 @@ class _Deck:
             known = [scope.name for scope in self._parts.values()]
             there = f"{nearest(bare(name), known)}; there are {', '.join(known) or 'none'}"
             raise card.error(f"there is no part '{bare(name)[:40]}'{there}")
+        self._used.add(key)
         return self._parts[key]
 
     def contents(self, lines: Lines) -> Contents:
@@ -102,8 +105,9 @@ class _Deck:
         notes = [note for scope in scopes for note in scope.notes]
         if left_out:
             notes.append(f"elements that the body does not need are left out: {counted(left_out)}")
-        if explicit:
-            notes += _unused(self._parts, self._instances)
+        unused = [part.name for key, part in self._parts.items() if key not in self._used]
+        if explicit and unused:
+            notes.append(f"no instance is made of {', '.join(unused)}: left out")
         return Contents(
             node_numbers=assembly.nodes.numbers,
             points=assembly.nodes.points,
@@ -119,9 +123,7 @@ def _no_body(assembly: Assembly, left_out: Mapping[str, int]) -> str:
     if not assembly.nodes.numbers.size and not left_out:
         return "there is no *NODE: is this the whole deck, and does it include the file of its mesh?"
     what = f": {counted(left_out)} {'is' if sum(left_out.values()) == 1 else 'are'} none" if left_out else ""
-    is_turned = any(name.startswith("CAX") for name in left_out)
-    turned = "; an axisymmetric body is to be meshed in 3D" if is_turned else ""
-    return f"there is no *ELEMENT of a body{what}; a body is made of {READ}{turned}"
+    return f"there is no *ELEMENT of a body{what}; a body is made of {READ}"
 
 
 def _lower(assembly: Assembly) -> Iterator[str]:
@@ -131,15 +133,8 @@ def _lower(assembly: Assembly) -> Iterator[str]:
         if dimension(block.kind) < dim:
             lower[block.kind] += len(block.numbers)
     if lower:
-        yield f"{listed(lower)} are not of the body and only carry sets"
-
-
-def _unused(parts: dict[str, Scope], instances: dict[str, tuple[Scope, Move | None]]) -> Iterator[str]:
-    """Name the parts without an instance."""
-    used = {id(nodes) for scope, _ in instances.values() for nodes in scope.nodes}
-    unused = [part.name for part in parts.values() if part.nodes and not used & set(map(id, part.nodes))]
-    if unused:
-        yield f"{'parts' if unused[1:] else 'part'} {', '.join(unused)} without an instance: left out"
+        verbs = ("are", "carry") if lower.total() > 1 else ("is", "carries")
+        yield f"{listed(lower)} {verbs[0]} not of the body and only {verbs[1]} sets"
 
 
 class _Groups:

@@ -20,9 +20,6 @@ _DEEPEST, _MOST = 16, 1000
 # Lines are counted from 1; a place is the number of its file times this, and the line. A deck itself is file 0.
 _A_FILE = 1 << 40
 
-# Cards of which the body is made: what is said here may not be lost unseen.
-_OF_THE_MESH = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
-
 # Parameters without a value: by them the line behind a comma is known to be of the keyword.
 _FLAGS = {b"GENERATE", b"INTERNAL", b"UNSORTED"}
 
@@ -182,9 +179,9 @@ def cards(lines: Lines) -> Iterator[Card]:
     yield card
     if in_step:
         lines.notes.append("a *STEP has no *END STEP: the file may be cut off there, behind its mesh")
-    last = card.places[-1] if card.places else card.place
-    if last in lines.open_ends and card.keyword in _OF_THE_MESH:
-        lines.notes.append(f"{lines.at(last)} is the last one and has no line end: it may be cut off there")
+    for place in sorted(lines.open_ends):
+        if lines.is_included(place) or not card.keyword.startswith("END"):
+            lines.notes.append(f"{lines.at(place)} is the last one and has no line end: it may be cut off there")
 
 
 def _follow(card: Card, in_step: bool) -> None:

@@ -53,7 +53,7 @@ class ElementType(NamedTuple):
 def element_type(name: str) -> ElementType | None:
     """Return the type of a name in capitals; None where no body is made of it and no set of the body carried.
 
-    Those are left out: masses, connectors, gaps, dashpots, rigid, fluid, axisymmetric and user elements.
+    Those are left out: masses, connectors, gaps, dashpots, rigid, fluid and user elements.
     """
     found = re.fullmatch(rf"({'|'.join(_NAMED)})(?:[A-Z].*)?", name)
     if found:
@@ -65,7 +65,7 @@ def element_type(name: str) -> ElementType | None:
 
 def is_of_a_body(name: str) -> bool:
     """Tell whether a type fills a body, be its number of nodes known or not: such an element cannot be left out."""
-    return re.match(r"(C3D|CPS|CPE)\d", name) is not None
+    return re.match(r"(C3D|CPS|CPE|CPEG|CAX|CGAX)\d", name) is not None
 
 
 def local_facet(kind: str, face: int) -> int | None:

@@ -180,7 +180,8 @@ class Scope:
         if type_:
             _rows(card)
         if type_ is None and is_of_a_body(name):
-            raise card.error(f"TYPE={name[:40]} ({len(card.rows)} lines) is not read: mesh the body by {READ}")
+            what = ", axisymmetric," if "AX" in name else ""
+            raise card.error(f"TYPE={name[:40]} ({len(card.rows)} lines){what} is not read: mesh the body by {READ}")
         if type_ is None or dimension(type_.kind) == 1:
             numbers = self._add_lines(card, name, type_)
         else:
