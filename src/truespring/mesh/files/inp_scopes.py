@@ -333,4 +333,4 @@ def totals(scopes: list[Scope]) -> Counter[str]:
     for scope in scopes:
         for type_, numbers in scope.left_out.items():
             counts[type_] += sum(map(len, numbers))
-    return counts
+    return +counts
