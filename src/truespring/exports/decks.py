@@ -19,6 +19,7 @@ from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.material import PlaneStrain
 from truespring.mesh import outer_facets
+from truespring.mesh.files.inp_elements import FACES
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import Loading
@@ -38,13 +39,6 @@ _AT_REST = 1e-12
 # Numbers in a line.
 _A_LINE = 16
 
-# Corners of the faces, in both programs' order, from 0.
-_FACES = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
-}
 _SOLIDS = {"tetrahedron": "C3D4", "hexahedron": "C3D8"}
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
 
@@ -254,7 +248,7 @@ def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
             yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
         elif isinstance(load, Pressure):
             pressed = np.sort(outer_facets(mesh, load.on), axis=1)
-            for face, local in enumerate(_FACES[mesh.element], 1):
+            for face, local in enumerate(FACES[mesh.element], 1):
                 theirs = np.sort(mesh.elements[:, local], axis=1)
                 for number in np.flatnonzero(_rows_in(theirs, pressed)).tolist():
                     yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)

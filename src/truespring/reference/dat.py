@@ -69,7 +69,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)
     try:
-        contents = read_inp(read_file(deck, ReferenceFileError))
+        contents = read_inp(read_file(deck, ReferenceFileError), deck)
     except MeshError as error:
         raise ReferenceFileError(f"{deck}: {error}") from None
     refuse_repeated(contents.node_numbers, "*NODE", deck)
@@ -203,8 +203,7 @@ def _record(file: Path, deck: Contents, increments: Sequence[_Increment]) -> Rec
     ]
     kept, notes = without_modes(levels, [one.is_mode for one in moved])
     cells = {
-        name: rows_of(deck.node_numbers, nodes[:, (0, 2, 1)] if name == "line3" else nodes, f"a {name}", file)
-        for name, nodes in named(deck.cells, file).items()  # the middle of a line stands between its ends
+        name: rows_of(deck.node_numbers, nodes, f"a {name}", file) for name, nodes in named(deck.cells, file).items()
     }
     names = tuple(map(str, deck.node_numbers.tolist()))
     return Record(file, "dat", deck.points, cells, kept, names, (*notes, *_notes(moved, levels, deck)))

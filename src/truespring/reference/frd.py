@@ -40,6 +40,8 @@ _REAL = {_SINGLE: "<f4", _DOUBLE: "<f8"}
 _REAL_WIDTH = 12
 _INT = np.dtype("<i4")
 
+# What stands behind the elements of a binary file.
+_RECORDS = (b"    1", b"  100", b" 9999", b"    2", b"    3")
 # How a file may begin.
 _BEGINNINGS = (b"    1C", b"    1U", b"    2C")
 
@@ -79,6 +81,7 @@ class _Result:
         self._elements: dict[int, array[int]] = {}
         self._levels: list[Level] = []
         self._is_mode: list[bool] = []
+        self._notes: list[str] = []
         self._head = b""  # of the result that follows
         self._is_open = False  # a head was read, its result was not
         self._is_whole = False
@@ -121,7 +124,7 @@ class _Result:
         if self._nodes is not None:
             scan.refuse("a second block of nodes is not read: write one mesh only")
         count, form = self._announced(line)
-        rows = list(self._rows(count, form, 3))
+        rows = list(self._rows(count, form, 3, "nodes (2C)"))
         numbers, points = (np.concatenate(column) for column in zip(*rows, strict=True))
         refuse_repeated(numbers, "2C", scan.file)
         self._nodes = numbers, points
@@ -141,8 +144,11 @@ class _Result:
         if form not in (_SHORT, _LONG, _SINGLE, _DOUBLE):
             self._scan.refuse(f"format {form} is not read; 0, 1 (text), 2 and 3 (binary) are")
 
-    def _rows(self, count: int, form: int, width: int) -> Iterator[tuple[Ints, Floats]]:
-        """Yield numbers of nodes and their values, shapes (n,) and (n, width), and pass the end of the block."""
+    def _rows(self, count: int, form: int, width: int, what: str = "") -> Iterator[tuple[Ints, Floats]]:
+        """Yield numbers of nodes and their values, shapes (n,) and (n, width), and pass the end of the block.
+
+        In text the end mark counts, not how many rows were announced; fewer are refused.
+        """
         scan = self._scan
         for left in range(count, 0, -CHUNK):
             n = min(left, CHUNK)
@@ -152,10 +158,32 @@ class _Result:
                 continue
             lines = scan.lines(n)
             self._refuse_others(lines, n, count - left, count)
+            yield self._parsed(lines, form, width)
+        n_there = count
+        while form not in _REAL and (line := self._further(n_there)):
+            yield self._parsed([line], form, width)
+            n_there += 1
+        self._tell_more(what, count, n_there)
+
+    def _parsed(self, lines: list[bytes], form: int, width: int) -> tuple[Ints, Floats]:
+        """Return what rows hold that were read last; with long exponents they are longer than their columns."""
+        scan, begins = self._scan, 3 + _ID_WIDTH[form]
+        if max(len(line.rstrip()) for line in lines) <= begins + width * _REAL_WIDTH:
             nodes, values = scan.columns(lines, 3, (1, _ID_WIDTH[form], "int"), (width, _REAL_WIDTH, "float"))
-            yield nodes[:, 0], values
-        if form not in _REAL:
-            self._refuse_more(count)
+            return nodes[:, 0], values
+        return scan.glued(lines, 3, _ID_WIDTH[form], width)
+
+    def _further(self, done: int) -> bytes:
+        """Return a further row of a block, empty where its end mark stands; refuse anything else."""
+        line = self._scan.line()
+        if not line.startswith((b" -1", b" -3")):
+            why = f"stands {self._scan.shown(line)}" if line else "the file is cut off"
+            self._scan.refuse(f"behind {done} rows {why}: -3 is wanted at the end of a block")
+        return line if line.startswith(b" -1") else b""
+
+    def _tell_more(self, what: str, announced: int, there: int) -> None:
+        if what and there != announced:
+            self._notes.append(f"{what}: {announced} are announced, {there} are there and were taken")
 
     def _refuse_others(self, lines: list[bytes], wanted: int, before: int, count: int) -> None:
         """Refuse where a line begins otherwise than a row, or the file ends."""
@@ -167,30 +195,40 @@ class _Result:
         if len(lines) < wanted:
             scan.refuse(f"the file is cut off: {count} rows are announced, {before + len(lines)} are there")
 
-    def _refuse_more(self, count: int) -> None:
-        line = self._scan.line()
-        if not line.startswith(b" -3"):
-            why = f"stands {self._scan.shown(line)}" if line else "the file is cut off"
-            self._scan.refuse(f"{count} rows are announced, behind them {why}: -3 is wanted")
-
     def _read_elements(self, line: bytes) -> None:
         count, form = self._announced(line)
-        for _ in range(count):
-            code, nodes = self._element(form) if form in _ID_WIDTH else self._binary_element()
+        n_there = 0
+        for code, nodes in self._text_elements(form) if form in _ID_WIDTH else self._binary_elements(count):
             self._elements.setdefault(code, array("q")).extend(nodes)
-        if form in _ID_WIDTH:
-            self._refuse_more(count)
+            n_there += 1
+        self._tell_more("elements (3C)", count, n_there)
 
-    def _element(self, form: int) -> tuple[int, list[int]]:
-        """Return the type of the next element and its nodes, which stand in one or two lines below."""
+    def _text_elements(self, form: int) -> Iterator[tuple[int, list[int]]]:
+        """Yield type and nodes of all elements up to the end mark.
+
+        Of composite shells CalculiX writes an element a layer, and announces one a shell.
+        """
+        done = 0
+        while head := self._further(done):
+            yield self._element(head, form)
+            done += 1
+
+    def _binary_elements(self, count: int) -> Iterator[tuple[int, list[int]]]:
+        """Yield type and nodes of at least `count` elements, up to the next record: there is no end mark."""
+        while count > 0 or not self._scan.is_at(*_RECORDS):
+            code = int(self._scan.values(_INT, 4)[1])  # its number, type, group and material
+            yield code, self._scan.values(_INT, self._n_nodes(code)).tolist()
+            count -= 1
+
+    def _element(self, head: bytes, form: int) -> tuple[int, list[int]]:
+        """Return the type of an element and its nodes, which stand in one or two lines below its head."""
         scan, width = self._scan, _ID_WIDTH[form]
-        head = scan.line()
         try:
             code = int(head[3 + width : 8 + width])
         except ValueError:
             code = -1
-        if not head.startswith(b" -1") or code < 0:
-            scan.refuse(f"{scan.shown(head)} is no element" if head else "the file is cut off within the elements")
+        if code < 0:
+            scan.refuse(f"{scan.shown(head)} is no element")
         wanted = width * self._n_nodes(code)
         text = b""
         while len(text) < wanted:
@@ -205,10 +243,6 @@ class _Result:
         if len(text) != wanted:
             scan.refuse(f"{len(nodes)} nodes, an element of type {code} has {wanted // width}")
         return code, nodes
-
-    def _binary_element(self) -> tuple[int, list[int]]:
-        code = int(self._scan.values(_INT, 4)[1])  # its number, type, group and material
-        return code, self._scan.values(_INT, self._n_nodes(code)).tolist()
 
     def _n_nodes(self, code: int) -> int:
         if code not in _TYPES:
@@ -247,7 +281,7 @@ class _Result:
         displacement = np.full(points.shape, np.nan)
         is_known = np.zeros(len(points), dtype=bool)
         done = 0
-        for nodes, values in self._rows(count, form, 3):
+        for nodes, values in self._rows(count, form, 3, f"DISP at time {time:g}"):
             expected = np.arange(done, done + len(nodes))
             if not np.array_equal(nodes, numbers[done : done + len(nodes)]):
                 expected = rows_of(numbers, nodes, f"DISP at time {time:g}", scan.file)
@@ -266,6 +300,7 @@ class _Result:
             cut = "" if self._is_whole else ", and no end mark 9999: was the run stopped, or the file cut off"
             raise ReferenceFileError(f"{file} holds no displacement{cut}: ask for it by *NODE FILE and a line U")
         levels, notes = without_modes(self._levels, self._is_mode)
+        notes += tuple(self._notes)
         if not self._is_whole:
             notes += (
                 "there is no end mark 9999: the run was stopped, and its last increment may be a best guess, no "

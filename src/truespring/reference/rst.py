@@ -20,7 +20,7 @@ from truespring.mesh.files.contents import places
 from truespring.opening import open_file
 from truespring.reference.checks import checked, refuse_unreadable, without_modes
 from truespring.reference.record import Level, Reading, Record
-from truespring.reference.vtk_cells import sized
+from truespring.reference.vtk_cells import VTK_EMPTY, sized
 
 _CHILD = "import sys; from truespring.reference.rst import unpack; unpack(sys.argv[1], sys.argv[2])"
 
@@ -29,9 +29,10 @@ _CHILD = "import sys; from truespring.reference.rst import unpack; unpack(sys.ar
 _PATIENCE, _SLOWEST = 60.0, 1e-6
 _MEMORY, _MEMORY_PER_BYTE = 2 << 30, 50
 
-# Words of four bytes: the first record holds 100, its code of results is 12; the second is the header of the results.
+# Words of four bytes: the first record holds 100, its code of results is 12; the second is the header of the results,
+# behind its own length: 80, of Ansys before 14 it was 40, and files were smaller than 2^32 words.
 # Source: file fdresu.inc of Ansys, whose names the library's _rst_keys.py lists.
-_HEAD, _WORDS = 105, 185
+_LENGTH, _HEAD, _WORDS = 103, 105, 185
 _RESULTS = 12
 _MOST_SETS, _KIND, _N_SETS, _END, _LONG_END = 3, 7, 8, 9, 22
 _POINTERS = slice(10, 16)  # to result sets, times, steps, elements, nodes, geometry
@@ -77,7 +78,8 @@ def _header(file: Path) -> tuple[int, bool]:
         raise ReferenceFileError(f"{file} is no .rst file of Ansys: its first words are not 100 and 12")
     if len(words) < _WORDS:
         raise ReferenceFileError(f"{file} is cut off in its header: {_AGAIN}")
-    head, size = words[_HEAD:], file.stat().st_size
+    length, size = int(words[_LENGTH]), file.stat().st_size
+    head = np.where(np.arange(_WORDS - _HEAD) < length, words[_HEAD:_WORDS], 0)  # what an older one lacks is 0
     end = int(head[_LONG_END] % 2**32 + (head[_LONG_END + 1] << 32)) or int(head[_END])
     if 4 * end > size:
         raise ReferenceFileError(f"{file} is cut off: its header says {4 * end:,} bytes, it has {size:,}: {_AGAIN}")
@@ -141,6 +143,9 @@ def _record(file: Path, folder: Path, is_mode: bool) -> Record:
         for time, one in zip(times.tolist(), sorted(folder.glob("set*.npy")), strict=True)
     ]
     kept, notes = without_modes(levels, [is_mode] * len(levels))
+    n_empty = int((types == VTK_EMPTY).sum())
+    if n_empty:
+        notes += (f"{n_empty} elements of types that no body is made of are left out",)
     if n_lost:
         notes += (f"{n_lost} cells lack some of the nodes between their corners: they are taken by their corners",)
     placed = {name: row[nodes] for name, nodes in cells.items()}

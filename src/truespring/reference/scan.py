@@ -1,14 +1,17 @@
 """Large result files, read once from top to bottom: their lines in columns of fixed width, and where one is wrong."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truespring.arrays import Floats, Ints
 from truespring.errors import ReferenceFileError
 from truespring.opening import open_file
 from truespring.reference.record import Reading
@@ -19,13 +22,16 @@ CHUNK = 1 << 12
 # A line that is longer is none: it is cut there, and then refused.
 _LONGEST = 1000
 
+# A number as "%12.5E" writes it, with the blanks in front.
+_WRITTEN = re.compile(rb" *[+-]?(?:\d+\.\d+E[+-]\d{2,3}|nan|inf)", re.IGNORECASE)
+
 _BLANK = np.isin(np.arange(256), list(b" \r\n"))
 
 
 class Scan:
     """A file that is being read; `line_number` is that of the line that was read last."""
 
-    def __init__(self, file: Path, stream: BinaryIO, reading: Reading | None) -> None:
+    def __init__(self, file: Path, stream: BufferedReader, reading: Reading | None) -> None:
         self.file = file
         self.line_number = 0
         self._stream, self._reading = stream, reading
@@ -68,6 +74,13 @@ class Scan:
             self.refuse(f"the file is cut off: {dtype.itemsize * count} bytes are wanted, {len(data)} are there")
         return np.frombuffer(data, dtype)
 
+    def is_at(self, *beginnings: bytes) -> bool:
+        """Tell whether one of these follows, or nothing does."""
+        place = self._stream.tell()
+        following = self._stream.read(max(map(len, beginnings)))
+        self._stream.seek(place)
+        return not following or following.startswith(beginnings)
+
     def done(self) -> None:
         """Say that all is read that is wanted."""
         if self._reading:
@@ -103,6 +116,36 @@ class Scan:
             begins += count * width
             found.append(self._converted(fields, kind, first))
         return found
+
+    def glued(self, lines: list[bytes], begins: int, id_width: int, count: int) -> tuple[Ints, Floats]:
+        """Return number and values of lines that were read last, told apart by how numbers are written.
+
+        Programs of Windows, and very small numbers everywhere, have exponents of three digits: such a number is longer
+        than its column where it is negative. One of two digits has a blank or a sign in front, so nothing is ambiguous.
+
+        Args:
+            lines: of any length.
+            begins, id_width: where the number of a node begins, and its width.
+            count: how many values stand behind it.
+
+        Returns shapes (n,) and (n, count); refuses where a line is wrong.
+        """
+        first = self.line_number - len(lines) + 1
+        numbers, values = np.empty(len(lines), dtype=np.int64), np.empty((len(lines), count))
+        for place, line in enumerate(lines):
+            text = line[begins + id_width :].rstrip()
+            found = _WRITTEN.findall(text)
+            number = line[begins : begins + id_width].strip()
+            if not line.endswith(b"\n"):
+                self.refuse(f"{self.shown(line)} has no line end: the file is cut off", first + place)
+            if not number.isdigit() or len(found) != count or b"".join(found) != text:
+                self.refuse(
+                    f"{self.shown(line)} is no row of this block: a node and {count} numbers are wanted, with "
+                    "exponents of two or three digits; write the results anew, in CalculiX also by *NODE OUTPUT",
+                    first + place,
+                )
+            numbers[place], values[place] = int(number), [float(one) for one in found]
+        return numbers, values
 
     def _refuse_ragged(self, lines: list[bytes], first: int) -> None:
         for place, line in enumerate(lines):

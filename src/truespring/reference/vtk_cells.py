@@ -17,6 +17,8 @@ VTK_NAMES: Mapping[int, str] = {
 }
 #: Vertices: points alone.
 VTK_POINTS = (1, 2)
+#: No cell: what Ansys' reader makes of elements that no body has, such as those of contact.
+VTK_EMPTY = 0
 
 _CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 
@@ -65,11 +67,11 @@ def sized(types: Ints, offsets: Ints, connectivity: Ints, is_made: Bools, file: 
 
     Returns the points of the cells by meshio's name, and how many lost their middles.
     """
-    refuse_unknown(types, file)
+    refuse_unknown(types[types != VTK_EMPTY], file)
     n_lost = 0
     found: dict[str, list[Ints]] = {}
     for number, size in np.unique(np.stack([types, np.diff(offsets)], axis=1), axis=0).tolist():
-        if number in VTK_POINTS:
+        if number in (*VTK_POINTS, VTK_EMPTY):
             continue
         base = VTK_NAMES[number].rstrip("0123456789")
         members = np.flatnonzero((types == number) & (np.diff(offsets) == size))

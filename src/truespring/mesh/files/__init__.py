@@ -21,13 +21,18 @@ Reader = Callable[[bytes, Path], Contents]
 
 def _alone(read: Callable[[bytes], Contents]) -> Reader:
     """Return a reader of files that name no others."""
-    return lambda data, folder: read(data)
+    return lambda data, file: read(data)
+
+
+def _beside(read: Callable[[bytes, Path], Contents]) -> Reader:
+    """Return a reader of files that name others in their folder."""
+    return lambda data, file: read(data, file.parent)
 
 
 class Format(NamedTuple):
     """How files of a format begin, what reads them, and how a file that cannot be read may be mended.
 
-    Readers take the bytes of a file and the folder that it lies in.
+    Readers take the bytes of a file, and its name.
     """
 
     recognises: Recognises
@@ -43,8 +48,8 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
         ".msh": Format(
             is_msh, _alone(read_msh), "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
         ),
-        ".inp": Format(is_inp, _alone(read_inp)),
-        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
+        ".inp": Format(is_inp, read_inp),
+        **{suffix: Format(recognises, _beside(read_vtk), _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
@@ -53,8 +58,11 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     """Read a mesh file; its content tells the format, else its suffix.
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
-    called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    called by its number. .inp: Abaqus and CalculiX, with parts, instances and included files in the deck's
+    folder or below. NSET, ELSET and SURFACE become groups, in their first spelling: those of the assembly by
+    their name, those of an instance as INSTANCE.NAME, and by their name where no other scope has it; an NSET
+    stands before an ELSET of one name where nodes are asked for. Elements that no body is made of are left
+    out. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
     grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
@@ -87,7 +95,7 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
         )
     form = FORMATS[key]
     try:
-        contents = form.read(data, file.parent)
+        contents = form.read(data, file)
     except MeshError as error:
         raise MeshError("; ".join(filter(None, [f"{file}: {error}", form.again]))) from None
     try:

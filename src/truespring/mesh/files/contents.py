@@ -79,7 +79,8 @@ class Contents:
     Attributes:
         node_numbers, points: shapes (n,) and (n, 3) [the file's unit of length].
         cells: each block in the file's order.
-        node_groups, cell_groups: numbers of nodes and of cells by name. Cells of one dimension less than the body
+        node_groups, cell_groups: numbers of nodes and of cells by name; where both have one, the group of nodes is as
+            the file says, else that of the cells' nodes. Cells of one dimension less than the body
             name the facets that have their corners.
         facet_groups: facets by name as their elements' own: the number of a cell and that of its facet in the
             `facets` of ELEMENT_KINDS, shape (n, 2).
@@ -129,6 +130,8 @@ class Contents:
             facets[of_turned, 1] = mirrored_facets(kind)[facets[of_turned, 1]]
         element_groups, node_groups = self._groups(cells, body, nodes)
         for name, facets in facet_groups.items():
+            if name in self.node_groups:
+                continue
             there = node_groups.get(name, np.zeros(0, dtype=np.int64))
             node_groups[name] = np.union1d(there, facet_nodes(elements, kind, facets))
         notes = [
@@ -244,7 +247,9 @@ class Contents:
         members = {name: [group] for name, group in self.node_groups.items()}
         for name, group in self.cell_groups.items():
             element_groups[name] = _found(elements, group)
-            members.setdefault(name, []).extend(block.corners[_found(block.numbers, group)].ravel() for block in cells)
+            if name not in self.node_groups:
+                there = members.setdefault(name, [])
+                there.extend(block.corners[_found(block.numbers, group)].ravel() for block in cells)
         return element_groups, {
             name: _found(self.node_numbers[nodes], np.unique(np.concatenate(group))) for name, group in members.items()
         }

@@ -1,0 +1,228 @@
+"""Decks of Abaqus and CalculiX as they are written: lines, comments, keywords, parameters, and files that they include.
+
+Source: "Input syntax rules" in the manual of Abaqus, and that of CalculiX CrunchiX, https://www.dhondt.de
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from truespring.errors import MeshError
+from truespring.mesh.files.text import Rows, integers, reals, word
+from truespring.opening import file_beside, read_file
+
+# How deep files include files, and how many there are at most.
+_DEEPEST, _MOST = 16, 1000
+
+# Lines are counted from 1; a place is the number of its file times this, and the line. A deck itself is file 0.
+_A_FILE = 1 << 40
+
+# Parameters without a value: by them the line behind a comma is known to be of the keyword.
+_FLAGS = {b"GENERATE", b"INTERNAL", b"UNSORTED"}
+
+
+class Lines:
+    """The lines of a deck, with those of the files that it includes in their place.
+
+    Attributes:
+        notes: what was passed over.
+        open_ends: places of last lines that have no line end.
+    """
+
+    def __init__(self, data: bytes, file: Path | None) -> None:
+        self.notes: list[str] = []
+        self.open_ends: set[int] = set()
+        self._file = file
+        self._names = [""]
+        self._open: list[tuple[Path | None, Iterator[tuple[int, bytes]]]] = [(file, self._of(0, data))]
+
+    def __iter__(self) -> Iterator[tuple[int, bytes]]:
+        """Yield place and text of each line that is neither blank nor a comment."""
+        while self._open:
+            found = next(self._open[-1][1], None)
+            if found is None:
+                self._open.pop()
+            else:
+                yield found
+
+    def _of(self, file: int, data: bytes) -> Iterator[tuple[int, bytes]]:
+        lines = data.splitlines()
+        if not data.endswith((b"\n", b"\r")):
+            self.open_ends.add(file * _A_FILE + len(lines))
+        for number, line in enumerate(lines, 1):
+            text = line.strip()
+            if text and not text.startswith(b"**"):
+                yield file * _A_FILE + number, text
+
+    def at(self, place: int) -> str:
+        """Return "line 5", or "line 5 of mesh.inc"."""
+        file, line = divmod(int(place), _A_FILE)
+        return f"line {line} of {self._names[file]}" if file else f"line {line}"
+
+    def is_included(self, place: int) -> bool:
+        """Tell whether a line is of another file than the deck: nothing that stands there is shown."""
+        return place >= _A_FILE
+
+    def include(self, name: str) -> None:
+        """Go on with the lines of a file; raise MeshError where it cannot be, or is not in the deck's folder or below.
+
+        Names are relative to that folder, in files that are included, too: as both programs have it.
+        """
+        if self._file is None:
+            raise MeshError("files are included by a deck that is read from a file")
+        path = file_beside(self._file, name, MeshError)
+        if path in [one for one, _ in self._open]:
+            raise MeshError("this file includes itself: take the line out")
+        if len(self._open) > _DEEPEST or len(self._names) > _MOST:
+            raise MeshError(f"files are included {_DEEPEST} deep and {_MOST} times at most: write them into one")
+        data = read_file(path, MeshError)
+        if b"\0" in data:
+            raise MeshError("this file is binary, not text")
+        self._names.append(path.relative_to(self._file.parent).as_posix())
+        self._open.append((path, self._of(len(self._names) - 1, data.removeprefix(b"\xef\xbb\xbf"))))
+
+
+@dataclass
+class Card:
+    """A keyword with its parameters, and the lines of data below it.
+
+    Attributes:
+        deck: names places.
+        place: that of the keyword.
+        head: the keyword line with those that continue it.
+        rows, places: the lines of data, and where they stand.
+    """
+
+    deck: Lines
+    place: int
+    head: bytes
+    rows: list[bytes] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
+
+    @cached_property
+    def keyword(self) -> str:
+        """The keyword in capitals, without blanks."""
+        name = self.head.partition(b",")[0].decode("latin-1")
+        return re.sub(r"\s", "", name).upper().lstrip("*")
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """The parameters by name in capitals; values as they are written, with their quotation marks."""
+        pairs = [decoded(one).partition("=") for one in fields(self.head)[1:]]
+        return {name.strip().upper(): value.strip() for name, _, value in pairs if name.strip()}
+
+    def error(self, why: str, place: int | None = None) -> MeshError:
+        """Return an error with the place, the keyword's unless another is given."""
+        return MeshError(f"{self.deck.at(place or self.place)}: *{self.keyword}: {why}")
+
+    def shown(self, text: bytes, place: int) -> str:
+        """Return a field for a message, but nothing of another file than the deck."""
+        return "what stands there" if self.deck.is_included(place) else f"'{word(text)}'"
+
+    def integers(self, rows: Rows, places: Sequence[int], what: str) -> Any:
+        """Return all fields as whole numbers, shape (n,); raise MeshError with the place of one that is none."""
+        return self._numbers(integers, rows, places, what, "whole numbers")
+
+    def reals(self, rows: Rows, places: Sequence[int], what: str) -> Any:
+        """Return all fields as numbers, shape (n,); raise MeshError with the place of one that is none."""
+        return self._numbers(reals, rows, places, what, "numbers")
+
+    def _numbers(
+        self, read: Callable[[Rows, Sequence[int], str], Any], rows: Rows, places: Sequence[int], what: str, wanted: str
+    ) -> Any:
+        try:
+            return read(rows, places, what)
+        except MeshError:
+            if not any(map(self.deck.is_included, places)):
+                raise
+        for row, place in zip(rows, places, strict=True):
+            try:
+                read([row], [place], what)
+            except MeshError as error:
+                why = f"{self.deck.at(place)}: {what}: {wanted} are wanted here"
+                raise (MeshError(why) if self.deck.is_included(place) else error) from None
+        raise AssertionError("a row that is no number was not found again")  # pragma: no cover
+
+
+def cards(lines: Lines) -> Iterator[Card]:
+    """Yield the cards of a deck; raise MeshError where it is none. Where it may be cut off, a note says so.
+
+    A line that begins with * is a keyword, whatever the one before it ended with.
+    """
+    card: Card | None = None  # whose data follow
+    head: Card | None = None  # whose keyword line may go on
+    in_step = False
+    for place, text in lines:
+        if text.startswith(b"*"):
+            head = Card(lines, place, text)
+            if head.keyword != "INCLUDE":
+                if card:
+                    yield card
+                card = head
+                in_step = card.keyword == "STEP" or (in_step and card.keyword != "ENDSTEP")
+        elif head and head.head.endswith(b",") and _are_parameters(text):
+            head.head += text
+        else:
+            head = None
+            if card is None:
+                what = "" if lines.is_included(place) else f", not '{word(text)}'"
+                raise MeshError(f"{lines.at(place)}: this is no .inp file: a keyword such as *NODE is wanted{what}")
+            card.rows.append(text)
+            card.places.append(place)
+            continue
+        _follow(head, in_step)
+    if card is None:
+        raise MeshError("there is no keyword such as *NODE")
+    yield card
+    if in_step:
+        lines.notes.append("a *STEP has no *END STEP: the file may be cut off there, behind its mesh")
+    for place in sorted(lines.open_ends):
+        if lines.is_included(place) or not card.keyword.startswith("END"):
+            lines.notes.append(f"{lines.at(place)} is the last one and has no line end: it may be cut off there")
+
+
+def _follow(card: Card, in_step: bool) -> None:
+    """Go on with the file that a keyword line includes; within a step, what is missing is not needed for a mesh."""
+    name = bare(card.parameters.get("INPUT", ""))
+    goes_on = card.head.endswith(b",") and card.keyword != "INCLUDE"
+    if not name or goes_on or card.keyword not in ("INCLUDE", "NODE", "ELEMENT"):
+        return
+    try:
+        card.deck.include(name)
+    except MeshError as error:
+        full = card.error(str(error))
+        if not in_step:
+            raise full from None
+        card.deck.notes.append(str(full))
+
+
+def _are_parameters(text: bytes) -> bool:
+    """Tell whether a line goes on with the parameters of a keyword, and is none of its data."""
+    return b"=" in text or all(one.strip().upper() in _FLAGS for one in fields(text))
+
+
+def fields(row: bytes) -> list[bytes]:
+    """Split a line at its commas, but for those in quotation marks; blank fields at its end are none."""
+    if b'"' in row:
+        found = [one or other for one, other in re.findall(rb'((?:[^,"]|"[^"]*")+)|(?:^|(?<=,))()(?=,)', row)]
+    else:
+        found = row.split(b",")
+    while found and not found[-1].strip():
+        found.pop()
+    return found
+
+
+def decoded(data: bytes) -> str:
+    """Return text as UTF-8, else as Latin 1, as older programs write it."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def bare(name: str) -> str:
+    """Return a name without its quotation marks."""
+    return name.strip().strip("\"'")
