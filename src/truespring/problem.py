@@ -27,7 +27,7 @@ from truespring.material import Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
-from truespring.potential import Loading
+from truespring.potential import Loading, Potential
 
 #: A load: dead, or following the body.
 Load = Force | Traction | Gravity | Pressure | Moment
@@ -134,13 +134,9 @@ class Problem:
                 held[support.nodes, axis] = True
                 displacement[support.nodes, axis] = support.motion[axis]
                 moved[support.nodes, axis] = motion[:, axis]
-        body, turns = self.body, tuple(support.turn for support in self.held if support.turn is not None)
-        following = []
-        for number, load in enumerate(self.loads):
-            if isinstance(load, Pressure | Moment):
-                with _named(number):
-                    following.append(load.following(body, held))
-        return Loading(nodal_force(self.spreads, self.mesh.nodes.shape), held, displacement, turns, tuple(following))
+        turns = tuple(support.turn for support in self.held if support.turn is not None)
+        force = nodal_force(self.spreads(self.body), self.mesh.nodes.shape)
+        return Loading(force, held, displacement, turns, self.following(self.body, held))
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
@@ -154,14 +150,22 @@ class Problem:
         density = self.of_elements(lambda material: material.density or 0.0) if dense else None
         return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density)
 
-    @cached_property
-    def spreads(self) -> tuple[Spread, ...]:
-        """The dead loads over the cells that carry them."""
+    def spreads(self, body: Body) -> tuple[Spread, ...]:
+        """Return the dead loads over the cells of `body` that carry them; it may have more nodes than the mesh."""
         found = []
         for number, load in enumerate(self.loads):
             if isinstance(load, Force | Traction | Gravity):
                 with _named(number):
-                    found.append(load.spread(self.body))
+                    found.append(load.spread(body))
+        return tuple(found)
+
+    def following(self, body: Body, held: Bools) -> tuple[Potential, ...]:
+        """Return the loads that follow `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
+        found: list[Potential] = []
+        for number, load in enumerate(self.loads):
+            if isinstance(load, Pressure | Moment):
+                with _named(number):
+                    found.append(load.following(body, held))
         return tuple(found)
 
     def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:

@@ -16,7 +16,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ProblemError
 from truespring.loading.dead import Body
 from truespring.loading.values import number
-from truespring.mesh import Mesh, Selection, facets_within, select, shares
+from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
 from truespring.potential import Pattern, SparseMatrix
 
 # Forces of a pressure are polynomials of second order along a straight way: two Gauss points give its work exactly.
@@ -30,7 +30,8 @@ _SYMMETRIC, _DEFORMED = 1e-9, 0.05
 class Pressure:
     """A `pressure` [Pa] that presses on the facets of the boundary `on` and stays normal to them as they move.
 
-    `on` is a side, a group of the mesh, a Plane, a Box or node numbers: all facets whose nodes are among them.
+    `on` is a group of facets, or a side, another group of the mesh, a Plane, a Box or node numbers: all facets of the
+    boundary whose nodes are among them.
     """
 
     on: Selection
@@ -39,8 +40,8 @@ class Pressure:
     def following(self, body: Body, held: Bools) -> "SurfacePressure":
         """Return the potential; raise ProblemError where the load has none."""
         pressure = number(self.pressure, "pressure", "Pa")
-        facets = facets_within(body.mesh, select(body.mesh, self.on))
-        load = SurfacePressure(body.mesh.nodes, facets, body.thickness * pressure, held)
+        facets = body.whole(outer_facets(body.mesh, self.on))
+        load = SurfacePressure(body.nodes, facets, body.thickness * pressure, held)
         if pressure:
             load.refuse_open_edges()
         return load
@@ -65,10 +66,22 @@ class Moment:
                 "a moment in space has no potential: its work depends on the order of turns about several axes; "
                 "prescribe the rotation of the face instead (a support with rotation and axis)"
             )
-        nodes = select(mesh, self.on)
+        nodes = loaded(mesh, self.on)
         if len(nodes) < 2:
             raise ProblemError("a moment turns a face: select at least two nodes")
-        return FaceMoment(mesh.nodes, nodes, shares(mesh, nodes), moment, _way_to(mesh, nodes, held))
+        way = _way_to(mesh, nodes, held[: mesh.n_nodes])
+        return FaceMoment(body.nodes, *body.shares(self.on), moment, way)
+
+
+# The cell that a facet of so many nodes is, by dimensions of the body, and Gauss points along its axes: forces of a
+# pressure are the integral of shape functions times products of slopes, which they give exactly.
+_FACETS = {
+    (2, 2): ("line", 1),
+    (2, 3): ("line3", 2),
+    (3, 3): ("triangle", 1),
+    (3, 4): ("quad", 2),
+    (3, 6): ("triangle6", 3),
+}
 
 
 @dataclass(frozen=True)
@@ -81,15 +94,10 @@ class _Points:
 
 
 def _points(k: int, dim: int) -> _Points:
-    if dim == 2:
-        return _Points(np.full((1, 2), 0.5), np.array([[[-0.5], [0.5]]]), np.array([2.0]))
-    if k == 3:
-        slopes = np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]])
-        return _Points(np.full((1, 3), 1 / 3), slopes, np.array([0.5]))
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    factors = 1 + corners[:, None] / np.sqrt(3) * corners  # (points, k, axes)
-    slopes = np.stack([corners[:, i] * factors[:, :, 1 - i] / 4 for i in range(2)], axis=2)
-    return _Points(factors.prod(axis=2) / 4, slopes, np.ones(4))
+    name, n = _FACETS[dim, k]
+    cell = CELL_SHAPES[name]
+    at, weights = quadrature(cell.base, n)
+    return _Points(cell.shapes(at), cell.slopes(at), weights)
 
 
 class SurfacePressure:

@@ -11,7 +11,10 @@ from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.measures import corner_measures as corner_measures
 from truespring.mesh.measures import element_corner_measures as element_corner_measures
+from truespring.mesh.measures import quadrature as quadrature
 from truespring.mesh.mesh import Mesh as Mesh
+from truespring.mesh.middles import SecondOrder as SecondOrder
+from truespring.mesh.middles import edge_numbers as edge_numbers
 from truespring.mesh.refine import refined as refined
 from truespring.mesh.selections import Box as Box
 from truespring.mesh.selections import Near as Near
@@ -19,8 +22,10 @@ from truespring.mesh.selections import Plane as Plane
 from truespring.mesh.selections import Selection as Selection
 from truespring.mesh.selections import covering as covering
 from truespring.mesh.selections import facets_within as facets_within
+from truespring.mesh.selections import loaded as loaded
 from truespring.mesh.selections import named_point as named_point
 from truespring.mesh.selections import nearest_node as nearest_node
+from truespring.mesh.selections import outer_facets as outer_facets
 from truespring.mesh.selections import select as select
 from truespring.mesh.selections import select_elements as select_elements
 from truespring.mesh.selections import shares as shares

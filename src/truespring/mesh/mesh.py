@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
+from truespring.mesh.facets import facet_nodes
 from truespring.mesh.forms import Forms, find_forms
 from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind, Links
 from truespring.mesh.rows import ascending, distinct_rows
@@ -32,7 +33,12 @@ class Mesh:
         element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses).
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
+        facet_groups: facets by name, shape (n, 2): an element and the number of its facet in `kind.facets`, in
+            lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
+            becomes one: the facets' nodes.
         notes: what should be known of a mesh that was read, in words.
+        middles: where the nodes between the ends of each of `edges` are [m], shape (n_edges, dim), of triangles and
+            tetrahedra of second order; None where edges are straight. Elements of first order have none of them.
 
     Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
     twice, or a node belongs to no element.
@@ -43,7 +49,9 @@ class Mesh:
     element: str = "quadrilateral"
     node_groups: Mapping[str, Ints] = field(default_factory=dict)
     element_groups: Mapping[str, Ints] = field(default_factory=dict)
+    facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    middles: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.element not in ELEMENT_KINDS:
@@ -56,9 +64,13 @@ class Mesh:
             object.__setattr__(self, "elements", frozen_ints(self.elements, (None, self.kind.n_nodes), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
-        object.__setattr__(self, "node_groups", _groups(self.node_groups, self.n_nodes, "node"))
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
+        object.__setattr__(self, "facet_groups", self._facet_groups())
+        nodes = {name: np.unique(self.facet_nodes(facets)) for name, facets in self.facet_groups.items()}
+        object.__setattr__(self, "node_groups", _groups({**nodes, **self.node_groups}, self.n_nodes, "node"))
         self._check()
+        if self.middles is not None:
+            object.__setattr__(self, "middles", self._checked_middles(self.middles))
 
     def __repr__(self) -> str:
         return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
@@ -88,6 +100,14 @@ class Mesh:
             twice[distinct_rows(ascending(self.elements.T)).first] = False
             self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
 
+    def _checked_middles(self, middles: Floats) -> Floats:
+        if self.element not in ("triangle", "tetrahedron"):
+            raise MeshError(f"middles are of triangles and tetrahedra, not of {self.element} elements")
+        try:
+            return frozen_floats(middles, self.edges.shape[:1] + (self.dim,), "middles")
+        except ValueError as error:
+            raise MeshError(str(error)) from None
+
     @property
     def _degenerate(self) -> Floats:
         """The corner Jacobian below which an element is degenerate [m^dim], shape (n_elements,)."""
@@ -105,6 +125,24 @@ class Mesh:
             raise MeshError(
                 f"{int(bad.sum())} of {len(bad)} {what} are {why}; the first is {what[:-1]} {first} at ({place}) m"
             )
+
+    def _facet_groups(self) -> Mapping[str, Ints]:
+        """Freeze groups of facets: each facet once; raise MeshError for one that is empty or does not exist."""
+        frozen = {}
+        for name, facets in self.facet_groups.items():
+            given = np.asarray(facets)
+            if given.ndim != 2 or given.shape[1:] != (2,) or not np.issubdtype(given.dtype, np.integer):
+                raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are wanted")
+            n_there = len(self.elements), len(self.kind.facets)
+            if not len(given) or (given < 0).any() or (given >= n_there).any():
+                raise MeshError(
+                    f"facet group '{name}' is empty or has a facet that does not exist: elements are 0 to "
+                    f"{n_there[0] - 1}, facets of each 0 to {n_there[1] - 1}"
+                )
+            members = np.unique(given.astype(np.int64), axis=0)
+            members.setflags(write=False)
+            frozen[name] = members
+        return MappingProxyType(frozen)
 
     @property
     def kind(self) -> ElementKind:
@@ -173,6 +211,10 @@ class Mesh:
         """The facets that belong to one element only, in that element's own order of nodes, shape (n, k)."""
         facets, alone = self.facets_of(self.elements)
         return np.asarray(facets[alone])
+
+    def facet_nodes(self, facets: Ints) -> Ints:
+        """Return the nodes of facets, given as `facet_groups` holds them; from outside anticlockwise, shape (n, k)."""
+        return facet_nodes(self.elements, self.element, facets)
 
     def facets_of(self, elements: Ints, within: Bools | None = None) -> tuple[Ints, Bools]:
         """Return each facet of `elements` once, and whether but one of them has it; shapes (n, k) and (n,).

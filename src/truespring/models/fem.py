@@ -22,9 +22,9 @@ from truespring.problem import Problem
 #: Above this Poisson's ratio elements of first order lock; others are then the default.
 LOCKING_POISSON = 0.4
 
-#: Interpolations of `Fem.element`. Mean dilatation is for quadrilaterals and hexahedra, quadratic for
+#: Interpolations of `Fem.element`: mean dilatation for quadrilaterals and hexahedra, those that are quadratic for
 #: triangles and tetrahedra.
-ELEMENTS = ("linear", "mean-dilatation", "quadratic")
+ELEMENTS = ("linear", "mean-dilatation", "quadratic", "quadratic-mean-dilatation")
 
 # scikit-fem's element of each kind and its quadrature: the order, or for the constant strain of a triangle its one
 # point and weight. 2 Gauss points a direction integrate polynomials of third order.
@@ -50,11 +50,12 @@ class Fem:
 
     Attributes:
         law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
-        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals
-            and hexahedra), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with
-            nodes in the middle of the edges. None takes quadratic ones on triangles and tetrahedra, since linear
-            ones are too stiff in bending at any Poisson's ratio; mean dilatation on quadrilaterals and hexahedra
-            where linear ones lock, above 0.4 in plane strain and in 3D; and linear ones elsewhere.
+        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals and
+            hexahedra), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes in the
+            middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the mean
+            volume. None takes what does not lock: quadratic ones on triangles and tetrahedra, since linear ones are
+            too stiff in bending at any Poisson's ratio, and mean dilatation on all of them above a Poisson's ratio of
+            0.4 in plane strain and in 3D; linear ones on other quadrilaterals and hexahedra.
     """
 
     law: str
@@ -77,13 +78,15 @@ class Fem:
 
     def chosen_element(self, problem: Problem) -> str:
         """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
-        finer = _finer(problem)
         if self.element is None:
-            return finer if finer == "quadratic" or locks(problem) else "linear"
-        if self.element not in ("linear", finer):
+            usual, incompressible = _defaults(problem)
+            return incompressible if locks(problem) else usual
+        allowed = _allowed(problem)
+        if self.element not in allowed:
+            within = " in plane stress" if isinstance(problem.section, PlaneStress) else ""
             raise ModelError(
-                f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements; "
-                f"allowed here: linear, {finer}"
+                f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements{within}; "
+                f"allowed here: {', '.join(allowed)}"
             )
         return self.element
 
@@ -94,21 +97,33 @@ class Fem:
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
-            f'element = "{_finer(problem)}", the default here, does not lock',
+            f'element = "{_defaults(problem)[-1]}", the default here, does not lock',
         )
 
     def potential(self, problem: Problem) -> "FemPotential":
         """Return the potential on the problem's mesh."""
         from truespring.models.mean_dilatation import MeanDilatationPotential
         from truespring.models.quadratic import QuadraticPotential
+        from truespring.models.quadratic_mean import QuadraticMeanPotential
 
-        kinds = {kind.interpolation: kind for kind in (FemPotential, MeanDilatationPotential, QuadraticPotential)}
+        own = (FemPotential, MeanDilatationPotential, QuadraticPotential, QuadraticMeanPotential)
+        kinds = {kind.interpolation: kind for kind in own}
         return fem_potential(problem, self.law, kinds[self.chosen_element(problem)])
 
 
-def _finer(problem: Problem) -> str:
-    """The interpolation beside the linear one that the mesh allows."""
-    return "quadratic" if problem.mesh.element in ("triangle", "tetrahedron") else "mean-dilatation"
+def _defaults(problem: Problem) -> tuple[str, str]:
+    """The interpolations that are the default on the mesh: usually, and where the usual ones lock."""
+    if problem.mesh.element in ("triangle", "tetrahedron"):
+        return "quadratic", "quadratic-mean-dilatation"
+    return "linear", "mean-dilatation"
+
+
+def _allowed(problem: Problem) -> tuple[str, ...]:
+    """The interpolations that the mesh allows."""
+    found = dict.fromkeys(("linear", *_defaults(problem)))
+    if isinstance(problem.section, PlaneStress):  # the third direction is free to take lambda's part
+        found.pop("quadratic-mean-dilatation", None)
+    return tuple(found)
 
 
 def locks(problem: Problem) -> bool:
@@ -252,8 +267,7 @@ class FemPotential:
         section = self.problem.section
         assert section is not None  # fem_potential refuses bodies without one
         corner_slopes, slopes, weights = self._reference
-        corners = self.mesh.elements[first:last]
-        places = self.mesh.nodes[corners]
+        places = self.nodes[self.elements[first:last, : corner_slopes.shape[1]]]
         gradients = np.empty((len(places), *slopes.shape))
         volumes = np.empty((len(places), len(weights)))
         known = (places, corner_slopes, slopes, section.thickness * weights)
@@ -320,9 +334,13 @@ class FemPotential:
             at = self._points(positions, first, last)
             response = self._respond(at)
             change = self._strain_change(at, self._gradient_of(step, at.gradients, first, last))
-            return response.stress + contracted(response.elasticity(), change)
+            return response.stress + self._stress_change(at, response, change)
 
         return self._everywhere(carried_on)
+
+    def _stress_change(self, at: Points, response: Response, change: Floats) -> Floats:
+        """The change of the stress that is linear in one of the strain [Pa], axes (component, element, point)."""
+        return contracted(response.elasticity(), change)
 
     def _everywhere(self, stress: Callable[[int, int], Floats]) -> Floats:
         """What `stress` gives for slices of the elements, for all."""

@@ -79,12 +79,14 @@ class Law:
 
     A finite law takes the right Cauchy-Green tensor C = F^T F and is frame invariant; a law that is
     not finite takes the small strain (F + F^T) / 2 - I. A law with a `barrier` has infinite energy
-    where an element is inverted; C alone cannot tell that.
+    where an element is inverted; C alone cannot tell that. In 3D and plane strain lambda's part of the
+    energy is lam/2 (ln J)^2 of a `logarithmic` law, else lam/2 times the squared trace of its strain.
     """
 
     respond: Callable[[Floats, Constants], Response]
     finite: bool
     barrier: bool
+    logarithmic: bool
     label: str
 
 
@@ -226,11 +228,11 @@ def _log_difference(a: Floats, b: Floats) -> Floats:
 
 LAWS: MappingProxyType[str, Law] = MappingProxyType(
     {
-        "linear": Law(linear, finite=False, barrier=False, label="linear FEM"),
+        "linear": Law(linear, finite=False, barrier=False, logarithmic=False, label="linear FEM"),
         "saint-venant-kirchhoff": Law(
-            saint_venant_kirchhoff, finite=True, barrier=False, label="St. Venant-Kirchhoff FEM"
+            saint_venant_kirchhoff, finite=True, barrier=False, logarithmic=False, label="St. Venant-Kirchhoff FEM"
         ),
-        "neo-hookean": Law(neo_hookean, finite=True, barrier=True, label="neo-Hookean FEM"),
-        "hencky": Law(hencky, finite=True, barrier=True, label="Hencky FEM"),
+        "neo-hookean": Law(neo_hookean, finite=True, barrier=True, logarithmic=True, label="neo-Hookean FEM"),
+        "hencky": Law(hencky, finite=True, barrier=True, logarithmic=True, label="Hencky FEM"),
     }
 )
