@@ -39,8 +39,11 @@ def carried(path: Path, problem: Problem) -> Carried:
     """
     nodes = problem.mesh.nodes
     nowhere = np.zeros(len(nodes), dtype=bool)
-    if path.problem is problem or _equal(nodes, path.problem.mesh.nodes):
-        return Carried(replace(path, problem=problem), nowhere, True)
+    if path.problem is problem:
+        return Carried(path, nowhere, True)
+    if _equal(nodes, path.problem.mesh.nodes):
+        states = tuple(_with_own_supports(path, state) for state in path.states)
+        return Carried(replace(path, problem=problem, states=states), nowhere, True)
     grid = path.whole
     places = _in_its_dimensions(nodes, grid)
     same = matching_points(grid, places)
@@ -53,7 +56,7 @@ def carried(path: Path, problem: Problem) -> Carried:
             f"{path.label} is known at its {len(grid.points)} points only, which are others than those it is compared "
             "at: one of both must be a body of elements"
         )
-    return Carried(_on(path, problem, grid, found), found.outside, same is not None)
+    return Carried(_on(path, problem, grid, found, same), found.outside, same is not None)
 
 
 def matching_points(grid: Grid, places: Floats) -> Ints | None:
@@ -89,8 +92,14 @@ def _picked(numbers: Ints, n_points: int) -> "sparse.csr_array":
     return sparse.csr_array((np.ones(len(rows)), (rows, numbers)), shape=(len(rows), n_points))
 
 
-def _on(path: Path, problem: Problem, grid: Grid, found: Interpolation) -> Path:
+def _with_own_supports(path: Path, state: State) -> State:
+    """A state with what the supports of its own problem do, not those of the problem that it is carried to."""
+    return replace(state, supports=path.support_forces(state)) if path.problem.stated else state
+
+
+def _on(path: Path, problem: Problem, grid: Grid, found: Interpolation, same: Ints | None) -> Path:
     mesh = problem.mesh
+    as_many = mesh.dim == path.problem.mesh.dim
 
     def moved(state: State) -> State:
         displacement = found.carry(state.all_positions - grid.points)[:, : mesh.dim]
@@ -104,7 +113,11 @@ def _on(path: Path, problem: Problem, grid: Grid, found: Interpolation) -> Path:
             applied_force=state.applied_force[: mesh.dim],
             area_ratio=mesh.smallest_area_ratio(positions),
             mode=None,
+            supports=path.support_forces(state) if as_many else (),
         )
 
     states = tuple(moved(state) for state in path.states)
-    return replace(path, problem=problem, states=states, potential=None, grid=None, best=None)
+    held = None
+    if path.held is not None and same is not None and as_many and same.max(initial=-1) < len(path.held):
+        held = path.held[same]
+    return replace(path, problem=problem, states=states, potential=None, grid=None, best=None, held=held)

@@ -1,8 +1,9 @@
 """Path against path: how far a model may be trusted, level by level and in a sentence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,27 +13,94 @@ from truespring.equilibrium import Path, State
 from truespring.errors import ProblemError
 from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point, nearest_node, surface_distance
 from truespring.problem import Problem
+from truespring.reactions import SupportForce
 
-#: What "agrees" means where nothing else is said: an rms error of 5 %.
+#: What "agrees" means where nothing else is said: an error of 5 %.
 TOLERANCE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class SupportError:
+    """How force and torque of a moved support differ from those of the reference.
+
+    Attributes:
+        mine, theirs: of the model and of the reference.
+        load: length of the total load there [N], None where no load acts beside the motion, or loads have no total.
+    """
+
+    mine: SupportForce
+    theirs: SupportForce
+    load: float | None = None
+
+    @property
+    def force_apart(self) -> Floats | None:
+        """Difference of the forces over the length of the reference's, shape (dim,); None where that vanishes."""
+        return _apart(self.mine.force, self.theirs.force) if self.theirs.has_force else None
+
+    @property
+    def torque_apart(self) -> Floats | None:
+        """Difference of the torques over the length of the reference's, shape (1 or 3,); None where that vanishes."""
+        return _apart(self.mine.torque, self.theirs.torque) if self.theirs.has_torque else None
+
+    @property
+    def force_error(self) -> float | None:
+        """Length of the difference of the forces over that of the reference's; None where that vanishes."""
+        return _length(self.force_apart)
+
+    @property
+    def torque_error(self) -> float | None:
+        """Length of the difference of the torques over that of the reference's; None where that vanishes."""
+        return _length(self.torque_apart)
+
+    @property
+    def share_of_load(self) -> float | None:
+        """The reference's force over the total load; None where no load acts."""
+        return float(np.linalg.norm(self.theirs.force)) / self.load if self.load else None
+
+
+class Decisive(NamedTuple):
+    """The error that decides: `error`, not a number where none is known, and of what.
+
+    `quantity` is "displacement", "force" or "torque", empty where none is known; `support` the name of the support.
+    """
+
+    error: float
+    quantity: str
+    support: str = ""
+
+
+def decisive(displacement: float, supports: Sequence[SupportError]) -> Decisive:
+    """Return the larger of the rms error of displacement and the largest error of a support's force or torque.
+
+    The one rule by which verdicts, maps, comparisons and calibrations judge; of equal errors the first counts.
+    """
+    errors = [Decisive(displacement, "displacement")]
+    for one in supports:
+        errors.append(Decisive(_or_nan(one.force_error), "force", one.mine.name))
+        errors.append(Decisive(_or_nan(one.torque_error), "torque", one.mine.name))
+    known = [one for one in errors if not np.isnan(one.error)]
+    return max(known, key=lambda one: one.error) if known else Decisive(float("nan"), "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """How a path differs from a reference. All errors are relative to the reference's displacement.
+    """How a path differs from a reference. All errors are relative to the reference's own size.
 
     Attributes:
         model, reference: the two paths, on the nodes of one mesh: that on which they are compared.
         known_on: the two paths as they were given, each on its own mesh.
         outside: nodes that lie outside of the other body, which are left out of all errors, shape (n_nodes,).
+        compared: nodes that rms and largest errors are over: within both bodies, and not moved (or held) in all
+            directions by supports, which tells nothing of a model, shape (n_nodes,).
         node_by_node: whether both had the same nodes, so that nothing was interpolated.
         probe: number of the node that is watched.
-        tolerance: the rms error up to which the two agree.
+        tolerance: the error up to which the two agree.
         load_factors: the loaded levels that both paths have, ascending, shape (n,).
         rms_errors: root-mean-square nodal distance over root-mean-square displacement, shape (n,).
         max_errors: largest nodal distance over largest displacement, shape (n,).
         probe_errors: distance over displacement at the probe, shape (n,).
         rms_distances, max_distances: root-mean-square and largest nodal distance [m], shape (n,).
+        support_errors: at each level those of the moved supports whose forces both paths know, of length n.
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
     """
 
@@ -48,6 +116,8 @@ class Comparison:
     max_distances: Floats
     known_on: tuple[Path, Path]
     outside: Bools
+    compared: Bools
+    support_errors: tuple[tuple[SupportError, ...], ...] = ()
     node_by_node: bool = True
     surface: SurfaceDistance | None = None
 
@@ -73,20 +143,41 @@ class Comparison:
         """The largest error at full load; None where one path did not get there."""
         return self._at_full_load(self.max_errors)
 
+    @cached_property
+    def decisive(self) -> tuple[Decisive, ...]:
+        """At each level the error that decides: the larger of rms error and force error, of length n."""
+        return tuple(map(decisive, self.rms_errors.tolist(), self.support_errors))
+
+    @cached_property
+    def errors(self) -> Floats:
+        """The error that decides at each level, shape (n,); not a number where none is known."""
+        return np.array([one.error for one in self.decisive])
+
+    @cached_property
+    def force_errors(self) -> Floats:
+        """The largest error of a support's force or torque at each level, shape (n,); not a number where none is."""
+        return np.array([decisive(np.nan, several).error for several in self.support_errors])
+
+    @property
+    def supports(self) -> tuple[SupportError, ...]:
+        """The errors of the moved supports at full load; empty where one path did not get there."""
+        reached = self.load_factors.size and self.load_factors[-1] == 1.0
+        return self.support_errors[-1] if reached else ()
+
+    @property
+    def error(self) -> float | None:
+        """The error that decides at full load; None where one path did not get there."""
+        return self._at_full_load(self.errors)
+
+    @property
+    def decided_by(self) -> str | None:
+        """What decides at full load: "displacement", "force" or "torque"; None where nothing is known there."""
+        return None if self.error is None else self.decisive[-1].quantity
+
     @property
     def force_error(self) -> float | None:
-        """Difference over size of the reactions to a prescribed motion at full load; None where loads are given."""
-        mine, theirs = self.model.at(1.0), self.reference.at(1.0)
-        if (
-            not self.model.problem.loading.driven_by_motion
-            or mine is None
-            or theirs is None
-            or not self.reference.has_reactions
-        ):
-            return None
-        wanted = self.reference.applied_force(theirs)
-        size = float(np.linalg.norm(wanted))
-        return float(np.linalg.norm(self.model.applied_force(mine) - wanted)) / size if size else None
+        """The largest error of a moved support's force or torque at full load; None where there is none to tell."""
+        return self._at_full_load(self.force_errors)
 
     @property
     def n_outside(self) -> int:
@@ -131,24 +222,27 @@ class Comparison:
 
     @property
     def agrees_up_to_load_factor(self) -> float | None:
-        """The largest level up to which, without a gap from zero, the rms error is under the tolerance.
+        """The largest level up to which, without a gap from zero, the error that decides is under the tolerance.
 
-        Zero where the first level already differs; None for a reference of one level, read from a file.
+        Zero where the first level already differs; None for a reference of one level, read from a file, and where
+        there is nothing to compare.
         """
-        if not self.load_factors.size or self.reference.states[0].load_factor != 0.0:
+        if not self.load_factors.size or self.reference.states[0].load_factor != 0.0 or np.isnan(self.errors).all():
             return None
-        beyond = np.flatnonzero(~(self.rms_errors < self.tolerance))
+        beyond = np.flatnonzero(~(self.errors < self.tolerance))
         if not beyond.size:
             return float(self.load_factors[-1])
         return float(self.load_factors[beyond[0] - 1]) if beyond[0] else 0.0
 
     def __str__(self) -> str:
         """Return the comparison in a sentence."""
-        if self.rms_error is None:
+        if self.error is None:
             return f"{self.model.label} and {self.reference.label} do not meet at full load"
         up_to = self.agrees_up_to_load_factor
         within = "" if up_to is None else f", within {self.tolerance:.0%} up to load factor {up_to:g}"
-        return f"{self.model.label} against {self.reference.label}: {self.rms_error:.1%} rms at full load{within}"
+        found = [] if self.rms_error is None else [f"{self.rms_error:.1%} rms"]
+        found += [] if self.force_error is None else [f"{self.force_error:.1%} in the supports' force or torque"]
+        return f"{self.model.label} against {self.reference.label}: {', '.join(found)} at full load{within}"
 
 
 def compare(
@@ -178,7 +272,8 @@ def compare(
     watched = _watched(mine.path, inside, model, probe)
     pairs = [(state, theirs.path.at(state.level)) for state in mine.path.states if state.level > 0]
     both = [(one, other) for one, other in pairs if other is not None]
-    found = [_Distances.between(one, other, inside) for one, other in both]
+    compared = ~outside & ~_dictated(mine.path, theirs.path)
+    found = [_Distances.between(one, other, compared) for one, other in both]
     return Comparison(
         model=mine.path,
         reference=theirs.path,
@@ -192,9 +287,39 @@ def compare(
         max_distances=np.array([one.max for one in found]),
         known_on=(model, reference),
         outside=outside,
+        compared=compared,
+        support_errors=tuple(tuple(_support_errors(mine.path, theirs.path, *pair)) for pair in both),
         node_by_node=mine.node_by_node and theirs.node_by_node,
         surface=_surface_distance(mine.path, theirs.path),
     )
+
+
+def _dictated(mine: Path, theirs: Path) -> Bools:
+    """The nodes that supports move or hold in all directions, in both paths where both tell, shape (n_nodes,)."""
+    told = [one for one in (mine.dictated, theirs.dictated) if one is not None]
+    return np.logical_and.reduce(told) if told else np.zeros(mine.problem.mesh.n_nodes, dtype=bool)
+
+
+def _support_errors(mine: Path, theirs: Path, one: State, other: State) -> Iterator[SupportError]:
+    """Yield the errors of the supports that both paths know, by their numbers."""
+    wanted = {found.support: found for found in theirs.support_forces(other)}
+    load = _total_load(mine, one)
+    for found in mine.support_forces(one):
+        if found.support in wanted and found.force.shape == wanted[found.support].force.shape:
+            yield SupportError(found, wanted[found.support], load)
+
+
+def _total_load(path: Path, state: State) -> float | None:
+    """The length of the total load at a state [N]; None where none acts beside the motion, or it has no total."""
+    if not path.problem.stated or path.problem.loading.driven_by_motion:
+        return None
+    loads = path.problem.loading.force(state.positions, state.load_factor)
+    total = float(np.linalg.norm(state.applied_force))
+    return total if total > _NO_TOTAL * float(np.linalg.norm(loads, axis=1).sum()) else None
+
+
+# Loads that balance but for this share have no total.
+_NO_TOTAL = 1e-9
 
 
 def _common_problem(model: Path, reference: Path) -> Problem:
@@ -255,9 +380,12 @@ class _Distances:
     max_size: float
 
     @staticmethod
-    def between(mine: State, theirs: State, inside: Ints) -> "_Distances":
-        distance = np.linalg.norm(mine.displacement[inside] - theirs.displacement[inside], axis=1)
-        size = np.linalg.norm(theirs.displacement[inside], axis=1)
+    def between(mine: State, theirs: State, compared: Bools) -> "_Distances":
+        """Distances over some nodes; not a number where there are none."""
+        distance = np.linalg.norm(mine.displacement[compared] - theirs.displacement[compared], axis=1)
+        size = np.linalg.norm(theirs.displacement[compared], axis=1)
+        if not distance.size:
+            return _Distances(*[np.nan] * 4)
         means = (float(np.sqrt((one**2).mean())) for one in (distance, size))
         rms, rms_size = means
         return _Distances(rms, float(distance.max()), rms_size, float(size.max()))
@@ -267,6 +395,18 @@ def _probe_error(mine: State, theirs: State, probe: int) -> float:
     """The relative error at the probe; not a number where the reference does not move there."""
     size = float(np.linalg.norm(theirs.displacement[probe]))
     return float(np.linalg.norm(mine.displacement[probe] - theirs.displacement[probe])) / size if size else np.nan
+
+
+def _apart(mine: Floats, theirs: Floats) -> Floats:
+    return np.asarray((mine - theirs) / np.linalg.norm(theirs))
+
+
+def _length(apart: Floats | None) -> float | None:
+    return None if apart is None else float(np.linalg.norm(apart))
+
+
+def _or_nan(error: float | None) -> float:
+    return np.nan if error is None else error
 
 
 def _facets(path: Path, level: float) -> Floats | None:

@@ -2,13 +2,14 @@
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Bools, Floats
 from truespring.errors import ModelError, ProblemError
 from truespring.mesh import Grid, Shell, Surface, select
 from truespring.mesh.selections import AXES
@@ -26,10 +27,13 @@ from truespring.models import (
 )
 from truespring.potential import Loading, Potential, Refined, Stretched
 from truespring.problem import Problem
+from truespring.reactions import SupportForce, leading_support, support_forces
 from truespring.solvers import ArcLength, Cost, DisplacementControl, Equilibrium, Newton, Reporter
 
 # A relative residual above this is worth a word; it can only come from loads that drown in rounding.
 _LOOSE = 1e-6
+# Above this a state is no equilibrium: what is unbalanced is no longer small beside the load.
+_UNBALANCED = 1e-3
 
 # Levels this near are one: other programs print six digits.
 _SAME_LEVEL = 2e-6
@@ -83,6 +87,8 @@ class State:
             under displacement control the share of the displacement, not a number at a critical point.
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
+        supports: force and torque of each moved support where they were told with the state (read from a file, or
+            known on another mesh), None where the reactions tell them: see Path.support_forces.
     """
 
     load_factor: float
@@ -102,6 +108,7 @@ class State:
     critical: str = ""
     mode: Floats | None = None
     level: float = math.nan
+    supports: tuple[SupportForce, ...] | None = None
 
     def __repr__(self) -> str:
         return (
@@ -128,6 +135,7 @@ class Path:
         moduli: what the springs realise on the problem's own material, None for other models and networks.
         n_unknowns: the directions of nodes that were free, 0 where nothing was solved.
         cost: how it was solved and what that took, None where nothing was.
+        held: the directions of nodes that supports held, of a path that was read with them, shape (n_nodes, dim).
     """
 
     problem: Problem
@@ -145,6 +153,7 @@ class Path:
     moduli: Moduli | None = None
     n_unknowns: int = 0
     cost: Cost | None = None
+    held: Bools | None = None
 
     def __repr__(self) -> str:
         return f"Path({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
@@ -206,19 +215,34 @@ class Path:
         nearest = int(np.nanargmin(apart))
         return self.states[nearest] if apart[nearest] <= _SAME_LEVEL else None
 
-    def applied_force(self, state: State) -> Floats:
-        """Return the total applied force [N], shape (dim,); without loads, the reaction to the prescribed motion.
+    @cached_property
+    def dictated(self) -> Bools | None:
+        """Nodes whose motion supports dictate in all directions, shape (n_nodes,); None where no supports are told."""
+        if self.held is not None:
+            return np.asarray(self.held.all(axis=1))
+        return np.asarray(self.problem.loading.held.all(axis=1)) if self.problem.stated else None
 
-        The reaction of all nodes that move, but for those that move against the largest motion: of two
-        sides pulled apart, one. Not a number where it is not known.
+    def support_forces(self, state: State) -> tuple[SupportForce, ...]:
+        """Return force and torque of each moved support at a state; empty where none moves or they are not known."""
+        if state.supports is not None:
+            return state.supports
+        if not self.problem.stated or not np.isfinite(state.reaction).all():
+            return ()
+        return support_forces(self.problem, state.positions, state.reaction, state.load_factor)
+
+    @cached_property
+    def _leading(self) -> int | None:
+        return leading_support(self.problem)
+
+    def applied_force(self, state: State) -> Floats:
+        """Return the total applied force [N], shape (dim,); without loads, that of the support that moves most.
+
+        Of supports that move equally far, the first stated. Not a number where it is not known.
         """
-        loading = self.problem.loading
-        if not self.problem.stated or not loading.driven_by_motion:
+        if not self.problem.stated or not self.problem.loading.driven_by_motion:
             return state.applied_force
-        motion = loading.motion()
-        largest = motion[np.linalg.norm(motion, axis=1).argmax()]
-        moved = motion.any(axis=1) & (motion @ largest >= 0)
-        return np.asarray(state.reaction[moved].sum(axis=0))
+        of_leading = [one.force for one in self.support_forces(state) if one.support == self._leading]
+        return of_leading[0] if of_leading else np.full(self.problem.mesh.dim, math.nan)
 
 
 Solver = Newton | DisplacementControl | ArcLength
@@ -272,7 +296,7 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
             follow = solver.follow(potential, loading, _weights(problem, potential, solver), report)
         case ArcLength():
             follow = solver.follow(potential, loading, report)
-    found = list(follow)
+    found, drowned = _up_to_drowned(problem, follow)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
@@ -282,12 +306,38 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
         kind="springs" if isinstance(model, SpringNetwork) else getattr(model, "kind", "potential"),
         states=states,
         status=_status(states, best, linear, isinstance(solver, Newton)),
-        warnings=(*known, *_path_warnings(states, best, linear, isinstance(solver, Newton))),
+        warnings=(*known, *_path_warnings(states, best, linear, isinstance(solver, Newton), drowned)),
         best=best,
         potential=potential,
         n_unknowns=int((~loading.held).sum()),
         cost=found[-1].cost,
     )
+
+
+def _up_to_drowned(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[list[Equilibrium], bool]:
+    """Return the states of a path, and whether the load of the last one drowns in rounding.
+
+    Such a state, whose unbalanced force is not small beside the load, ends the path and has not converged.
+    """
+    found = []
+    for one in follow:
+        unbalanced = one.converged and one.load_factor != 0 and one.residual > _UNBALANCED
+        if unbalanced and not _moved_by_more_than_rounding(problem, one.load_factor):
+            return [*found, replace(one, converged=False)], True
+        found.append(one)
+    return found, False
+
+
+def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
+    """Whether motion alone drives the body, by more than its coordinates are rounded.
+
+    The unbalanced force is then rounding beside what the motion takes. Where that is nothing, as of a body moved as a
+    whole, all forces are rounding, and their ratio tells nothing.
+    """
+    loading, nodes = problem.loading, problem.mesh.nodes
+    rounding = float(np.finfo(float).eps * np.abs(nodes).max())
+    moved = float(np.abs(loading.motion(load_factor)).max())
+    return loading.driven_by_motion and _UNBALANCED * moved > rounding
 
 
 def _weights(problem: Problem, potential: Potential, control: DisplacementControl) -> Floats:
@@ -349,7 +399,7 @@ def _status(states: tuple[State, ...], best: State | None, linear: bool, keeps_t
 
 
 def _path_warnings(
-    states: tuple[State, ...], best: State | None, linear: bool, keeps_to_stable: bool
+    states: tuple[State, ...], best: State | None, linear: bool, keeps_to_stable: bool, drowned: bool
 ) -> tuple[str, ...]:
     warnings = []
     if best is not None:
@@ -360,9 +410,10 @@ def _path_warnings(
         ]
         good = [state.load_factor for state in states if not bad or state.load_factor < bad[0]]
         last = f"{good[-1]:.6g}" if good else "none"
+        why = _DROWNED if drowned else Status.NOT_CONVERGED.advice
         warnings.append(
             f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
-            f"last good load factor: {last}; {Status.NOT_CONVERGED.advice}"
+            f"last good load factor: {last}; {why}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]
     what = "area" if states and states[0].positions.shape[1] == 2 else "volume"
@@ -400,6 +451,12 @@ def _path_warnings(
     if any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent could not be found")
     return tuple(warnings)
+
+
+_DROWNED = (
+    "the load drowns in rounding: it is too small for the stiffness and the coordinates of the body; load more, or "
+    "place the body near the origin"
+)
 
 
 def _critical_warning(state: State) -> str:

@@ -1,0 +1,139 @@
+"""Reactions by support: one force and one torque for each support that moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.loading import Held
+from truespring.problem import Problem
+
+# Shares of what the nodes' reactions add up to, below which a resultant vanishes: one that the prescribed motion does
+# work with only where it is zero by symmetry; one that it does not, such as the torque of a straight pull, already where
+# it may be due to the mesh alone (coarse tetrahedra make one of 4 %).
+_VANISHING, _IDLE = 1e-3, 0.1
+# Shares of the way at which the motion of a support is measured: a full turn ends where it began.
+_SHARES = (0.25, 0.5, 0.75, 1.0)
+_EQUAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class SupportForce:
+    """The force and the torque of a moved support on the body, the resultant of its reactions.
+
+    Attributes:
+        support: its number among the supports of the problem, from 0.
+        name: what it is on, "support 2" where that has no name.
+        force: sum of its reactions [N], shape (dim,).
+        torque: sum of arm x reaction [N m], shape (1,) in the plane (about z), (3,) in space. It does work with the
+            rotation of the support: arms are those of the deformed body, from the point of `point_of_torque`.
+        has_force, has_torque: whether there is a resultant to compare, not reactions that cancel.
+    """
+
+    support: int
+    name: str
+    force: Floats
+    torque: Floats
+    has_force: bool
+    has_torque: bool
+
+
+def moved_supports(problem: Problem) -> list[int]:
+    """Return the numbers of the supports that are moved or turned; none of a body that no problem was stated for."""
+    if not problem.stated:
+        return []
+    return [number for number, held in enumerate(problem.held) if held.motion.any() or held.turn is not None]
+
+
+def leading_support(problem: Problem) -> int | None:
+    """Return the number of the support that moves most, of equals the first stated; None where none moves.
+
+    By the largest distance that one of its nodes gets from where it stood.
+    """
+    found = None
+    largest = 0.0
+    for number in moved_supports(problem):
+        way = _way(problem.held[number])
+        if way > largest * (1 + _EQUAL):
+            found, largest = number, way
+    return found
+
+
+def support_forces(
+    problem: Problem, positions: Floats, reaction: Floats, load_factor: float
+) -> tuple[SupportForce, ...]:
+    """Return force and torque of each support that moves, in the order in which they are stated.
+
+    A support acts only in the directions that it holds. A direction of a node that several supports hold is shared
+    equally by them, so that the forces of all supports add up to the total reaction. The torque is taken about the
+    point `about` of a turn, else the centre of the nodes at rest, moved along with the support's displacement: the
+    same point in every model.
+
+    Args:
+        problem: whose supports.
+        positions: of the nodes [m], shape (n_nodes, dim).
+        reaction: at the nodes [N], shape (n_nodes, dim).
+        load_factor: share of the prescribed motion.
+    """
+    moved = moved_supports(problem)
+    if not moved:
+        return ()
+    holders = np.zeros(problem.mesh.nodes.shape)
+    for held in problem.held:
+        holders[np.ix_(held.nodes, held.directions)] += 1
+    return tuple(
+        _resultant(problem, number, positions, reaction / np.maximum(holders, 1), load_factor) for number in moved
+    )
+
+
+def torque_axes(dim: int) -> str:
+    """Return the axes about which a torque acts: z in the plane, all in space."""
+    return "xyz" if dim == 3 else "z"
+
+
+def point_of_torque(problem: Problem, support: int, load_factor: float) -> Floats:
+    """Return the point about which the torque of a support is taken at a load factor [m], shape (dim,)."""
+    held, nodes = problem.held[support], problem.mesh.nodes
+    centre = nodes[held.nodes].mean(axis=0) if held.turn is None else nodes[held.nodes[0]] - held.turn.arms[0]
+    return np.asarray(centre + load_factor * held.motion)
+
+
+def _resultant(
+    problem: Problem, number: int, positions: Floats, shared: Floats, load_factor: float
+) -> SupportForce:
+    held = problem.held[number]
+    reaction = np.zeros((len(held.nodes), positions.shape[1]))
+    reaction[:, held.directions] = shared[np.ix_(held.nodes, held.directions)]
+    arms = positions[held.nodes] - point_of_torque(problem, number, load_factor)
+    force, torque = reaction.sum(axis=0), _cross(arms, reaction).sum(axis=0)
+    size, longest = float(np.linalg.norm(reaction, axis=1).sum()), float(np.linalg.norm(arms, axis=1).max())
+    least_force = _VANISHING if held.motion.any() else _IDLE
+    least_torque = _IDLE if held.turn is None else _VANISHING
+    return SupportForce(
+        support=number,
+        name=support_name(problem, number),
+        force=force,
+        torque=torque,
+        has_force=float(np.linalg.norm(force)) > least_force * size,
+        has_torque=float(np.linalg.norm(torque)) > least_torque * size * longest,
+    )
+
+
+def support_name(problem: Problem, number: int) -> str:
+    """Return what a support is on where that has a name, else its number, counted from 1."""
+    on = problem.supports[number].on
+    alone = sum(isinstance(one.on, str) and one.on == on for one in problem.supports) == 1
+    return on if isinstance(on, str) and alone else f"support {number + 1}"
+
+
+def _cross(arms: Floats, forces: Floats) -> Floats:
+    """Arms times forces, shape (n, 1) in the plane, (n, 3) in space."""
+    if arms.shape[1] == 2:
+        return np.asarray(arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1])
+    return np.asarray(np.cross(arms, forces))
+
+
+def _way(held: Held) -> float:
+    """The largest distance of a node of a support from where it stood [m]."""
+    ways = [share * held.motion + (0.0 if held.turn is None else held.turn.motion(share)) for share in _SHARES]
+    return max(float(np.linalg.norm(np.atleast_2d(way), axis=1).max()) for way in ways)
