@@ -42,6 +42,7 @@ ALLOWED = {
     "sweeping": {"study", "report", "units"},
     "study": {
         "calibration",
+        "refining",
         "report",
         "comparison",
         "misfit",
@@ -62,6 +63,7 @@ ALLOWED = {
     "report": {
         "calibration",
         "comparison",
+        "refining",
         "equilibrium",
         "reactions",
         "settling",
@@ -87,6 +89,7 @@ ALLOWED = {
         "units",
     },
     "comparison": {"carrying", "equilibrium", "reactions", "problem", "mesh"},
+    "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh"},
     "carrying": {"equilibrium", "problem", "mesh"},
     "misfit": {"comparison", "equilibrium", "mesh"},
     "reference": {

@@ -4,6 +4,7 @@ import numpy as np
 
 from truespring.arrays import Ints
 from truespring.errors import MeshError
+from truespring.mesh.facets import find_facets
 from truespring.mesh.mesh import Mesh
 
 
@@ -36,12 +37,14 @@ def in_simplices(mesh: Mesh) -> tuple[Mesh, Ints]:
                 whose.append(numbers)
     parents = np.concatenate(whose)
     order = np.argsort(parents, kind="stable")
-    parents = parents[order]
-    groups = {
-        name: np.flatnonzero(np.isin(parents, of, kind="table")) for name, of in mesh.element_groups.items()
-    }
+    elements, parents = np.concatenate(found)[order], parents[order]
     kind = "triangle" if mesh.dim == 2 else "tetrahedron"
-    return Mesh(mesh.nodes, np.concatenate(found)[order], kind, mesh.node_groups, groups, mesh.notes), parents
+    groups = {name: np.flatnonzero(np.isin(parents, of)) for name, of in mesh.element_groups.items()}
+    facets = {
+        name: find_facets(elements, kind, np.concatenate(_fanned(mesh.facet_nodes(of))))
+        for name, of in mesh.facet_groups.items()
+    }
+    return Mesh(mesh.nodes, elements, kind, mesh.node_groups, groups, facets, mesh.notes), parents
 
 
 def _fanned(facets: Ints) -> list[Ints]:
