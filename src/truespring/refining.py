@@ -58,9 +58,30 @@ class OwnError:
         return f"not known: {self.how}" if self.value is None else f"{self.value:.2%} ({self.how})"
 
 
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a reference stands to its own limit, and a model compared with it to that limit.
+
+    Attributes:
+        value, how: of the reference, see OwnError.
+        refined_error: the model's error at full load against the finer path of the reference, as Comparison.error is;
+            None where there is none.
+    """
+
+    value: float | None
+    how: str
+    refined_error: float | None = None
+
+
+def standing(model: Path, found: OwnError) -> Standing:
+    """Return how a reference stands whose own error was found, and `model` to its limit."""
+    against = None if found.limit is None else compare(model, found.limit).error
+    return Standing(found.value, found.how, against)
+
+
 def work_of(path: Path) -> float:
     """Return what solving a path took: Newton iterations times unknowns to the power of their growth, no times."""
-    return path.newton_iterations * path.n_unknowns**_GROWTH
+    return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
 
 
 def reference_error(problem: Problem, model: Model, solver: Solver | None = None) -> OwnError:

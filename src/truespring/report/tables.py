@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
+from truespring.report.standing import own_errors
 from truespring.report.summary import difference
 from truespring.report.verdict import verdict
 from truespring.settling import Settling
@@ -135,13 +136,15 @@ def settling_table(title: str, several: Iterable[Settling]) -> "Table":
 
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
-    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to")
+    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", "itself")
     table = _table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
         shown = ("-" if error is None else f"{error:.2%}" for error in errors)
         up_to = one.agrees_up_to_load_factor
-        table.add_row(name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}")
+        table.add_row(
+            name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}", own_errors(result, name)[0]
+        )
     return table
 
 

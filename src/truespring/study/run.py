@@ -39,6 +39,7 @@ from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
 from truespring.solvers import Reporter
 from truespring.study.read import Entry, Study, read_study
+from truespring.study.standings import standings
 
 #: Called with study, model and the load factor reached, for a progress bar.
 Progress = Callable[[str, str, float], None]
@@ -63,8 +64,11 @@ def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
     return studies
 
 
-def run(study: Study, progress: Progress | None = None, comparing: bool = True) -> Result:
-    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached."""
+def run(study: Study, progress: Progress | None = None, comparing: bool = True, refining: bool = True) -> Result:
+    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached.
+
+    With `refining`, unless the study leaves it out, references are refined to tell how far they are themselves off.
+    """
     paths: dict[str, Path] = {}
     for name, entry in study.entries.items():
 
@@ -95,6 +99,7 @@ def run(study: Study, progress: Progress | None = None, comparing: bool = True) 
         }
         if comparing
         else {},
+        standings=standings(study, paths, names) if refining else {},
     )
 
 

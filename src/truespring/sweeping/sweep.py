@@ -180,7 +180,7 @@ def solve_point(asked: tuple[StudyText, Point]) -> dict[str, Any]:
     """Solve one point, on a worker, and return its summary, with the stored energy of each model [J]."""
     text, point = asked
     _refuse_other_than_planned(text, point)
-    result = run(text.study(point.changes))
+    result = run(text.study(point.changes), refining=False)
     found = summary(result)
     for name, path in result.paths.items():
         energy = path.states[-1].energy if path.states else math.nan
