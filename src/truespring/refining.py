@@ -6,13 +6,26 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from truespring.arrays import Floats, Ints
 from truespring.comparison import Comparison, compare
 from truespring.equilibrium import Path, Solver, solve
-from truespring.errors import ModelError, TruespringError
-from truespring.mesh import Box, Mesh, Near, Plane, in_simplices, refined, refuse_too_large, select_elements
+from truespring.errors import MeshError, ModelError, TruespringError
+from truespring.mesh import (
+    Box,
+    Mesh,
+    Near,
+    Plane,
+    box,
+    in_simplices,
+    rectangle,
+    refined,
+    refuse_too_large,
+    select_elements,
+)
 from truespring.models import Model
+from truespring.models.bending import cell_counts
 from truespring.potential import Potential
 from truespring.problem import Problem, Region
 from truespring.solvers import Nearby, Newton
@@ -41,7 +54,7 @@ class OwnError:
     Attributes:
         value: at full load, relative as Comparison.error is: the larger of the rms distance of nodes and the error of a
             moved support's force or torque; None where it is not known.
-        how: by what it was found: "second order", "refined", "bending"; or why it is not known.
+        how: by what it was found: "second order", "refined" or "coarser"; or why it is not known.
         limit: the path on the finer mesh or of the better elements, None without one.
         comparison: of the path with `limit`, None without one.
         work: what it took, as `work_of` counts it.
@@ -95,29 +108,39 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
 
     A model of first order whose law has elements of second order is held against these, on simplices of the same nodes:
     their distance times SECOND_ORDER. Others are solved on meshes of half and, if that costs little, of a quarter of
-    the size: the distance to the finest over 1 - 2^(-p k), after k halvings, p = ORDER (Richardson). It is not known of
-    a path that did not reach full load, was read from a file, or whose refinement takes more than `most_work`, does not
-    fit in memory or does not converge.
+    the size: the distance to the finest over 1 - 2^(-p k), after k halvings, p = ORDER (Richardson). Where that takes
+    more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if elements are alike and
+    along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path that did not reach full
+    load, was read from a file, or finds no equilibrium on other meshes.
     """
     if not path.complete or not path.solved:
         return OwnError(None, "it was not solved to full load here")
-    found, spent = OwnError(None, "a finer mesh costs too much"), 0.0
+    found, spent = None, 0.0
     try:
         for finer in _finer(path.problem, model):
-            cost = _ITERATIONS * finer.n_unknowns**_GROWTH
-            if spent + cost > most_work:
+            if spent + _ITERATIONS * finer.n_unknowns**_GROWTH > most_work:
                 break
-            limit = _solve(finer, found.limit or path, solver, most_work - spent)
+            limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
             spent += work_of(limit)
-            if not limit.complete or any(state.negative_eigenvalues for state in limit.states):
-                return found if found.limit else OwnError(None, "a finer mesh finds no equilibrium there", work=spent)
             against = compare(path, limit)
             value = None if against.error is None else finer.factor * against.error
-            found = OwnError(value, finer.how, limit, against, spent)
-    except (TruespringError, MemoryError) as error:
-        if found.limit is None:
-            return OwnError(None, str(error) or "it does not fit in memory", work=spent)
-    return replace(found, work=spent)
+            found = OwnError(value, finer.how, limit, against)
+    except (TruespringError, MemoryError):
+        pass
+    return replace(found or _from_coarser(path, model, solver, most_work - spent), work=spent)
+
+
+def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
+    """How far a path is from its limit by the distance of a mesh of twice the size."""
+    try:
+        problem = coarser_problem(path.problem)
+        if path.newton_iterations * int((~problem.loading.held).sum()) ** _GROWTH > most_work:
+            return OwnError(None, "other meshes cost too much")
+        coarse = solve(problem, model, solver)
+        against = compare(coarse, path)
+    except (TruespringError, AttributeError) as error:
+        return OwnError(None, str(error))
+    return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
 
 
 class _Finer(NamedTuple):
@@ -162,6 +185,26 @@ def refined_problem(problem: Problem) -> Problem:
     return on_mesh(named, finer, np.repeat(np.arange(len(mesh.elements)), count))
 
 
+def coarser_problem(problem: Problem) -> Problem:
+    """Return a problem on a mesh of elements of twice the size; raise MeshError where there is none.
+
+    For rectangles and bricks that are alike and along the axes, an even number in each direction, without groups of
+    elements or facets, node numbers or regions.
+    """
+    mesh, counts = problem.mesh, cell_counts(problem.mesh)
+    chosen = [getattr(one, "on", None) for one in (*problem.supports, *problem.loads)]
+    plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
+    if counts is None or any(count % 2 for count in counts) or not plain or mesh.element_groups or mesh.facet_groups:
+        raise MeshError("no mesh of twice the size is known")
+    half = tuple(count // 2 for count in counts)
+    size = mesh.upper - mesh.lower
+    made = (rectangle if mesh.dim == 2 else box)(tuple(size.tolist()), half)
+    nodes = made.nodes + mesh.lower
+    at = np.asarray(KDTree(nodes).query(mesh.nodes, distance_upper_bound=1e-6 * mesh.diameter)[1])
+    groups = {name: at[of][at[of] < len(nodes)] for name, of in mesh.node_groups.items()}
+    return replace(problem, mesh=Mesh(nodes, made.elements, made.element, groups))
+
+
 def on_mesh(problem: Problem, mesh: Mesh, parents: Ints) -> Problem:
     """Return a problem on a mesh that divides its own; `parents` are the elements that the new ones are parts of."""
     regions = [
@@ -195,15 +238,24 @@ def _with_named_nodes(problem: Problem) -> Problem:
 def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Path:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
     if isinstance(solver, Newton):
+        # From a state that is near, so that the path is not taken again, and on the same branch.
         nearby = Nearby(
             1, solver.tolerance, _MOST_ITERATIONS, method=solver.method, linear=solver.linear, start=_carrying(coarse)
         )
         path = solve(finer.problem, finer.model, nearby)
-        if path.complete:
+        if _sound(path):
             return path
     if coarse.newton_iterations * finer.n_unknowns**_GROWTH > most_work:
-        raise ModelError("a finer mesh costs too much")
-    return solve(finer.problem, finer.model, solver)
+        raise ModelError("other meshes cost too much")
+    path = solve(finer.problem, finer.model, solver)
+    if not _sound(path):
+        raise ModelError("a finer mesh finds no stable equilibrium")
+    return path
+
+
+def _sound(path: Path) -> bool:
+    """Whether a path reached full load and is stable there."""
+    return path.complete and not path.states[-1].negative_eigenvalues
 
 
 def _carrying(coarse: Path) -> Callable[[Potential], Floats]:
