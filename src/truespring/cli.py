@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from truespring.report.result import Result
-    from truespring.study import Realised, Study
+    from truespring.study import Realised, Refinement, Study
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -336,17 +336,23 @@ def _converge(options: argparse.Namespace) -> int:
         raise TruespringError(f"--tolerance {options.tolerance:g}: a relative error between 0 and 1 is wanted")
     _make_folders(options.out, studies)
     console = _console(options)
-    found: dict[str, Any] = {}
+    found: dict[str, Refinement] = {}
+    told_of = [(f"--{name}", str(getattr(options, name))) for name in ("tolerance", "meshes", "out")]
+    command = shlex.join(["truespring", "converge", *options.study, *(part for pair in told_of for part in pair)])
     for study in studies:
         for told in converge(study.file, options.tolerance, options.meshes):
             found[study.stem] = told
             with _writing(options.out):
-                write_settling(told, options.out / study.stem)
-            console.print(settling_table(f"{study.stem}: {told[0].n_nodes[-1]:,} nodes", told))
+                page = write_settling(study.title, study.file, told, options.out / study.stem, command)
+            console.print(settling_table(f"{study.stem}: {told.n_nodes[-1]:,} nodes", told))
+        console.print(found[study.stem].sentence, f"report: {page}", sep="\n", soft_wrap=True)
     if options.json:
-        values = {stem: [asdict(one) for one in told] for stem, told in found.items()}
+        values = {stem: [asdict(one) for one in told.quantities] for stem, told in found.items()}
         _print_json(values if len(values) > 1 else values[studies[0].stem])
-    return CONVERGED if all(one.settled for told in found.values() for one in told) else NOT_CONVERGED
+    for stem, told in found.items():
+        if not told.settled and console.quiet:
+            print(f"truespring: {stem}: {told.sentence}", file=sys.stderr)
+    return CONVERGED if all(told.settled for told in found.values()) else NOT_CONVERGED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -78,8 +78,14 @@ def decisive(displacement: float, supports: Sequence[SupportError]) -> Decisive:
     for one in supports:
         errors.append(Decisive(_or_nan(one.force_error), "force", one.mine.name))
         errors.append(Decisive(_or_nan(one.torque_error), "torque", one.mine.name))
+    return largest(errors)
+
+
+def largest(errors: Sequence[Decisive]) -> Decisive:
+    """Return the largest error that is known, of equal ones the first."""
     known = [one for one in errors if not np.isnan(one.error)]
-    return max(known, key=lambda one: one.error) if known else Decisive(float("nan"), "")
+    # Errors that differ by rounding are equal.
+    return max(known, key=lambda one: float(f"{one.error:.6g}")) if known else Decisive(float("nan"), "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

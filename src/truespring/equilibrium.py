@@ -319,7 +319,7 @@ def _up_to_drowned(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[lis
 
     Such a state, whose unbalanced force is not small beside the load, ends the path and has not converged.
     """
-    found = []
+    found: list[Equilibrium] = []
     for one in follow:
         unbalanced = one.converged and one.load_factor != 0 and one.residual > _UNBALANCED
         if unbalanced and not _moved_by_more_than_rounding(problem, one.load_factor):

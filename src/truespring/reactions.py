@@ -1,20 +1,24 @@
 """Reactions by support: one force and one torque for each support that moves."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from truespring.arrays import Floats
 from truespring.loading import Held
 from truespring.problem import Problem
 
 # Shares of what the nodes' reactions add up to, below which a resultant vanishes: one that the prescribed motion does
-# work with only where it is zero by symmetry; one that it does not, such as the torque of a straight pull, already where
-# it may be due to the mesh alone (coarse tetrahedra make one of 4 %).
+# work with only where it is zero by symmetry; an idle one, such as the torque of a straight pull, already where it may
+# be due to the mesh alone (coarse tetrahedra make one of 4 %).
 _VANISHING, _IDLE = 1e-3, 0.1
 # Shares of the way at which the motion of a support is measured: a full turn ends where it began.
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _EQUAL = 1e-9
+
+Rows = sparse.csr_array[Any, tuple[int, int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +70,8 @@ def support_forces(
 
     A support acts only in the directions that it holds. A direction of a node that several supports hold is shared
     equally by them, so that the forces of all supports add up to the total reaction. The torque is taken about the
-    point `about` of a turn, else the centre of the nodes at rest, moved along with the support's displacement: the
-    same point in every model.
+    point `about` of a turn, moved along with the support's displacement, else about the centre of the nodes where they
+    are: with that a support that lets its nodes slide has no torque of its own where it only pulls.
 
     Args:
         problem: whose supports.
@@ -78,12 +82,38 @@ def support_forces(
     moved = moved_supports(problem)
     if not moved:
         return ()
+    shared = reaction / np.maximum(_holders(problem), 1)
+    return tuple(_resultant(problem, number, positions, shared, load_factor) for number in moved)
+
+
+def _holders(problem: Problem) -> Floats:
+    """The number of supports that hold each direction of each node, shape (n_nodes, dim)."""
     holders = np.zeros(problem.mesh.nodes.shape)
     for held in problem.held:
-        holders[np.ix_(held.nodes, held.directions)] += 1
-    return tuple(
-        _resultant(problem, number, positions, reaction / np.maximum(holders, 1), load_factor) for number in moved
-    )
+        holders[held.nodes[:, None], held.directions] += 1
+    return holders
+
+
+def resultant_rows(problem: Problem, support: int, positions: Floats, load_factor: float) -> tuple[Rows, Rows]:
+    """Return what makes force and torque of a support from the reactions of all nodes, at given positions.
+
+    Sparse, shape (dim, n_dof) and (1 or 3, n_dof), for reactions of shape (n_dof,); arguments as support_forces.
+    """
+    held, dim = problem.held[support], problem.mesh.dim
+    dofs = held.nodes[:, None] * dim + np.array(held.directions)
+    shares = 1 / _holders(problem).ravel()[dofs]
+    units = np.eye(dim)[held.directions]  # along each direction that is held
+    arms = positions[held.nodes] - point_of_torque(problem, support, positions, load_factor)
+    forces = np.broadcast_to(units, (len(arms), *units.shape)) * shares[:, :, None]
+    torques = _cross(np.repeat(arms, len(units), axis=0), forces.reshape(-1, dim))
+    size = problem.mesh.nodes.size
+
+    def rows(values: Floats) -> Rows:
+        several, columns = values.T, dofs.ravel()
+        place = np.repeat(np.arange(len(several)), len(columns))
+        return sparse.csr_array((several.ravel(), (place, np.tile(columns, len(several)))), shape=(len(several), size))
+
+    return rows(forces.reshape(-1, dim)), rows(torques)
 
 
 def torque_axes(dim: int) -> str:
@@ -91,20 +121,20 @@ def torque_axes(dim: int) -> str:
     return "xyz" if dim == 3 else "z"
 
 
-def point_of_torque(problem: Problem, support: int, load_factor: float) -> Floats:
-    """Return the point about which the torque of a support is taken at a load factor [m], shape (dim,)."""
-    held, nodes = problem.held[support], problem.mesh.nodes
-    centre = nodes[held.nodes].mean(axis=0) if held.turn is None else nodes[held.nodes[0]] - held.turn.arms[0]
-    return np.asarray(centre + load_factor * held.motion)
+def point_of_torque(problem: Problem, support: int, positions: Floats, load_factor: float) -> Floats:
+    """Return the point about which the torque of a support is taken [m], shape (dim,); arguments as support_forces."""
+    held = problem.held[support]
+    if held.turn is None:
+        return np.asarray(positions[held.nodes].mean(axis=0))
+    about = problem.mesh.nodes[held.nodes[0]] - held.turn.arms[0]
+    return np.asarray(about + load_factor * held.motion)
 
 
-def _resultant(
-    problem: Problem, number: int, positions: Floats, shared: Floats, load_factor: float
-) -> SupportForce:
+def _resultant(problem: Problem, number: int, positions: Floats, shared: Floats, load_factor: float) -> SupportForce:
     held = problem.held[number]
     reaction = np.zeros((len(held.nodes), positions.shape[1]))
-    reaction[:, held.directions] = shared[np.ix_(held.nodes, held.directions)]
-    arms = positions[held.nodes] - point_of_torque(problem, number, load_factor)
+    reaction[:, held.directions] = shared[held.nodes[:, None], held.directions]
+    arms = positions[held.nodes] - point_of_torque(problem, number, positions, load_factor)
     force, torque = reaction.sum(axis=0), _cross(arms, reaction).sum(axis=0)
     size, longest = float(np.linalg.norm(reaction, axis=1).sum()), float(np.linalg.norm(arms, axis=1).max())
     least_force = _VANISHING if held.motion.any() else _IDLE

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from truespring.calibration.identifiability import Identifiability, identifiabil
 from truespring.calibration.objective import Objective, relative_errors
 from truespring.calibration.partial import GAUSS_NEWTON, fit_equilibria
 from truespring.calibration.unknowns import Unknowns, make_unknowns
+from truespring.comparison import Decisive, compare, largest
 from truespring.equilibrium import Path, Status, solve
 from truespring.errors import ModelError, ProblemError
 from truespring.models import GivenSprings, Springs
@@ -51,16 +53,36 @@ class CaseResult:
         known = [one.level for one in self.case.observations if one.quantity == quantity]
         return self.errors(path, quantity).get(max(known)) if known else None
 
+    def decisive(self, path: Path) -> Decisive | None:
+        """Return the error of a path that decides at the last level that is known; None where it does not get there.
+
+        As of a comparison: the larger of the rms error and that of a moved support's force or torque.
+        """
+        last = max(one.level for one in self.case.observations)
+        if self.case.field is not None and self.case.reference is not None and path.states:
+            found = compare(path, self.case.reference)
+            there = np.flatnonzero(np.isclose(found.load_factors, last, rtol=0, atol=1e-9))
+            return found.decisive[int(there[0])] if there.size else None
+        quantities = dict.fromkeys(one.quantity for one in self.case.observations)
+        told = {quantity: self.errors(path, quantity).get(last) for quantity in quantities}
+        errors = [Decisive(error, quantity) for quantity, error in told.items() if error is not None]
+        return largest(errors) if errors else None
+
+    @cached_property
+    def both(self) -> tuple[Decisive | None, Decisive | None]:
+        """What decides under the rule and under the calibrated springs."""
+        return self.decisive(self.before), self.decisive(self.after)
+
     @property
     def quantity(self) -> str:
-        """What the error is told of: the displacement, of a curve of forces alone the force."""
-        told = {one.quantity for one in self.case.observations}
-        return "displacement" if "displacement" in told else "force"
+        """What the error of the calibrated springs is of: displacement, force or torque."""
+        return next((one.quantity for one in self.both[::-1] if one is not None), "displacement")
 
     @property
     def pair(self) -> tuple[float | None, float | None]:
-        """The error under the rule and under the calibrated springs."""
-        return self.error(self.before, self.quantity), self.error(self.after, self.quantity)
+        """The error that decides under the rule and under the calibrated springs."""
+        before, after = (None if one is None or np.isnan(one.error) else one.error for one in self.both)
+        return before, after
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,7 +143,7 @@ class Calibration:
                 "No load was held out: nothing is known of these springs under other loads than those they were "
                 "fitted to."
             )
-        told = [f"{_percent(one.pair[1])} on {one.case.name} ({_percent(one.pair[0])} before)" for one in self.held_out]
+        told = [f"{_off(one.both[1])} on {one.case.name} ({_off(one.both[0])} before)" for one in self.held_out]
         return f"On loads that took no part the calibrated springs are off by {_joined(told)}."
 
     @property
@@ -152,6 +174,13 @@ class Calibration:
 
 def _percent(share: float | None) -> str:
     return "no equilibrium" if share is None else f"{100 * share:.2g} %"
+
+
+def _off(error: Decisive | None) -> str:
+    """An error, and of what it is where that is not the displacement."""
+    if error is None or np.isnan(error.error):
+        return _percent(None)
+    return _percent(error.error) + ("" if error.quantity == "displacement" else f" in the {error.quantity}")
 
 
 def _joined(parts: Sequence[str]) -> str:
@@ -272,7 +301,7 @@ def _warnings(unknowns: Unknowns, values: Floats, results: Sequence[CaseResult])
         before, after = one.pair
         if one.held_out and before is not None and (after is None or after > before):
             yield (
-                f"{one.case.name}: calibration made it worse, from {_percent(before)} to {_percent(after)}: springs "
+                f"{one.case.name}: calibration made it worse, from {_off(one.both[0])} to {_off(one.both[1])}: springs "
                 "fitted to some loads are not better under all"
             )
     gone = [name for name, value in zip(unknowns.names, values, strict=True) if value < 1e-3]

@@ -1,6 +1,6 @@
 """Load cases of a calibration: a problem, and what is known of how its body answers."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ from truespring.equilibrium import Path
 from truespring.errors import ProblemError
 from truespring.mesh import Grid
 from truespring.problem import Problem
+from truespring.reactions import SupportForce, leading_support, resultant_rows
 from truespring.solvers import Newton
 
 # Levels this near are one.
@@ -25,16 +26,17 @@ Rows = sparse.csr_array[Any, tuple[int, int]]
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What is known of an equilibrium at one level: `rows` times displacement, or times the force of the supports.
+    """What is known of an equilibrium at one level: `rows` times displacement, or times the reactions.
 
     Attributes:
         level: the load factor.
-        quantity: "displacement" [m] or "force" [N].
+        quantity: "displacement" [m], "force" [N] or "torque" [N m] of a support.
         rows: sparse, shape (m, n_dof).
         data: shape (m,).
         scale: by which the objective divides errors: the norm of the like data at the last level that is known, so that
             what is small at first counts little; of forces no less than the total load.
-        whole: whether it is the displacement of all nodes, of which equilibrium itself may be asked.
+        whole: whether the displacement of all nodes is known, of which equilibrium itself may be asked.
+        support: the number of the support whose force or torque it is.
     """
 
     level: float
@@ -43,6 +45,7 @@ class Observation:
     data: Floats
     whole: bool = False
     scale: float = 1.0
+    support: int | None = None
 
     @property
     def size(self) -> float:
@@ -104,9 +107,9 @@ class LoadCase:
         known: list[Observation] = []
         for source in (self._of_field, self._of_markers, self._of_curve):
             found = [one for level in self.levels for one in source(level)]
-            for quantity in ("displacement", "force"):
-                like = [one for one in found if one.quantity == quantity and one.size]
-                least = self._load if quantity == "force" else 0.0
+            for kind in dict.fromkeys((one.quantity, one.support) for one in found):
+                like = [one for one in found if (one.quantity, one.support) == kind and one.size]
+                least = self._load if kind[0] == "force" else 0.0
                 known += [replace(one, scale=max(like[-1].size, least)) for one in like]
         return tuple(sorted(known, key=lambda one: one.level))
 
@@ -127,12 +130,25 @@ class LoadCase:
         state = path.at(level)
         if state is None:
             return
-        dofs = (nodes[:, None] * self.problem.mesh.dim + np.arange(self.problem.mesh.dim)).ravel()
-        whole = len(nodes) == self.problem.mesh.n_nodes
-        yield Observation(level, "displacement", self._picked(dofs), state.displacement.ravel()[dofs], whole)
-        if self.moved.any() and np.isfinite(state.reaction).all():
-            rows = self._pull()
-            yield Observation(level, "force", rows, rows @ state.reaction.ravel())
+        dim = self.problem.mesh.dim
+        told = nodes[~self.problem.loading.held[nodes].all(axis=1)]  # of others the displacement is prescribed
+        dofs = (told[:, None] * dim + np.arange(dim)).ravel()
+        if dofs.size:
+            whole = len(nodes) == self.problem.mesh.n_nodes
+            yield Observation(level, "displacement", self._picked(dofs), state.displacement.ravel()[dofs], whole)
+        yield from self._of_supports(path.support_forces(state), state.positions, level)
+
+    def _of_supports(self, forces: Sequence[SupportForce], positions: Floats, level: float) -> Iterator[Observation]:
+        """What moved supports take: forces, and torques where the support holds its nodes in all directions.
+
+        The arms of a torque are then prescribed; where nodes slide they change with what is sought.
+        """
+        for one in forces:
+            force, torque = resultant_rows(self.problem, one.support, positions, level)
+            if one.has_force:
+                yield Observation(level, "force", force, one.force, support=one.support)
+            if one.has_torque and len(self.problem.held[one.support].directions) == self.problem.mesh.dim:
+                yield Observation(level, "torque", torque, one.torque, support=one.support)
 
     def _of_markers(self, level: float) -> Iterator[Observation]:
         reference = self.reference
@@ -163,21 +179,15 @@ class LoadCase:
         if self.curve is None:
             return
         for quantity, axes, data in self.curve.at(level):
-            whole = self._pull() if quantity == "force" else self._probe(self.curve.probe)
+            whole = self._pull(level) if quantity == "force" else self._probe(self.curve.probe)
             yield Observation(level, quantity, sparse.csr_array(whole[axes]), data)
 
-    @property
-    def moved(self) -> Any:
-        """Whether each node is moved by a support, and not against the largest motion, as in Path.applied_force."""
-        motion = self.problem.loading.motion()
-        largest = motion[np.linalg.norm(motion, axis=1).argmax()]
-        return motion.any(axis=1) & (motion @ largest >= 0)
-
-    def _pull(self) -> Rows:
-        """What sums the forces of supports that move, shape (dim, n_dof)."""
-        dim, nodes = self.problem.mesh.dim, np.flatnonzero(self.moved)
-        rows, columns = np.tile(np.arange(dim), len(nodes)), (nodes[:, None] * dim + np.arange(dim)).ravel()
-        return sparse.csr_array((np.ones(len(columns)), (rows, columns)), shape=(dim, self.problem.mesh.nodes.size))
+    def _pull(self, level: float) -> Rows:
+        """What sums the reactions of the support that moves most, whose force a curve tells, shape (dim, n_dof)."""
+        support = leading_support(self.problem)
+        assert support is not None  # a motion drives the body
+        force, _ = resultant_rows(self.problem, support, self.problem.mesh.nodes, level)
+        return force
 
     def _probe(self, node: int) -> Rows:
         dim = self.problem.mesh.dim

@@ -66,7 +66,7 @@ def _at_level(unknowns: Unknowns, case: LoadCase, state: State, level: float) ->
     applied = case.problem.loading.force(state.positions, level).ravel()
     rows, right = [forces[case.free]], [applied[case.free]]
     for one in case.observations:
-        if one.level == level and one.quantity == "force":
+        if one.level == level and one.quantity != "displacement":
             rows.append(one.rows @ forces)
             right.append(one.data + one.rows @ applied)
     stacked = np.concatenate(right)

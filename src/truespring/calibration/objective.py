@@ -101,8 +101,8 @@ class Objective:
         """Return dJ/dc by the adjoint, one linear system a level whatever the number of unknowns, shape (n,).
 
         With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
-        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces of supports r = G (f - F) - y, which depends on c by itself
-        too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
+        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends on
+        c by itself too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
         """
         seen = self._seen(values)
         if seen is None:
@@ -114,7 +114,7 @@ class Objective:
             for one in group:
                 scaled = (self._weights / one.observation.scale) ** 2 * _misfit(one)
                 back = (one.observation.rows.T @ scaled).reshape(tangent.shape)
-                if one.observation.quantity == "force":
+                if one.observation.quantity != "displacement":
                     direct += back
                     right += tangent.apply(back)
                 else:
@@ -135,7 +135,7 @@ class Objective:
             moves = np.stack([-tangent.solve(push.reshape(tangent.shape)).ravel() for push in pushes], axis=1)
             for one in group:
                 change = moves
-                if one.observation.quantity == "force":
+                if one.observation.quantity != "displacement":
                     pulled = [tangent.apply(move.reshape(tangent.shape)).ravel() for move in moves.T]
                     change = np.stack(pulled, axis=1) + pushes.T
                 blocks[id(one)] = self._weights / one.observation.scale * (one.observation.rows @ change)
@@ -206,15 +206,12 @@ class _At:
 def relative_errors(case: LoadCase, path: Path, quantity: str = "displacement") -> dict[float, float]:
     """Return, by load factor, the relative error of a path: distance over size of what is known there.
 
-    Of displacements that is what a comparison calls the rms error; of forces the size is that of the last level, and no
-    less than the total load, beside which a support's force may be nothing.
+    Of displacements that is what a comparison calls the rms error, of forces and torques the largest of all supports.
     """
-    found: dict[float, tuple[float, float]] = {}
+    found: dict[float, float] = {}
     for one in case.observations:
         state = path.at(one.level)
-        if one.quantity != quantity or state is None:
-            continue
-        off, size = found.get(one.level, (0.0, 0.0))
-        own = one.size if quantity == "displacement" else one.scale
-        found[one.level] = off + float((_misfit(_Seen(0, one, state)) ** 2).sum()), size + own**2
-    return {level: float(np.sqrt(off / size)) for level, (off, size) in found.items()}
+        if one.quantity == quantity and state is not None:
+            error = float(np.linalg.norm(_misfit(_Seen(0, one, state)))) / one.size
+            found[one.level] = max(found.get(one.level, 0.0), error)
+    return found

@@ -227,7 +227,7 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
 def over_title(result: Result, level: float, comparison: Comparison) -> str:
     """Return the level at which the two paths of a comparison are drawn, and how far they are apart."""
     at = level_name(result, level).capitalize()
-    if comparison.load_factors.size:
+    if comparison.load_factors.size and np.isfinite(comparison.rms_errors[-1]):
         return f"{at}: {percent(float(comparison.rms_errors[-1]))} apart (root mean square)"
     if comparison.surface is not None:
         return f"{at}: outlines {quantity(comparison.surface.outline_rms, 'm', 2)} apart (root mean square)"

@@ -11,9 +11,8 @@ from weakref import WeakKeyDictionary
 
 from truespring.report.bodies import distance_figure, over_figure, undeformed_figure
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
-from truespring.report.curves import moved_supports
 from truespring.report.frame3d import figure_of, shot
-from truespring.report.plots import curves_figure, error_figure, moduli_figure, reactions_figure
+from truespring.report.plots import curves_figure, error_figure, moduli_figure, reactions_figure, tells_reactions
 from truespring.report.render import render
 from truespring.report.result import Result
 from truespring.report.sheet import Sheet
@@ -87,7 +86,7 @@ def _draw(result: Result) -> Iterator[_Named]:
     bodies = _bodies_in_space(result) if result.problem.mesh.dim == 3 else lambda: _plane_bodies(result)
     if any(len(path.states) > 1 for path in result.paths.values()):
         yield "curves", curves_figure(result), ""
-        if not result.problem.loading.driven_by_motion and moved_supports(result.problem):
+        if tells_reactions(result):
             yield "reactions", reactions_figure(result), ""
     if any(one.load_factors.size for one in result.comparisons.values()):
         yield "error", error_figure(result), ""

@@ -23,6 +23,7 @@ from truespring.report.figures import Drawing, distance_name, over_name, render_
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.standing import own_errors
+from truespring.report.supports import support_rows
 from truespring.report.verdict import (
     carrying_sentence,
     cause_sentence,
@@ -136,6 +137,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "full": level_name(result, 1.0),
         "tolerance": tolerance_percent(result.tolerance),
         "measures": _measures(result),
+        "supports": list(support_rows(result)),
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
         "models": [_model_row(name, path) for name, path in result.paths.items()],
         "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],
@@ -241,7 +243,7 @@ def _in_short(result: Result) -> str:
 
 
 def _measures(result: Result) -> list[str]:
-    """The errors of the comparison table, in the order of _comparison_row; the force where a motion drives."""
+    """The errors of the comparison table, in the order of _comparison_row; the force where supports move."""
     forced = any(one.force_error is not None for one in result.comparisons.values())
     return ["root mean square", "at the probe", "largest", *(["force"] if forced else [])]
 
@@ -261,7 +263,7 @@ def _comparison_row(result: Result, name: str) -> dict[str, Any]:
 
 def _apart(one: Comparison, in_detail: bool) -> Iterator[str]:
     """Distances in metres, and of energies, beside the relative errors of a comparison."""
-    if in_detail and one.load_factors.size:
+    if in_detail and one.load_factors.size and one.compared.any():
         rms, most = (float(several[-1]) for several in (one.rms_distances, one.max_distances))
         yield f"nodes {quantity(rms, 'm', 2)} apart (root mean square), {quantity(most, 'm', 2)} at most"
     if one.surface is not None:

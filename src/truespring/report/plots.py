@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.report.curves import moved_supports, reaction_of
+from truespring.equilibrium import Path, State
+from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
@@ -71,40 +72,57 @@ def curves_figure(result: Result) -> Sheet:
 
 
 def _is_balanced(result: Result) -> bool:
-    """Whether the loads have no total, as their sum is rounding beside them, or it is not known of a path."""
+    """Whether the force has no total: loads or reactions that cancel, or it is not known of a path."""
     forces = np.array([path.applied_force(path.states[-1]) for path in result.paths.values() if path.states])
     if not np.isfinite(forces).all() or (not result.problem.stated and not forces.any()):
         return True
     if not result.problem.stated:
         return False
     if result.problem.loading.driven_by_motion:
-        return False
+        leading = [_of_leading(path, path.states[-1]) for path in result.paths.values() if path.states]
+        return not any(one is not None and one.has_force for one in leading)
     force = result.problem.loading.force(result.problem.mesh.nodes)
     return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
 
 
+def _of_leading(path: Path, state: State) -> SupportForce | None:
+    """Force and torque of the support that moves most, None where they are not known."""
+    number = leading_support(path.problem) if path.problem.stated else None
+    return next((one for one in path.support_forces(state) if one.support == number), None)
+
+
+def tells_reactions(result: Result) -> bool:
+    """Whether what moved supports take is a figure of its own: beside loads, and where one is turned."""
+    problem = result.problem
+    moved = moved_supports(problem)
+    if not any(path.support_forces(state) for path in result.paths.values() for state in path.states[:1]):
+        return False
+    return not problem.loading.driven_by_motion or any(problem.held[number].turn is not None for number in moved)
+
+
 def reactions_figure(result: Result) -> Sheet:
-    """The force of the support that is moved most, along its way, against how far it is moved."""
-    held, nodes = result.problem.held, result.problem.mesh.nodes
-    moved = [(number, held[number].nodes) for number in moved_supports(result.problem)]
-    motion = result.problem.loading.motion()
-    number, at = max(moved, key=lambda one: float(np.linalg.norm(motion[one[1]].mean(axis=0))))
-    way = motion[at].mean(axis=0)
-    turned = np.linalg.norm(way) <= 1e-9 * np.linalg.norm(nodes.max(axis=0) - nodes.min(axis=0))
+    """What the support takes that is moved most: its force along its way, or its torque where it is only turned."""
+    number = leading_support(result.problem)
+    assert number is not None  # tells_reactions
+    held = result.problem.held[number]
+    turned = held.turn is not None and not held.motion.any()
     styles = path_styles(result)
     forces, moves = {}, {}
     for name, path in result.paths.items():
-        if path.has_reactions:
-            both = [reaction_of(path, state, number) for state in path.states]
-            if turned:  # about its own middle: its moment against the angle
-                axis = held[number].turn.axis if len(both[0][1]) == 3 else np.ones(1)  # type: ignore[union-attr]
-                forces[name] = np.array([float(moment @ axis) for _, moment in both])
-                moves[name] = path.load_factors * np.degrees(held[number].turn.angle)  # type: ignore[union-attr]
-            else:
-                forces[name] = np.array([float(force @ way) for force, _ in both]) / np.linalg.norm(way)
-                moves[name] = np.array([float(state.displacement[at].mean(axis=0) @ way) for state in path.states])
-                moves[name] /= np.linalg.norm(way)
-    unit, letter = ("N m", "moment") if turned else ("N", "force")
+        both = [(state, _of_leading(path, state)) for state in path.states]
+        told = [(state, one) for state, one in both if one is not None]
+        if not told:
+            continue
+        factors = np.array([state.load_factor for state, _ in told])
+        if turned and held.turn is not None:
+            axis = held.turn.axis if result.problem.mesh.dim == 3 else np.ones(1)
+            forces[name] = np.array([float(one.torque @ axis) for _, one in told])
+            moves[name] = factors * np.degrees(held.turn.angle)
+        else:
+            way = held.motion / np.linalg.norm(held.motion)
+            forces[name] = np.array([float(one.force @ way) for _, one in told])
+            moves[name] = factors * np.linalg.norm(held.motion)
+    unit, letter = ("N m", "torque") if turned else ("N", "force")
     x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), unit)
     y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
     size, name_of_y = (
@@ -120,19 +138,22 @@ def reactions_figure(result: Result) -> Sheet:
         )
         for name in forces
     ]
-    title = "What it takes to move the support" if len(moved) == 1 else f"What it takes to move support {number + 1}"
+    several = len(moved_supports(result.problem)) > 1
+    title = f"What it takes to move support {number + 1}" if several else "What it takes to move the support"
     return plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
 
 
 def error_figure(result: Result) -> Sheet:
-    """Rms error against every reference, level by level, beside the tolerance."""
+    """Error against every reference, level by level, beside the tolerance: of displacement, or of force if larger."""
     from matplotlib.patches import Rectangle
 
     styles = path_styles(result)
+    forced = any(np.isfinite(one.force_errors).any() for one in result.comparisons.values())
+    name_of_y = "rms error or error of a force, the larger [%]" if forced else "rms error [%]"
     curves = [
         Curve(
             one.load_factors,
-            100 * np.asarray(one.rms_errors),
+            100 * one.errors,
             *styles[name],
             label=_two_lines(result, name),
             strong=False,
@@ -144,7 +165,7 @@ def error_figure(result: Result) -> Sheet:
     within = f"within {tolerance_percent(result.tolerance)}"
     curves.append(Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    area = plot(f"Error of {who} against each reference", "load factor", "rms error [%]", curves, to_right=1.02)
+    area = plot(f"Error of {who} against each reference", "load factor", name_of_y, curves, to_right=1.02)
     area.add(Rectangle((0, 0), 1.02, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
     return area.sheet
 
@@ -157,10 +178,17 @@ def _two_lines(result: Result, name: str) -> str:
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
-def plot(title: str, x_label: str, y_label: str, curves: Sequence[Curve], to_right: float | None = None) -> Area:
+def plot(
+    title: str,
+    x_label: str,
+    y_label: str,
+    curves: Sequence[Curve],
+    to_right: float | None = None,
+    far: bool = False,
+) -> Area:
     """Curves with their names at their ends, moved apart where they would meet.
 
-    The axes end at 0 or below and, with `to_right`, span 0 to that.
+    The axes end at 0 or below, but for values that lie `far` from 0, and, with `to_right`, span 0 to that.
     """
     from matplotlib.lines import Line2D
 
@@ -172,7 +200,7 @@ def plot(title: str, x_label: str, y_label: str, curves: Sequence[Curve], to_rig
     sheet = Sheet(max(5.9, left + 3.2 + right), bottom + height + top, title)
     low, high = _span([curve.y for curve in curves])
     x = _span([curve.x for curve in curves]) if to_right is None else (0.0, to_right)
-    y = (min(low, 0.0) if to_right is None else 0.0, high)
+    y = (low if far else min(low, 0.0) if to_right is None else 0.0, high)
     area = Area(sheet, left, bottom, sheet.width - left - right, height, x, y)
     draw_frame(area, x_label, y_label)
     draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)

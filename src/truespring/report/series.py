@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
 from truespring.equilibrium import Path, State
 from truespring.mesh import Mesh, Surface
@@ -45,11 +45,14 @@ def write_series(path: Path, folder: FilePath, name: str) -> None:
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
 
 
-def write_mesh(mesh: Mesh, file: FilePath) -> None:
-    """Write the body at rest by its elements as VTU [m]."""
+def write_mesh(mesh: Mesh, file: FilePath, held: Bools) -> None:
+    """Write the body at rest by its elements as VTU [m], with the directions of nodes that supports hold as 1."""
     import meshio
 
-    meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)]).write(file, file_format="vtu")
+    body = meshio.Mesh(
+        _in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data={"held": _in_space(held.astype(float))}
+    )
+    body.write(file, file_format="vtu")
 
 
 def _state_mesh(path: Path, state: State) -> "meshio.Mesh":

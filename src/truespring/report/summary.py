@@ -6,9 +6,10 @@ from importlib.metadata import version
 from typing import Any
 
 from truespring.arrays import Floats
-from truespring.comparison import Comparison
+from truespring.comparison import Comparison, SupportError
 from truespring.equilibrium import Path
 from truespring.models import FemPotential, Moduli
+from truespring.reactions import moved_supports
 from truespring.report.result import Result
 
 
@@ -94,8 +95,8 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
         "max_error": comparison.max_error,
         "agrees_up_to_load_factor": comparison.agrees_up_to_load_factor,
     }
-    if comparison.force_error is not None:
-        values["force_error"] = comparison.force_error
+    if moved_supports(comparison.model.problem):
+        values |= _of_forces(comparison, None if comparison.error is None else -1)
     if (surface := comparison.surface) is not None:
         values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
         values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
@@ -108,6 +109,29 @@ def _standing(result: Result, name: str) -> dict[str, float | None]:
     return {
         "reference_error": known.value if known else None,
         "refined_error": known.refined_error if known else None,
+    }
+
+
+def _of_forces(comparison: Comparison, level: int | None) -> dict[str, Any]:
+    """The errors of what moved supports take at a level by its number, and what decides there."""
+    if level is None:
+        return {"force_error": None, "decided_by": None, "supports": []}
+    return {
+        "force_error": _known(float(comparison.force_errors[level])),
+        "decided_by": comparison.decisive[level].quantity or None,
+        "supports": [_support(one) for one in comparison.support_errors[level]],
+    }
+
+
+def _support(one: SupportError) -> dict[str, Any]:
+    return {
+        "support": one.mine.support + 1,
+        "on": one.mine.name,
+        "force": {"model": one.mine.force.tolist(), "reference": one.theirs.force.tolist()},
+        "torque": {"model": one.mine.torque.tolist(), "reference": one.theirs.torque.tolist()},
+        "force_error": one.force_error,
+        "torque_error": one.torque_error,
+        "share_of_load": one.share_of_load,
     }
 
 
@@ -131,6 +155,7 @@ def difference(result: Result) -> dict[str, Any]:
         "rms_error": last(one.rms_errors),
         "max_error": last(one.max_errors),
         "probe_error": last(one.probe_errors),
+        **(_of_forces(one, -1) if any(one.support_errors) else {}),
         "energy_error": one.energy_error,
         "rms_distance": last(one.rms_distances),
         "max_distance": last(one.max_distances),
@@ -144,9 +169,18 @@ def difference(result: Result) -> dict[str, Any]:
         "agrees_up_to_load_factor": one.agrees_up_to_load_factor,
         "tolerance": one.tolerance,
         "levels": [
-            {"load_factor": level, "rms_error": _known(error), "rms_distance": distance}
-            for level, error, distance in zip(
-                one.load_factors.tolist(), one.rms_errors.tolist(), one.rms_distances.tolist(), strict=True
+            {
+                "load_factor": level,
+                "rms_error": _known(error),
+                "rms_distance": _known(distance),
+                **({"force_error": _known(forced)} if any(one.support_errors) else {}),
+            }
+            for level, error, distance, forced in zip(
+                one.load_factors.tolist(),
+                one.rms_errors.tolist(),
+                one.rms_distances.tolist(),
+                one.force_errors.tolist(),
+                strict=True,
             )
         ],
         "warnings": [f"{who}: {warning}" for who, path in result.paths.items() for warning in path.warnings],

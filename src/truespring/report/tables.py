@@ -1,14 +1,16 @@
 """Tables for a terminal, as rich renderables: moduli before a solve, status and errors after it."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
+from truespring.report.settling import settling_rows
 from truespring.report.standing import own_errors
 from truespring.report.summary import difference
+from truespring.report.supports import support_rows
 from truespring.report.verdict import verdict
-from truespring.settling import Settling
+from truespring.settling import Refinement
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -84,6 +86,9 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     yield table
     if result.comparisons:
         yield _error_table(result)
+        supports = _support_table(result)
+        if supports is not None:
+            yield supports
     yield verdict(result)
     for note in result.problem.mesh.notes:
         yield f"note: mesh: {note}"
@@ -99,11 +104,14 @@ def difference_tables(result: Result) -> "Iterator[Table | str]":
     table = _table(result.title, "", "")
     table.show_header = False
     for key, what in _DIFFERENCES.items():
-        if (value := values[key]) is not None:
+        if (value := values.get(key)) is not None:
             table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")
     table.add_row("compared", "node by node" if one.node_by_node else "at nodes of one, carried from the other")
     table.add_row("nodes", f"{len(one.outside):,}, {one.n_outside:,} outside")
     yield table
+    supports = _support_table(result)
+    if supports is not None:
+        yield supports
     yield verdict(result)
     for warning in values["warnings"]:
         yield f"warning: {warning}"
@@ -114,6 +122,7 @@ _DIFFERENCES = {
     "rms_error": "root-mean-square error",
     "max_error": "largest error",
     "probe_error": "error at the probe",
+    "force_error": "error of the supports' force or torque",
     "energy_error": "error of the stored energy",
     "rms_distance": "root-mean-square distance [m]",
     "max_distance": "largest distance [m]",
@@ -122,30 +131,44 @@ _DIFFERENCES = {
 }
 
 
-def settling_table(title: str, several: Iterable[Settling]) -> "Table":
-    """Return what quantities come to on finer meshes: value, change, order, extrapolated value, error."""
+def settling_table(title: str, found: Refinement) -> "Table":
+    """Return what quantities come to on finer meshes: value, order, extrapolated value, error, and what they tell."""
     table = _table(title, "model", "", "value", "order", "at h = 0", "error", "")
-    for one in several:
-        order = "-" if one.order is None else f"{one.order:.2f}"
-        limit = "-" if one.extrapolated is None else f"{one.extrapolated:.6g}"
-        error = "-" if one.error is None else f"{one.error:.2%}"
-        value = f"{one.values[-1]:.6g} {one.unit}"
-        table.add_row(one.model, one.quantity, value, order, limit, error, "settled" if one.settled else "")
+    for row in settling_rows(found):
+        table.add_row(*row)
     return table
 
 
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
-    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", "itself")
+    by = ("by",) if forced else ()
+    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "itself")
     table = _table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
-        shown = ("-" if error is None else f"{error:.2%}" for error in errors)
         up_to = one.agrees_up_to_load_factor
-        table.add_row(
-            name, one.reference.label, *shown, "-" if up_to is None else f"{up_to:.6g}", own_errors(result, name)[0]
-        )
+        shown = [*map(_share, errors), "-" if up_to is None else f"{up_to:.6g}"]
+        shown += [one.decided_by or "-"] if forced else []
+        table.add_row(name, one.reference.label, *shown, own_errors(result, name)[0])
     return table
+
+
+def _support_table(result: Result) -> "Table | None":
+    """Force and torque of each moved support, of the model and of each reference; None where none are known."""
+    rows = list(support_rows(result))
+    if not rows:
+        return None
+    loaded = any(row.share_of_load for row in rows)
+    columns = ("", f"'{result.model}'", "reference", "error", *(("of the load",) if loaded else ()))
+    table = _table("What moved supports take", "support", *columns)
+    for row in rows:
+        shares = [row.share_of_load or "-"] if loaded else []
+        table.add_row(row.support, f"{row.quantity}, {row.label}", row.mine, row.theirs, row.error or "-", *shares)
+    return table
+
+
+def _share(error: float | None) -> str:
+    return "-" if error is None else f"{error:.2%}"
 
 
 def _table(title: str, *columns: str) -> "Table":

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.comparison import Comparison
+from truespring.comparison import Comparison, SupportError, decisive
 from truespring.equilibrium import Path, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
 from truespring.models import Fem, FemPotential, Moduli
+from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.standing import equally_wrong_sentence, own_error_sentence
@@ -33,7 +34,8 @@ def closest_sentence(result: Result) -> str | None:
         return None
     error = result.comparisons[name].rms_error
     assert error is not None  # what Result.closest chooses by
-    return f"Nearest at {_full(result)} is {display_name(result, name)}, {percent(error)} off."
+    what = " in displacement" if result.comparisons[name].force_error is not None else ""
+    return f"Nearest{what} at {_full(result)} is {display_name(result, name)}, {percent(error)} off."
 
 
 def cause_sentence(result: Result) -> str | None:
@@ -92,27 +94,65 @@ def reach(result: Result, one: Comparison) -> str:
 
 
 def force_sentence(result: Result) -> str | None:
-    """Return the forces that a prescribed motion needs in each model; None where loads are given.
+    """Return what each moved support takes in each model, force and torque; None where none moves or is known.
 
-    A force is positive along the motion, and negative where the body has to be held back.
+    Along the support's own motion: a force is positive along its displacement, a torque about the axis of its turn,
+    and negative where the body has to be held back.
     """
-    if not _driven_by_motion(result) or result.model is None:
+    if result.model is None or not result.paths[result.model].states:
         return None
     model = result.paths[result.model]
     level = model.load_factor
-    if not model.has_reactions or not level:
-        return None
-    to = drive(result)
-    own = quantity(to.along(model.applied_force(model.states[-1])), "N")
-    parts = [f"The force it takes at {level_name(result, level)}, along {to.name}: {_subject(result)[0]} {own}"]
-    for name, one in result.comparisons.items():
-        state = one.reference.at(level)
-        if state is None or not one.reference.has_reactions:
-            continue
-        force = quantity(to.along(one.reference.applied_force(state)), "N")
-        apart = "" if one.force_error is None else f" ({percent(one.force_error)} off)"
-        parts.append(f"{display_name(result, name)} {force}{apart}")
-    return ", ".join(parts) + "."
+    found = [
+        sentence
+        for one in (model.support_forces(model.states[-1]) if level else ())
+        for sentence in _taken(result, level, one)
+    ]
+    return " ".join(found) or None
+
+
+def _taken(result: Result, level: float, own: SupportForce) -> Iterator[str]:
+    """What a support takes along its displacement and about the axis of its turn, a sentence each."""
+    problem = result.problem
+    if not problem.stated or result.model is None:
+        return
+    held = problem.held[own.support]
+    several = len(moved_supports(problem)) > 1
+    ways: list[tuple[str, Floats, str, str]] = []
+    if held.motion.any():
+        ways.append(("force", held.motion / np.linalg.norm(held.motion), "N", f", along {_axis_name(held.motion)}"))
+    if held.turn is not None:
+        axis = held.turn.axis if problem.mesh.dim == 3 else np.ones(1)
+        ways.append(("torque", axis * np.sign(held.turn.angle), "N m", ", along its turn"))
+    for what, way, unit, along in ways:
+
+        def told(one: SupportForce, what: str = what, way: Floats = way, unit: str = unit) -> str:
+            return quantity(float((one.force if what == "force" else one.torque) @ way), unit)
+
+        to_move = f" to move {own.name}" if several else ""
+        parts = [
+            f"The {what} it takes{to_move} at {level_name(result, level)}{along}: {_subject(result)[0]} {told(own)}"
+        ]
+        for name, one in result.comparisons.items():
+            error = next((e for pairs in _at(one, level) for e in pairs if e.mine.support == own.support), None)
+            if error is not None:
+                off = error.force_error if what == "force" else error.torque_error
+                apart = "" if off is None else f" ({percent(off)} off)"
+                parts.append(f"{display_name(result, name)} {told(error.theirs)}{apart}")
+        yield ", ".join(parts) + "."
+
+
+def _at(one: Comparison, level: float) -> list[tuple[SupportError, ...]]:
+    """The errors of supports at a level, none where it is not compared."""
+    return [one.support_errors[place] for place in np.flatnonzero(one.load_factors == level)]
+
+
+def _axis_name(vector: Floats) -> str:
+    """A direction as people write it: x, −y; of several components the way itself."""
+    if np.count_nonzero(vector) > 1:
+        return "its way"
+    axis = int(np.abs(vector).argmax())
+    return Drive(axis, float(np.sign(vector[axis]))).name
 
 
 def mesh_sentence(result: Result) -> str | None:
@@ -285,15 +325,20 @@ def drive(result: Result) -> Drive:
         axis = int(np.abs(moved).argmax())
         return Drive(axis, float(np.sign(moved[axis])))
     loading = result.problem.loading
+    leading = leading_support(result.problem)
+    if _driven_by_motion(result) and leading is not None:
+        held = result.problem.held[leading]
+        return _largest(held.motion[None] if held.motion.any() else loading.motion()[held.nodes])
     force = loading.force(result.problem.mesh.nodes)
     total = force.sum(axis=0)
-    # Loads that balance each other have no total: the largest single one decides, and so for motions.
-    each = loading.motion() if _driven_by_motion(result) else force
-    largest = each.ravel()[np.abs(each).argmax()]
-    if _driven_by_motion(result) or np.abs(total).max() <= 1e-9 * abs(largest):
-        return Drive(int(np.abs(each).argmax()) % each.shape[1], float(np.sign(largest)))
-    axis = int(np.abs(total).argmax())
-    return Drive(axis, float(np.sign(total[axis])))
+    # Loads that balance each other have no total: the largest single one decides.
+    return _largest(force if np.abs(total).max() <= 1e-9 * np.abs(force).max() else total[None])
+
+
+def _largest(vectors: Floats) -> Drive:
+    """The direction of the largest component of several vectors."""
+    place = int(np.abs(vectors).argmax())
+    return Drive(place % vectors.shape[1], float(np.sign(vectors.ravel()[place])))
 
 
 # --- what the sentences are made of -------------------------------------------------------------
@@ -399,7 +444,7 @@ def _runs(one: Comparison) -> list[tuple[float, float]]:
     """First and last level of each stretch of neighbouring levels within the tolerance."""
     runs: list[tuple[float, float]] = []
     neighbour = False
-    for level, error in zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True):
+    for level, error in zip(one.load_factors.tolist(), one.errors.tolist(), strict=True):
         if error < one.tolerance:
             runs[len(runs) - neighbour :] = [(runs[-1][0] if neighbour else level, level)]
         neighbour = error < one.tolerance
@@ -419,16 +464,30 @@ def _rank(one: Comparison) -> tuple[float, bool, float]:
     """Agreement that reaches farthest from zero first, none last, then the smaller error."""
     runs = _runs(one)
     from_zero = runs[0][1] if runs and runs[0][0] == one.load_factors[0] else 0.0
-    return -from_zero, not runs, float(one.rms_errors[-1])
+    return -from_zero, not runs, float(one.errors[-1])
 
 
 def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
     """The errors at full load, smallest first; None where no reference meets the model there."""
-    met = {name: one.rms_error for name, one in measured.items() if one.rms_error is not None}
+    met = {name: one.error for name, one in measured.items() if one.error is not None}
     if not met:
         return None
-    parts = [f"{display_name(result, name)} {percent(met[name])}" for name in sorted(met, key=lambda name: met[name])]
-    return f"at {_full(result)}: {', '.join(parts)}"
+    parts = [f"{display_name(result, name)} {_off(measured[name])}" for name in sorted(met, key=lambda name: met[name])]
+    # Several errors of one reference have commas between them.
+    between = "; " if any(np.isfinite(one.force_errors[-1]) for one in measured.values()) else ", "
+    return f"at {_full(result)}: {between.join(parts)}"
+
+
+def _off(one: Comparison) -> str:
+    """How far the last level is off, the error that decides first; with forces, what each error is of."""
+    displacement = float(one.rms_errors[-1])
+    found = [(displacement, "in displacement")] if np.isfinite(displacement) else []
+    several = len({error.mine.support for error in one.support_errors[-1]}) > 1
+    largest = decisive(np.nan, one.support_errors[-1])
+    if not largest.quantity:
+        return percent(displacement)
+    found.append((largest.error, f"in the {largest.quantity}{f' of {largest.support}' if several else ''}"))
+    return ", ".join(f"{percent(error)} {what}" for error, what in sorted(found, reverse=True))
 
 
 def _meets_at_full_load(one: Comparison) -> bool:
@@ -440,8 +499,8 @@ def _short_of_full_load(result: Result, name: str, one: Comparison) -> str:
     if one.load_factors.size:
         level = float(one.load_factors[-1])
         if one.agrees_up_to_load_factor is None:
-            return f"{who} is known at load factor {level:.4g} only, there {percent(one.rms_errors[-1])}."
-        return f"with {who} the comparison ends at load factor {level:.4g}, there {percent(one.rms_errors[-1])}."
+            return f"{who} is known at load factor {level:.4g} only, there {_off(one)}."
+        return f"with {who} the comparison ends at load factor {level:.4g}, there {_off(one)}."
     if one.surface is None and one.hausdorff is not None:
         apart = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
         return "the surfaces lie {} (root mean square) and at most {} apart.".format(*apart)

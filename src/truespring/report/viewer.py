@@ -105,7 +105,7 @@ def _path(
         "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
         "force": [_force(to.along(path.applied_force(state))) for state in states],
         "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
-        "errors": [None if error is None else percent(error) for error in errors],
+        "errors": [None if error is None or np.isnan(error) else percent(error) for error in errors],
         "surface": None,
     }
     if rest.shape[1] == 3:

@@ -1,5 +1,6 @@
 """Study files: read, checked, run."""
 
+from truespring.settling import Refinement as Refinement
 from truespring.study.changes import value_at as value_at
 from truespring.study.compare import compare_sources as compare_sources
 from truespring.study.compare import read_probe as read_probe

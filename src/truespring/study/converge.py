@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,8 +13,9 @@ from truespring.equilibrium import Path as Equilibria
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
-from truespring.settling import Settling, beside, settle
-from truespring.study.read import Entry, Study, read_study
+from truespring.report.settling import render_settling
+from truespring.settling import Attempt, Refinement, refinement
+from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 
 
@@ -23,45 +24,43 @@ def converge(
     tolerance: float = 0.01,
     most: int = 5,
     report: Callable[[Study, str], None] | None = None,
-) -> Iterator[list[Settling]]:
+) -> Iterator[Refinement]:
     """Solve a study on meshes of half the size each time; yield after each what all models tell.
 
-    It ends when every quantity of every model has settled to `tolerance`, or after `most` meshes. Watched are the
-    probe's displacement along each axis, the stored energy, and the reaction where motion drives the body. Raises
+    It ends when all that tells something has settled to `tolerance`, where a model does not reach full load, or after
+    `most` meshes. Watched are the probe's displacement along each axis, the stored energy, and force and torque of
+    each moved support. A mesh on which a model is inverted, unstable or not converged settles nothing. Raises
     StudyError where the mesh cannot be refined.
     """
-    nodes: list[int] = []
-    values: dict[tuple[str, str, str], list[float]] = {}
+    attempts: list[Attempt] = []
+    values: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
     place = None
     for halvings in range(most):
         study = read_study(file, halvings)
-        nodes.append(study.problem.mesh.n_nodes)
         models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Equilibria)}
         if not models:
             raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")
         mesh = study.problem.mesh
-        for name, path in _solved(study, models, report):
+        for name, model in models.items():
+            if report:
+                report(study, name)
+            path = follow(study, model)
+            attempts.append(_attempt(name, path))
+            if not path.complete:
+                continue
             if place is None:
                 place = mesh.nodes[most_moved(path) if study.probe is None else study.probe]
             for quantity, unit, value in _watched(path, nearest_node(mesh, place.tolist())):
-                values.setdefault((name, quantity, unit), []).append(value)
-        told = [settle(*key, nodes, found, tolerance) for key, found in values.items()]
-        yield [beside(one, told) for one in told]
-        if all(one.settled for one in told):
+                values.setdefault((name, quantity, unit), []).append((mesh.n_nodes, value))
+        found = refinement(attempts, values, tolerance)
+        yield found
+        if found.ended:
             return
 
 
-def _solved(
-    study: Study, models: Mapping[str, Entry], report: Callable[[Study, str], None] | None
-) -> Iterator[tuple[str, Equilibria]]:
-    for name, model in models.items():
-        if report:
-            report(study, name)
-        path = follow(study, model)
-        if not path.complete:
-            at = f"stopped at load factor {path.load_factor:.4g} on {study.problem.mesh.n_nodes:,} nodes"
-            raise StudyError(f"{study.file}: models.{name}: {at}: {path.status.advice}")
-        yield name, path
+def _attempt(name: str, path: Equilibria) -> Attempt:
+    n_nodes = path.problem.mesh.n_nodes
+    return Attempt(name, n_nodes, str(path.status), path.load_factor, path.status.advice, path.complete)
 
 
 def _watched(path: Equilibria, probe: int) -> Iterator[tuple[str, str, float]]:
@@ -69,19 +68,22 @@ def _watched(path: Equilibria, probe: int) -> Iterator[tuple[str, str, float]]:
     for direction, value in zip(AXES, state.displacement[probe], strict=False):
         yield f"u{direction} of the probe", "m", float(value)
     yield "energy", "J", state.energy
-    if path.problem.loading.driven_by_motion:
-        force = path.applied_force(state)
-        axis = int(np.abs(force).argmax())
-        yield f"reaction along {AXES[axis]}", "N", float(force[axis])
+    for one in path.support_forces(state):  # a resultant that vanishes is zero on every mesh
+        yield f"force of {one.name}", "N", float(np.linalg.norm(one.force)) if one.has_force else 0.0
+        yield f"torque of {one.name}", "N m", float(np.linalg.norm(one.torque)) if one.has_torque else 0.0
 
 
-def write_settling(found: list[Settling], folder: Path) -> None:
-    """Write converge.csv, a row a model, quantity and mesh, and converge.json."""
+def write_settling(title: str, file: Path, found: Refinement, folder: Path, command: str) -> Path:
+    """Write converge.csv, a row a model, quantity and mesh, converge.json and the page converge.html; return that."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "converge.csv").open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
         table.writerow(["model", "quantity", "unit", "n_nodes", "value"])
-        for one in found:
+        for one in found.quantities:
             for count, value in zip(one.n_nodes, one.values, strict=True):
                 table.writerow([one.model, one.quantity, one.unit, count, repr(value)])
-    (folder / "converge.json").write_text(json.dumps([asdict(one) for one in found], indent=1) + "\n")
+    values = [asdict(one) for one in found.quantities]
+    (folder / "converge.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    page = folder / "converge.html"
+    page.write_text(render_settling(title, file, found, command), encoding="utf-8")
+    return page

@@ -32,8 +32,9 @@ from truespring.models import (
     moduli,
 )
 from truespring.problem import Problem
+from truespring.reactions import moved_supports
 from truespring.reference import Program
-from truespring.report.curves import moved_supports, write_curves, write_reactions
+from truespring.report.curves import write_curves, write_reactions
 from truespring.report.result import Result
 from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
@@ -222,7 +223,7 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     if result.problem.mesh.element != "line":
-        write_mesh(result.problem.mesh, folder / "mesh.vtu")
+        write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
     for name, path in result.paths.items():
         write_series(path, folder, name)
         write_stl(path, folder / f"deformed_{name}.stl")

@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from truespring.equilibrium import Path, Status, solve
+from truespring.arrays import Bools, Floats
+from truespring.equilibrium import Path, State, Status, solve
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
 from truespring.problem import Problem
+from truespring.reactions import SupportForce, torque_axes
 from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
@@ -162,10 +164,24 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
     energies = {float(level): float(energy) for level, energy in told.get("energies", [])}
     states = [
         replace(state, energy=energies.get(state.load_factor, state.energy))
-        for state in _with_forces(path, folder / "curves.csv", name)
+        for state in _with_supports(_with_forces(path, folder / "curves.csv", name), folder / "reactions.csv", name)
     ]
     warnings = (*(str(text) for text in told["warnings"]), f"solved before: read from {folder}")
-    return replace(path, kind=told["kind"], status=Status(told["status"]), states=tuple(states), warnings=warnings)
+    held = _held(path, elements) if elements.is_file() else None
+    return replace(
+        path, kind=told["kind"], status=Status(told["status"]), states=tuple(states), warnings=warnings, held=held
+    )
+
+
+def _held(path: Path, body: FilePath) -> Bools | None:
+    """The directions of nodes that supports held, as mesh.vtu tells them; None where it does not, or of other nodes."""
+    import meshio
+
+    told, nodes = meshio.read(body), path.problem.mesh.nodes
+    held = told.point_data.get("held")
+    if held is None or len(held) != len(nodes) or not np.allclose(told.points[:, : nodes.shape[1]], nodes):
+        return None
+    return np.asarray(held[:, : nodes.shape[1]] > 0)
 
 
 def _folder(text: str, file: FilePath) -> FilePath:
@@ -195,19 +211,56 @@ def _json(file: FilePath) -> dict[str, Any]:
     return dict(read)
 
 
-def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[Any, ...]:
+def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[State, ...]:
     """The states of a path with the forces that curves.csv tells at their levels."""
+    axes = "xyz"[: path.problem.mesh.dim]
     try:
-        with curves.open(newline="", encoding="utf-8") as stream:
-            rows = [row for row in csv.DictReader(stream) if row.get("model") == name]
-        axes = "xyz"[: path.problem.mesh.dim]
-        forces = {float(row["load_factor"]): [float(row[f"f{axis}"] or math.nan) for axis in axes] for row in rows}
-    except (OSError, ValueError, KeyError, TypeError):
+        forces = {level: _numbers(rows[0], [f"f{axis}" for axis in axes]) for level, rows in _rows(curves, name)}
+    except _DAMAGED:
         return path.states  # displacements can be compared without
-    known = np.array(list(forces))
-    states = []
-    for state in path.states:
-        near = np.flatnonzero(np.abs(known - state.load_factor) < 1e-6) if known.size else np.zeros(0, dtype=int)
-        force = np.array(list(forces.values())[int(near[0])]) if near.size else state.applied_force
-        states.append(replace(state, applied_force=force))
-    return tuple(states)
+    return tuple(replace(one, applied_force=_near(forces, one, one.applied_force)) for one in path.states)
+
+
+def _with_supports(states: Sequence[State], reactions: FilePath, name: str) -> tuple[State, ...]:
+    """The states with force and torque of each moved support that reactions.csv tells at their levels."""
+    if not states or not reactions.is_file():
+        return tuple(states)
+    dim = states[0].positions.shape[1]
+    try:
+        told = {level: tuple(_support(row, dim) for row in rows) for level, rows in _rows(reactions, name)}
+    except _DAMAGED:
+        return tuple(states)
+    return tuple(replace(one, supports=_near(told, one, None)) for one in states)
+
+
+def _support(row: Mapping[str, str], dim: int) -> SupportForce:
+    compared = row["compared"].split()
+    return SupportForce(
+        support=int(row["support"]) - 1,
+        name=row["on"],
+        force=_numbers(row, [f"f{axis}" for axis in "xyz"[:dim]]),
+        torque=_numbers(row, [f"m{axis}" for axis in torque_axes(dim)]),
+        has_force="force" in compared,
+        has_torque="torque" in compared,
+    )
+
+
+# What a table that someone cut or changed may raise.
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError)
+
+
+def _rows(table: FilePath, name: str) -> list[tuple[float, list[dict[str, str]]]]:
+    """The rows of a model in a table, by load factor."""
+    with table.open(newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row.get("model") == name]
+    levels = dict.fromkeys(float(row["load_factor"]) for row in rows)
+    return [(level, [row for row in rows if float(row["load_factor"]) == level]) for level in levels]
+
+
+def _numbers(row: Mapping[str, str], columns: Sequence[str]) -> Floats:
+    return np.array([float(row[column] or math.nan) for column in columns])
+
+
+def _near(told: Mapping[float, Any], state: State, otherwise: Any) -> Any:
+    """What is told at the level of a state."""
+    return next((value for level, value in told.items() if abs(level - state.load_factor) < 1e-6), otherwise)

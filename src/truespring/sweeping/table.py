@@ -18,14 +18,23 @@ _OF_MODELS = (
     "probe_displacement",
     "force",
     "energy",
+    "residual",
     "smallest_area_ratio",
     "newton_iterations",
     "n_nodes",
     "n_unknowns",
     "seconds",
+    "warnings",
 )
 _OF_MODULI = ("young", "poisson", "anisotropy")
-_OF_COMPARISONS = ("probe_error", "rms_error", "max_error", "agrees_up_to_load_factor", "force_error")
+_OF_COMPARISONS = (
+    "probe_error",
+    "rms_error",
+    "max_error",
+    "force_error",
+    "decided_by",
+    "agrees_up_to_load_factor",
+)
 _VECTORS = ("probe_displacement", "force")
 
 
@@ -59,6 +68,8 @@ def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> I
         if name in _VECTORS:
             for axis, component in zip("xyz", value or (), strict=False):
                 yield f"{prefix}.{name}.{axis}", component
+        elif name == "warnings":
+            yield f"{prefix}.{name}", "; ".join(value or ())
         elif name in values:
             yield f"{prefix}.{name}", value
 

@@ -1,12 +1,13 @@
 """How far springs are off the reference at every size of the load: from levels to all sizes between them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from truespring.arrays import Floats
-from truespring.comparison import compare
+from truespring.comparison import SupportError, compare
 from truespring.validity.reference import Reference
 from truespring.validity.solving import Solved, conjugate_force
 
@@ -22,7 +23,7 @@ class Curve:
         sizes, rms_errors, probe_errors, stiffness: at the levels that were solved, the small one first, shape (n,):
             rms and probe errors as in a Comparison; `stiffness` how much stiffer than the reference the springs are, by
             the displacement along the load under the same load, or the force of the same motion.
-        force_errors: of the force that moved supports need; zero under loads.
+        force_errors: the largest of forces and torques of moved supports, as in a Comparison; zero where none moves.
         grid: sizes from 0 on, shape (m,).
         errors, probe_on_grid, stiffness_on_grid: there, not a number where springs or reference do not reach.
         reached: the largest size for which there is an error.
@@ -61,45 +62,46 @@ def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None
     size = reference.sizes[:n]
     rising = np.flatnonzero(np.diff(size) <= _SAME * size[-1]) if n else np.zeros(0, dtype=int)
     n = int(rising[0]) + 1 if rising.size else n
-    inside = ~full.outside
+    compared = full.compared
     mine = np.array([state.displacement for state in springs.states[:n]])
     theirs_loaded = [state for state in full.reference.states if state.level > 0]
     other = np.array([state.displacement for state in (small.reference.states[-1], *theirs_loaded)[:n]])
-    norms = np.sqrt((other[:, inside] ** 2).sum(axis=(1, 2)))
-    apart = (mine - other)[:, inside].reshape(n, -1) / norms[:, None]
+    norms = np.sqrt((other[:, compared] ** 2).sum(axis=(1, 2)))
+    apart = (mine - other)[:, compared].reshape(n, -1) / norms[:, None]
     moved = np.linalg.norm(other[:, full.probe], axis=1)
     told_at_probe = bool((moved > 0).all())  # a probe that is held tells nothing
     at_probe = (mine - other)[:, full.probe] / np.where(moved > 0, moved, 1.0)[:, None]
-    force = np.zeros(n)
+    forces = _apart((small.support_errors[-1], *full.support_errors)[:n])
     loading = springs.path.problem.loading
     if loading.driven_by_motion:
         levels = springs.levels[:n]
         both = [conjugate_force(one.path, one.states[:n], levels) for one in (springs, theirs)]
         stiffness = both[0] / both[1] - 1
-        force = stiffness
     else:
         load = loading.force(springs.path.problem.mesh.nodes)
         stiffness = (load * other).sum(axis=(1, 2)) / (load * mine).sum(axis=(1, 2)) - 1
-    told = np.column_stack([apart, at_probe, force, stiffness])
-    d = at_probe.shape[1]
+    told = [apart, at_probe, *forces, stiffness[:, None]]
+    ends = np.cumsum([one.shape[1] for one in told])
 
     def split(rows: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        fields = rows[:, : -d - 2]
+        fields, probed, *forced, stiff = np.split(rows, ends[:-1], axis=1)
+        unknown = np.full(len(rows), np.nan)
         return (
-            np.linalg.norm(fields, axis=1),
-            np.linalg.norm(rows[:, -d - 2 : -2], axis=1) if told_at_probe else np.full(len(rows), np.nan),
-            np.abs(rows[:, -2]),
-            rows[:, -1],
+            np.linalg.norm(fields, axis=1) if compared.any() else unknown,
+            np.linalg.norm(probed, axis=1) if told_at_probe else unknown,
+            np.max([np.zeros(len(rows)), *(np.linalg.norm(one, axis=1) for one in forced)], axis=0),
+            stiff[:, 0],
         )
 
     size = size[:n]
-    between = _spline(size, told)
+    together = np.hstack(told)
+    between = _spline(size, together)
     reached = float(size[-1])
     there = grid <= reached * (1 + 1e-3)  # what a load was scaled to is met to a hair
     rms, probed, forced, stiff = split(between(np.minimum(grid[there], reached)))
     on_grid = np.full((3, len(grid)), np.nan)
-    on_grid[:, there] = np.maximum(rms, forced), probed, stiff
-    rms, probed, forced, stiff = split(told)
+    on_grid[:, there] = np.fmax(rms, forced), probed, stiff
+    rms, probed, forced, stiff = split(together)
     return Curve(
         sizes=size,
         rms_errors=rms,
@@ -112,10 +114,21 @@ def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None
         stiffness_on_grid=on_grid[2],
         reached=reached,
         end=springs.end if n == len(springs.states) and n < len(theirs.states) else "",
-        interpolation=_left_out(size, told[:, : -d - 2]),
+        interpolation=_left_out(size, apart),
         n_nodes=springs.path.problem.mesh.n_nodes,
         seconds=springs.seconds,
     )
+
+
+def _apart(levels: Sequence[tuple[SupportError, ...]]) -> list[Floats]:
+    """How far forces and torques of moved supports are apart, relative, a row a level; zero where they vanish."""
+    found = []
+    for several in zip(*levels, strict=True):
+        for parts in ([one.force_apart for one in several], [one.torque_apart for one in several]):
+            known = next((part for part in parts if part is not None), None)
+            if known is not None:
+                found.append(np.array([np.zeros_like(known) if part is None else part for part in parts]))
+    return found
 
 
 def _spline(size: Floats, rows: Floats) -> CubicSpline:

@@ -1,0 +1,74 @@
+"""What a study tells on finer and finer meshes: rows of a table, and a page that loads nothing from anywhere."""
+
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from truespring.report.figures import Drawing
+from truespring.report.page import close, picture, versions
+from truespring.report.plots import Curve, plot
+from truespring.report.style import SPRING_STYLES, figure_style
+from truespring.settling import Refinement, Settling
+
+
+def settling_rows(found: Refinement) -> Iterator[tuple[str, ...]]:
+    """Yield model, quantity, value, order, extrapolated value, error, and settled, zero or the status, as text."""
+    statuses = {one.model: one.status for one in found.last if not one.sound}
+    for one in found.quantities:
+        order = "-" if one.order is None else f"{one.order:.2f}"
+        limit = "-" if one.extrapolated is None else f"{one.extrapolated:.6g}"
+        error = "-" if one.error is None else f"{one.error:.2%}"
+        value = f"{one.values[-1]:.6g} {one.unit}"
+        state = "zero" if one.zero else "settled" if one.settled else statuses.get(one.model, "")
+        yield one.model, one.quantity, value, order, limit, error, state
+
+
+def render_settling(title: str, file: Path, found: Refinement, command: str) -> str:
+    """Return the page as HTML; `command` is what does it again."""
+    from jinja2 import Environment, StrictUndefined
+
+    folder = files("truespring.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["close"] = close
+    template = environment.from_string((folder / "settling.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        # The look of all pages stands in that of studies.
+        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+        title=title,
+        file=str(file),
+        sentence=found.sentence,
+        settled=found.settled,
+        n_nodes=", ".join(f"{count:,}" for count in found.n_nodes),
+        troubles=[
+            f"{one.model} on {one.n_nodes:,} nodes: {one.status}, up to load factor {one.load_factor:.4g}; {one.advice}"
+            for one in found.attempts
+            if not one.sound
+        ],
+        picture=_figure(found),
+        rows=list(settling_rows(found)),
+        versions=versions(),
+        command=command,
+    )
+
+
+def _figure(found: Refinement) -> dict[str, str] | None:
+    """Each quantity over what it comes to, mesh by mesh; None where there are no two meshes to tell it."""
+    several = [one for one in found.told if len(one.values) > 1]
+    if not several:
+        return None
+    curves = []
+    for place, one in enumerate(several):
+        meshes = np.array([found.n_nodes.index(count) + 1.0 for count in one.n_nodes])
+        shares = 100 * np.array(one.values) / _limit(one)
+        style = SPRING_STYLES[place % len(SPRING_STYLES)]
+        curves.append(Curve(meshes, shares, *style, label=f"{one.quantity}\n{one.model}", strong=False))
+    with figure_style():
+        sheet = plot("What is watched over what it comes to", "mesh", "share [%]", curves, far=True).sheet
+        return picture(Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width))
+
+
+def _limit(one: Settling) -> float:
+    """What a quantity comes to, as far as it is known."""
+    return one.values[-1] if one.extrapolated is None else one.extrapolated
