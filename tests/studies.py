@@ -1,4 +1,4 @@
-"""A small study and ways to change it, for tests of the study file and the command line."""
+"""A small study and ways to change it, for tests of the study file and the command line. It is not refined."""
 
 from pathlib import Path
 
@@ -38,6 +38,7 @@ law = "linear"
 
 [compare]
 probe = "right-middle"
+refine = false
 """
 
 

@@ -82,7 +82,8 @@ def test_summary(out: Path) -> None:
     assert "moduli" not in linear and linear["warnings"] == []
     assert summary["closest"] == "linear"
     errors = summary["comparison"]["linear"]
-    assert list(errors) == ["probe_error", "rms_error", "max_error", "agrees_up_to_load_factor"]
+    wanted = ["probe_error", "rms_error", "max_error", "agrees_up_to_load_factor", "reference_error", "refined_error"]
+    assert list(errors) == wanted
     table = {(row["model"], row["load_factor"]): row for row in rows(out / "study" / "curves.csv")}
     mine, theirs = (np.array([float(table[m, "1.0"][u]) for u in ("ux", "uy")]) for m in MODELS)
     assert errors["probe_error"] == pytest.approx(np.linalg.norm(mine - theirs) / np.linalg.norm(theirs), rel=1e-9)

@@ -45,6 +45,7 @@ ALLOWED = {
     "study": {
         "calibration",
         "outputs",
+        "refining",
         "report",
         "comparison",
         "misfit",
@@ -65,6 +66,7 @@ ALLOWED = {
     "report": {
         "calibration",
         "comparison",
+        "refining",
         "equilibrium",
         "reactions",
         "settling",
@@ -90,6 +92,7 @@ ALLOWED = {
         "units",
     },
     "comparison": {"carrying", "equilibrium", "reactions", "problem", "mesh"},
+    "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh"},
     "carrying": {"equilibrium", "problem", "mesh"},
     "misfit": {"comparison", "equilibrium", "mesh"},
     "reference": {

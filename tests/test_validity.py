@@ -5,6 +5,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -114,17 +115,66 @@ def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
 def test_the_reference_is_converged_and_says_to_what(bent: Validity, study: Path) -> None:
     (found,) = bent.references
     assert found.converged and found.error < 0.002 and found.tolerance == 0.002
-    assert found.order is not None and 0.8 < found.order < 3
-    finer = run_task(
-        Task(
-            Body.of(read_study(study)).reference_problem(found.load, found.factor, None, 3),
-            ts.Fem("neo-hookean", "quadratic"),
-            2,
-        )
-    )
-    apart = ts.compare(found.solved.path, finer.path).rms_errors
-    assert 0.2 * found.error < apart.max() < found.error  # what it still was off is what it had told
+    apart = _two_refinements_finer(found, Body.of(read_study(study)))
+    assert 0.2 * found.error < apart < found.error  # what it still was off is what it had told
     assert found.reached == pytest.approx(0.3, rel=0.02)
+
+
+def _two_refinements_finer(found: reference.Reference, body: Body) -> float:
+    """How far a reference is from that of two refinements more: the largest relative distance of all levels."""
+    level = len(found.n_nodes) + 1
+    problem = body.reference_problem(found.load, found.factor, found.poisson, level)
+    finer = run_task(Task(problem, body.reference_model(found.law), 2))
+    return float(ts.compare(found.solved.path, finer.path).rms_errors.max())
+
+
+def test_what_a_clamp_leaves_is_told_of_meshes_that_are_not_fine(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nearly incompressible at a clamp, where the order is lowest, on meshes too coarse for it to show."""
+    monkeypatch.setattr(reference, "_MOST_UNKNOWNS", {2: 2500})
+    text = THIRD.replace("poisson = 0.33333333333", "poisson = 0.45").replace("plane-stress", "plane-strain")
+    file = study.with_name("clamped.toml")
+    file.write_text(text)
+    body = Body.of(read_study(file))
+    found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+    assert len(found.n_nodes) == 3 and not found.converged
+    apart = _two_refinements_finer(found, body)
+    assert apart < found.error < 6 * apart
+
+
+@pytest.mark.verification
+def test_what_a_clamp_leaves_is_told_of_cubes() -> None:
+    """The soft block of the examples, on a mesh of four cubes through the depth and on one of sixteen."""
+    study = Path(__file__).parent.parent / "examples" / "soft_block.toml"
+    body = Body.of(read_study(study))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference, "_MOST_UNKNOWNS", {3: 10_000})
+        found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+    assert found.elements == 4
+    apart = _two_refinements_finer(found, body)
+    assert apart < found.error < 6 * apart
+
+
+def test_richardson_and_roache_to_the_letter() -> None:
+    """Meshes whose error is h^p: what is left is the last change over 2^p - 1, and a quarter more for safety."""
+    for order in (0.5, 1.0, 1.2, 2.0):
+        errors = [2.0 ** (-order * mesh) for mesh in range(4)]
+        changes = [before - one for before, one in pairwise(errors)]
+        told, shown = reference._estimate(changes)
+        assert shown == pytest.approx(order)
+        assert told == pytest.approx(1.25 * errors[-1])
+        # Three meshes do not tell whether they are fine enough: no order above the first is taken from them.
+        told, shown = reference._estimate(changes[:2])
+        assert shown is None and told == pytest.approx(1.25 * errors[2] * max(1.0, 2**order - 1))
+
+
+def test_an_order_that_meshes_only_seem_to_have_is_not_believed() -> None:
+    """A smooth part of second order that dies out, over what a corner makes of order 0.8: the sum seems better."""
+    errors = [0.0625**mesh + 0.1 * 2.0 ** (-0.8 * mesh) for mesh in range(4)]
+    changes = [before - one for before, one in pairwise(errors)]
+    seeming = np.log2(changes[1] / changes[2])
+    assert 1.25 * changes[-1] / (2**seeming - 1) < 0.35 * errors[-1]
+    told, shown = reference._estimate(changes)
+    assert shown is None and errors[-1] < told < 1.5 * errors[-1]
 
 
 def test_what_is_adaptive_has_the_lines_of_the_whole_grid(bent: Validity, study: Path) -> None:

@@ -51,6 +51,8 @@ from .problem import Region as Region
 from .reference import CalculiX as CalculiX
 from .reference import read_result as read_result
 from .reference import read_stl as read_stl
+from .refining import OwnError as OwnError
+from .refining import reference_error as reference_error
 from .report.calibration import draw_calibration as draw_calibration
 from .solvers import ArcLength as ArcLength
 from .solvers import DisplacementControl as DisplacementControl

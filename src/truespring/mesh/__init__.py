@@ -35,6 +35,7 @@ from truespring.mesh.shapes import SOLID_ELEMENTS as SOLID_ELEMENTS
 from truespring.mesh.shapes import box as box
 from truespring.mesh.shapes import rectangle as rectangle
 from truespring.mesh.shapes import refuse_too_large as refuse_too_large
+from truespring.mesh.simplices import in_simplices as in_simplices
 from truespring.mesh.surface import Shell as Shell
 from truespring.mesh.surface import Surface as Surface
 from truespring.mesh.surface import SurfaceDistance as SurfaceDistance

@@ -90,6 +90,10 @@ class Fem:
             )
         return self.element
 
+    def second_order(self, problem: Problem) -> "Fem | None":
+        """Return the model of second order on triangles or tetrahedra; None where the own elements are as good."""
+        return Fem(self.law) if self.chosen_element(problem) == "linear" else None
+
     def warnings(self, problem: Problem) -> tuple[str, ...]:
         """Return what should be known before the model is solved: elements that lock."""
         if self.chosen_element(problem) != "linear" or not locks(problem):

@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import FemPotential, fem_potential, locking_warnings
+from truespring.models.fem import Fem, FemPotential, fem_potential, locking_warnings
 from truespring.models.laws import LAWS, Response
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
@@ -51,6 +51,10 @@ class Heml:
     def label(self) -> str:
         """How curves and tables call the model."""
         return f"HEML ({LAWS[self.law].label.removesuffix(' FEM')})"
+
+    def second_order(self, problem: Problem) -> Fem:
+        """Return the finite elements of second order of the same law: where finer meshes of this model lead."""
+        return Fem(self.law)
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
         """Return what should be known before the model is solved: elements that lock."""

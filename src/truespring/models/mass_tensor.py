@@ -10,7 +10,7 @@ from truespring.arrays import Floats, Ints, ShortInts
 from truespring.errors import ModelError, nearest
 from truespring.memory import slices
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import FemPotential, fem_potential, locking_warnings
+from truespring.models.fem import Fem, FemPotential, fem_potential, locking_warnings
 from truespring.models.laws import LAWS
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import identity
@@ -50,6 +50,10 @@ class MassTensor:
     def label(self) -> str:
         """How curves and tables call the model."""
         return f"mass-tensor ({LAWS[self.law].label.removesuffix(' FEM')})"
+
+    def second_order(self, problem: Problem) -> Fem:
+        """Return the finite elements of second order of the same law: where finer meshes of this model lead."""
+        return Fem(self.law)
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
         """Return what should be known before the model is solved: elements that lock."""

@@ -17,7 +17,7 @@ from truespring.exports.decks import check_fem, check_springs, fem_element, is_l
 from truespring.exports.exported import plain_springs
 from truespring.loading import Pressure
 from truespring.material import PlaneStress
-from truespring.models import SpringModel, SpringNetwork
+from truespring.models import Fem, SpringModel, SpringNetwork
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
 from truespring.reference.dat import read_dat
@@ -77,6 +77,10 @@ class CalculiX:
     @property
     def _linear(self) -> bool:
         return self.springs is None and self.law == "linear"
+
+    def second_order(self, problem: Problem) -> Fem | None:
+        """Return finite elements of second order of the same law, to which the elements of CalculiX converge too."""
+        return None if self.springs is not None else Fem(self.law)
 
     def check(self, problem: Problem, solver: Solver) -> None:
         """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""

@@ -22,6 +22,7 @@ from truespring.problem import Problem, Region
 from truespring.report.figures import Drawing, distance_name, over_name, render_figures
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
+from truespring.report.standing import own_errors
 from truespring.report.supports import support_rows
 from truespring.report.verdict import (
     carrying_sentence,
@@ -140,6 +141,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
         "models": [_model_row(name, path) for name, path in result.paths.items()],
         "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],
+        "own_errors": {name: own_errors(result, name) for name in result.comparisons} if result.standings else {},
         "moduli_note": _section_note(result.problem),
         "source": result.source,
     }

@@ -10,6 +10,7 @@ from truespring.comparison import Comparison, closest
 from truespring.equilibrium import Path, Status
 from truespring.models import Fitness
 from truespring.problem import Problem
+from truespring.refining import Standing
 
 
 def head_note(source: str) -> str:
@@ -33,6 +34,7 @@ class Result:
         tolerance: the rms error up to which two paths agree.
         source: text of the study file; comments at its head are shown with its results.
         fitness: whether the springs of a path are fit for the material, by its name.
+        standings: how far each reference is from its own limit, by its name; empty where none was refined.
         in_detail: whether distances of surfaces, in metres, and energies are told too, and a plane body is coloured by
             its distance, as where two results are compared.
     """
@@ -47,6 +49,7 @@ class Result:
     tolerance: float
     source: str
     fitness: Mapping[str, Fitness] = field(default_factory=dict)
+    standings: Mapping[str, Standing] = field(default_factory=dict)
     in_detail: bool = False
 
     def __repr__(self) -> str:

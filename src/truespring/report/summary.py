@@ -21,7 +21,7 @@ def summary(result: Result) -> dict[str, Any]:
         "model": result.model,
         "models": {name: _model(path, result.probe) for name, path in result.paths.items()},
         "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
-        "comparison": {name: _comparison(one) for name, one in result.comparisons.items()},
+        "comparison": {name: _comparison(one) | _standing(result, name) for name, one in result.comparisons.items()},
         "closest": result.closest,
     }
 
@@ -101,6 +101,15 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
         values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
         values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
     return values
+
+
+def _standing(result: Result, name: str) -> dict[str, float | None]:
+    """How far a reference is from its own limit, and the model from that; None where it is not known."""
+    known = result.standings.get(name)
+    return {
+        "reference_error": known.value if known else None,
+        "refined_error": known.refined_error if known else None,
+    }
 
 
 def _of_forces(comparison: Comparison, level: int | None) -> dict[str, Any]:

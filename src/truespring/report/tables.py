@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from truespring.models import Moduli
 from truespring.report.result import Result
 from truespring.report.settling import settling_rows
+from truespring.report.standing import own_errors
 from truespring.report.summary import difference
 from truespring.report.supports import support_rows
 from truespring.report.verdict import verdict
@@ -140,13 +141,15 @@ def settling_table(title: str, found: Refinement) -> "Table":
 
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
-    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *(("by",) if forced else ()))
+    by = ("by",) if forced else ()
+    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "itself")
     table = _table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
         up_to = one.agrees_up_to_load_factor
         shown = [*map(_share, errors), "-" if up_to is None else f"{up_to:.6g}"]
-        table.add_row(name, one.reference.label, *shown, *([one.decided_by or "-"] if forced else []))
+        shown += [one.decided_by or "-"] if forced else []
+        table.add_row(name, one.reference.label, *shown, own_errors(result, name)[0])
     return table
 
 

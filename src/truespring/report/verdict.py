@@ -14,6 +14,7 @@ from truespring.models import Fem, FemPotential, Moduli
 from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
+from truespring.report.standing import equally_wrong_sentence, own_error_sentence
 
 
 def verdict(result: Result) -> str:
@@ -366,6 +367,9 @@ def _agreement(result: Result) -> Iterator[str]:
             yield f"{where}."
             if errors:
                 yield f"{errors}."
+        who, plural = _subject(result)
+        names = {name: display_name(result, name) for name in result.comparisons}
+        yield from filter(None, (equally_wrong_sentence(result, who, plural, names), own_error_sentence(result)))
     for name, one in result.comparisons.items():
         if name not in measured or not _meets_at_full_load(one):
             yield _short_of_full_load(result, name, one)

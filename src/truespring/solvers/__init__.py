@@ -5,4 +5,5 @@ from truespring.solvers.balance import Reporter as Reporter
 from truespring.solvers.continuation import ArcLength as ArcLength
 from truespring.solvers.continuation import DisplacementControl as DisplacementControl
 from truespring.solvers.cost import Cost as Cost
+from truespring.solvers.nearby import Nearby as Nearby
 from truespring.solvers.newton import Newton as Newton

@@ -72,6 +72,7 @@ class Study:
         references: the names that it is compared with.
         probe: number of the node that is watched; None takes the one that moves most.
         tolerance: the rms error up to which two paths agree.
+        refine: whether references are refined to tell how far they are themselves off.
     """
 
     title: str
@@ -85,6 +86,7 @@ class Study:
     references: tuple[str, ...]
     probe: int | None
     tolerance: float
+    refine: bool = True
 
     @property
     def file(self) -> FilePath:
@@ -247,6 +249,7 @@ class _Builder:
             references=references,
             probe=probe,
             tolerance=table.compare.tolerance,
+            refine=table.compare.refine,
         )
 
     def solver(self, problem: Problem) -> Solver:

@@ -40,6 +40,7 @@ from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
 from truespring.solvers import Reporter
 from truespring.study.read import Entry, Study, read_study
+from truespring.study.standings import standings
 
 #: Called with study, model and the load factor reached, for a progress bar.
 Progress = Callable[[str, str, float], None]
@@ -73,11 +74,13 @@ def run(
     comparing: bool = True,
     timeout: float | None = None,
     known: Known | None = None,
+    refining: bool = True,
 ) -> Result:
     """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached.
 
     With a `timeout` [s] each model is given up after that long; another program after an hour where none is given.
-    `known` is told each path before the next model is solved.
+    `known` is told each path before the next model is solved. With `refining`, unless the study leaves it out,
+    references are refined to tell how far they are themselves off.
     """
     paths: dict[str, Path] = {}
     for name, entry in study.entries.items():
@@ -111,6 +114,7 @@ def run(
         }
         if comparing
         else {},
+        standings=standings(study, paths, names) if refining else {},
     )
 
 

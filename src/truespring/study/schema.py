@@ -416,6 +416,7 @@ class CompareTable(Table):
     references: list[str] | None = None
     probe: Probe = None
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
+    refine: bool = True
 
 
 #: What a model may be, by its kind.

@@ -195,7 +195,7 @@ def solve_point(asked: tuple[StudyText, Point], timeout: float | None = None) ->
     """
     text, point = asked
     _refuse_other_than_planned(text, point)
-    result = run(text.study(point.changes), timeout=timeout)
+    result = run(text.study(point.changes), timeout=timeout, refining=False)
     found = summary(result)
     for name, path in result.paths.items():
         energy = path.states[-1].energy if path.states else math.nan

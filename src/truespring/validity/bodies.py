@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from truespring.errors import StudyError
 from truespring.mesh import Mesh, box, nearest_node, rectangle, refined, refuse_too_large
 from truespring.models import Fem
-from truespring.models.fem import locks
 from truespring.problem import Problem
 from truespring.study import Study, schema
 from truespring.validity.loads import LOADS, Asked, LoadType, scaled, standard
@@ -121,11 +120,8 @@ class Body:
         return box(self.shape.size, counts, "tetrahedron")
 
     def reference_model(self, law: str) -> Fem:
-        """Return finite elements of second order where the mesh allows it, of a kind that does not lock elsewhere."""
-        simplices = self.shape is not None or self.problem.mesh.element in ("triangle", "tetrahedron")
-        if simplices:
-            return Fem(law, "quadratic")
-        return Fem(law, "mean-dilatation" if locks(self.problem) else None)
+        """Return finite elements that do not lock: of second order on triangles and tetrahedra, the default there."""
+        return Fem(law)
 
     def asked(self, load: LoadType) -> Asked:
         """Return supports and loads of a standard type on this body, and its probe."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,8 +20,14 @@ TOLERANCE = {2: 0.002, 3: 0.005}
 
 # A mesh of more unknowns is not solved for a reference, in the plane and in space.
 _MOST_UNKNOWNS = {2: 60_000, 3: 65_000}
-# Orders of convergence between these are believed.
-_ORDERS = (0.3, 6.0)
+# The order of convergence where none is shown: elements of second order have no higher one at clamps and corners.
+_CAUTIOUS = 1.0
+# Orders are shown where those of three meshes and of the three before differ by this share at most: there meshes are
+# fine enough for the order to be that of all finer ones too. Higher ones than the second are not believed: what a
+# corner makes may still be hidden, and comes to light last.
+_ASYMPTOTIC, _HIGHEST = 0.25, 2.0
+# The lowest order that is believed: a mesh that changes more than the one before may do anything.
+_LOWEST = 0.3
 # What Richardson's estimate is multiplied by: Roache's factor for three meshes.
 _SAFETY = 1.25
 # Loads are scaled until the reference reaches the size that is asked to this share of it; so often at most.
@@ -37,9 +44,10 @@ class Reference:
         solved: the path on the finest mesh.
         sizes: the size of the load at each of its states, shape (n_states,).
         asked: the size asked for.
-        error: what the finest mesh is off, relative, as estimated: the larger of the rms displacement's last change and
-            of what it does work with, by Richardson's extrapolation where the changes show an order.
-        order: the order of convergence of the displacement, None where none shows.
+        error: what the finest mesh is off, relative, as estimated: the larger of the rms displacement and of what it
+            does work with, by Richardson's extrapolation and Roache's factor, with the order that four meshes show or,
+            where they show none, with a cautious one.
+        order: the order of convergence of the displacement that four meshes show, None where they show none.
         changes: of the displacement from mesh to mesh, relative rms, the worst load level.
         n_nodes, elements: of each mesh; `elements` of the finest through the depth.
         settling: what the displacement along the load (of moved supports the force) does over the meshes.
@@ -117,7 +125,7 @@ def solve_reference(
         meshes.append(solved)
         values.append(_worked(solved, load))
         settling = _settling(law, load, meshes, values, tolerance)
-        error, order = _estimate(changes, settling)
+        error, order = _estimate(changes, _steps(values))
         finer = 2**body.dim * solved.path.n_unknowns
         if (error <= tolerance and len(meshes) > 2) or (meshes[1:] and finer > _MOST_UNKNOWNS[body.dim]):
             break
@@ -211,16 +219,30 @@ def _change(coarse: Solved, fine: Solved, load: LoadType) -> float:
     return max((float(error) for one in met for error in one.rms_errors), default=math.inf)
 
 
-def _estimate(changes: list[float], settling: Settling) -> tuple[float, float | None]:
-    """What the finest mesh is off, and the order of convergence."""
+def _steps(values: list[float]) -> list[float]:
+    """How far each value is from the one before, relative to the last."""
+    size = abs(values[-1])
+    return [abs(one - before) / size if size else 0.0 for before, one in pairwise(values)]
+
+
+def _estimate(*several: list[float]) -> tuple[float, float | None]:
+    """What the finest mesh is off by the changes of quantities from mesh to mesh, and the order of the first one."""
+    found = [_by_richardson(changes) for changes in several]
+    return max(error for error, _ in found), found[0][1]
+
+
+def _by_richardson(changes: list[float]) -> tuple[float, float | None]:
+    """The error left after changes from mesh to mesh, each of half the size, and the order if they show one.
+
+    An order that meshes only seem to have before they are fine enough is too high: what is left is then more.
+    """
     if not changes:
         return math.inf, None
-    error, order = changes[-1], None
-    if len(changes) > 1 and min(changes[-2:]) > 0:
-        found = math.log2(changes[-2] / changes[-1])
-        if _ORDERS[0] <= found <= _ORDERS[1]:
-            order, error = found, _SAFETY * changes[-1] / (2**found - 1)
-    return max(error, settling.error or 0.0), order
+    orders = [math.log2(before / one) if before and one else 0.0 for before, one in pairwise(changes)]
+    low, high = (min(orders[-2:]), max(orders[-2:])) if orders else (0.0, 0.0)
+    shown = len(orders) > 1 and low >= _LOWEST and high - low <= _ASYMPTOTIC * high
+    order = min(low, _HIGHEST) if shown else _CAUTIOUS if not orders else min(max(orders[-1], _LOWEST), _CAUTIOUS)
+    return _SAFETY * changes[-1] / (2**order - 1), order if shown else None
 
 
 def label_of(path: Path) -> str:

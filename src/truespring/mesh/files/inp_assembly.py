@@ -142,7 +142,7 @@ class Assembly:
             raise MeshError(f"{self._lines.at(lines[row])}: element {numbers[row]} is there twice: number one anew")
         for block in scope.elements:
             unknown = places(nodes.numbers, block.nodes) < 0
-            lost = unknown.any(axis=1)
+            lost = np.asarray(unknown.any(axis=1))
             if lost.any() and dimension(block.kind) > 1:
                 row = int(lost.argmax())
                 raise MeshError(

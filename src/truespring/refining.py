@@ -1,0 +1,269 @@
+"""Refining: how far a path is from its own limit, by the same law on a finer mesh or by elements of second order."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from truespring.arrays import Floats, Ints
+from truespring.comparison import Comparison, compare
+from truespring.equilibrium import Path, Solver, solve
+from truespring.errors import MeshError, ModelError, TruespringError
+from truespring.mesh import (
+    Box,
+    Mesh,
+    Near,
+    Plane,
+    box,
+    in_simplices,
+    rectangle,
+    refined,
+    refuse_too_large,
+    select_elements,
+)
+from truespring.models import Model
+from truespring.models.bending import cell_counts
+from truespring.potential import Potential
+from truespring.problem import Problem, Region
+from truespring.solvers import Nearby, Newton
+
+#: The order of convergence that refinement is taken to have: the lowest that is met, at clamps and corners. Bodies
+#: without these have twice that, and their error is then overestimated by half at most.
+ORDER = 1.0
+#: By how much the distance to elements of second order on the same nodes falls short of an error, at most: these are
+#: still off themselves. Measured on cantilevers, blocks and tubes: by 1.004 to 1.08.
+SECOND_ORDER = 1.1
+#: Refinement may cost so many times what the paths of a study did.
+COST = 10.0
+
+# How work grows with the number of unknowns, measured in the plane and in space.
+_GROWTH = 1.25
+# Newton iterations from the coarse state, of which five are usual.
+_ITERATIONS, _MOST_ITERATIONS = 6, 20
+# Meshes are halved twice at most.
+_LEVELS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class OwnError:
+    """How far a path is from its own limit: that of finer and finer meshes, under its law, loads and supports.
+
+    Attributes:
+        value: at full load, relative as Comparison.error is: the larger of the rms distance of nodes and the error of a
+            moved support's force or torque; None where it is not known.
+        how: by what it was found: "second order", "refined" or "coarser"; or why it is not known.
+        limit: the path on the finer mesh or of the better elements, None without one.
+        comparison: of the path with `limit`, None without one.
+        work: what it took, as `work_of` counts it.
+    """
+
+    value: float | None
+    how: str
+    limit: Path | None = None
+    comparison: Comparison | None = None
+    work: float = 0.0
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        return f"not known: {self.how}" if self.value is None else f"{self.value:.2%} ({self.how})"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a reference stands to its own limit, and a model compared with it to that limit.
+
+    Attributes:
+        value, how: of the reference, see OwnError.
+        refined_error: the model's error at full load against the finer path of the reference, as Comparison.error is;
+            None where there is none.
+    """
+
+    value: float | None
+    how: str
+    refined_error: float | None = None
+
+
+def standing(model: Path, found: OwnError) -> Standing:
+    """Return how a reference stands whose own error was found, and `model` to its limit."""
+    against = None if found.limit is None else compare(model, found.limit).error
+    return Standing(found.value, found.how, against)
+
+
+def work_of(path: Path) -> float:
+    """Return what solving a path took: Newton iterations times unknowns to the power of their growth, no times."""
+    return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
+
+
+def reference_error(problem: Problem, model: Model, solver: Solver | None = None) -> OwnError:
+    """Solve a problem and return how far the solution is from its own limit; see `own_error`."""
+    solver = solver or Newton()
+    return own_error(solve(problem, model, solver), model, solver, math.inf)
+
+
+def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
+    """Return how far the path of a model is from its own limit at full load.
+
+    A model of first order whose law has elements of second order is held against these, on simplices of the same nodes:
+    their distance times SECOND_ORDER. Others are solved on meshes of half and, if that costs little, of a quarter of
+    the size: the distance to the finest over 1 - 2^(-p k), after k halvings, p = ORDER (Richardson). Where that takes
+    more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if elements are alike and
+    along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path that did not reach full
+    load, was read from a file, or finds no equilibrium on other meshes.
+    """
+    if not path.complete or not path.solved:
+        return OwnError(None, "it was not solved to full load here")
+    found, spent = None, 0.0
+    try:
+        for finer in _finer(path.problem, model):
+            if spent + _ITERATIONS * finer.n_unknowns**_GROWTH > most_work:
+                break
+            limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
+            spent += work_of(limit)
+            against = compare(path, limit)
+            value = None if against.error is None else finer.factor * against.error
+            found = OwnError(value, finer.how, limit, against)
+    except (TruespringError, MemoryError):
+        pass
+    return replace(found or _from_coarser(path, model, solver, most_work - spent), work=spent)
+
+
+def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
+    """How far a path is from its limit by the distance of a mesh of twice the size."""
+    try:
+        problem = coarser_problem(path.problem)
+        if path.newton_iterations * int((~problem.loading.held).sum()) ** _GROWTH > most_work:
+            return OwnError(None, "other meshes cost too much")
+        coarse = solve(problem, model, solver)
+        against = compare(coarse, path)
+    except (TruespringError, AttributeError) as error:
+        return OwnError(None, str(error))
+    return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
+
+
+class _Finer(NamedTuple):
+    """A finer way to solve a problem, and what the distance to it is multiplied by."""
+
+    problem: Problem
+    model: Any
+    how: str
+    factor: float
+    n_unknowns: int
+
+
+def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
+    """Yield finer and finer ways."""
+    n_unknowns = int((~problem.loading.held).sum())
+    growth = 2**problem.mesh.dim
+    better = model.second_order(problem) if hasattr(model, "second_order") else None
+    if better is not None:
+        mesh, parents = in_simplices(problem.mesh)
+        yield _Finer(
+            on_mesh(problem, mesh, parents), better, "second order", SECOND_ORDER, _with_middles(mesh, n_unknowns)
+        )
+        return
+    if not hasattr(model, "potential"):
+        raise ModelError(f"{getattr(model, 'label', model)} has one mesh")
+    for halvings in range(1, _LEVELS + 1):
+        problem, n_unknowns = refined_problem(problem), growth * n_unknowns
+        yield _Finer(problem, model, "refined", 1 / (1 - 2 ** (-ORDER * halvings)), n_unknowns)
+
+
+def _with_middles(mesh: Mesh, n_unknowns: int) -> int:
+    return round(n_unknowns * (1 + len(mesh.edges) / mesh.n_nodes))
+
+
+def refined_problem(problem: Problem) -> Problem:
+    """Return a problem on a mesh of elements of half the size; raise MeshError where that does not fit in memory."""
+    mesh = problem.mesh
+    refuse_too_large(2**mesh.dim * mesh.n_nodes, mesh.dim)
+    named = _with_named_nodes(problem)
+    finer = refined(named.mesh)
+    count = len(finer.elements) // len(mesh.elements)
+    return on_mesh(named, finer, np.repeat(np.arange(len(mesh.elements)), count))
+
+
+def coarser_problem(problem: Problem) -> Problem:
+    """Return a problem on a mesh of elements of twice the size; raise MeshError where there is none.
+
+    For rectangles and bricks that are alike and along the axes, an even number in each direction, without groups of
+    elements or facets, node numbers or regions.
+    """
+    mesh, counts = problem.mesh, cell_counts(problem.mesh)
+    chosen = [getattr(one, "on", None) for one in (*problem.supports, *problem.loads)]
+    plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
+    if counts is None or any(count % 2 for count in counts) or not plain or mesh.element_groups or mesh.facet_groups:
+        raise MeshError("no mesh of twice the size is known")
+    half = tuple(count // 2 for count in counts)
+    size = mesh.upper - mesh.lower
+    made = (rectangle if mesh.dim == 2 else box)(tuple(size.tolist()), half)
+    nodes = made.nodes + mesh.lower
+    at = np.asarray(KDTree(nodes).query(mesh.nodes, distance_upper_bound=1e-6 * mesh.diameter)[1])
+    groups = {name: at[of][at[of] < len(nodes)] for name, of in mesh.node_groups.items()}
+    return replace(problem, mesh=Mesh(nodes, made.elements, made.element, groups))
+
+
+def on_mesh(problem: Problem, mesh: Mesh, parents: Ints) -> Problem:
+    """Return a problem on a mesh that divides its own; `parents` are the elements that the new ones are parts of."""
+    regions = [
+        Region(np.flatnonzero(np.isin(parents, select_elements(problem.mesh, region.on))), region.material)  # type: ignore[arg-type]
+        for region in problem.regions
+    ]
+    return replace(problem, mesh=mesh, regions=regions)
+
+
+def _with_named_nodes(problem: Problem) -> Problem:
+    """The problem with a group in place of each selection by node numbers: groups are refined with the mesh."""
+    groups = dict(problem.mesh.node_groups)
+
+    def named(ones: Sequence[Any]) -> list[Any]:
+        found = []
+        for one in ones:
+            on = getattr(one, "on", None)
+            if on is not None and not isinstance(on, str | Plane | Box | Near):
+                name = f"nodes {len(groups) + 1}"
+                groups[name] = np.unique(np.asarray(on))
+                one = replace(one, on=name)
+            found.append(one)
+        return found
+
+    supports, loads = named(problem.supports), named(problem.loads)
+    if len(groups) == len(problem.mesh.node_groups):
+        return problem
+    return replace(problem, mesh=replace(problem.mesh, node_groups=groups), supports=supports, loads=loads)
+
+
+def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Path:
+    """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
+    if isinstance(solver, Newton):
+        # From a state that is near, so that the path is not taken again, and on the same branch.
+        nearby = Nearby(
+            1, solver.tolerance, _MOST_ITERATIONS, method=solver.method, linear=solver.linear, start=_carrying(coarse)
+        )
+        path = solve(finer.problem, finer.model, nearby)
+        if _sound(path):
+            return path
+    if coarse.newton_iterations * finer.n_unknowns**_GROWTH > most_work:
+        raise ModelError("other meshes cost too much")
+    path = solve(finer.problem, finer.model, solver)
+    if not _sound(path):
+        raise ModelError("a finer mesh finds no stable equilibrium")
+    return path
+
+
+def _sound(path: Path) -> bool:
+    """Whether a path reached full load and is stable there."""
+    return path.complete and not path.states[-1].negative_eigenvalues
+
+
+def _carrying(coarse: Path) -> Callable[[Potential], Floats]:
+    """What gives the nodes of a finer potential the displacement of a coarse state, by its elements' interpolation."""
+
+    def start(potential: Potential) -> Floats:
+        whole = coarse.whole
+        moved = coarse.states[-1].all_positions - whole.points
+        return np.asarray(potential.nodes + whole.locate(potential.nodes).carry(moved))
+
+    return start

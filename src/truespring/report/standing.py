@@ -1,0 +1,78 @@
+"""How far references are themselves off, in words: what errors against them are worth."""
+
+from truespring.comparison import Comparison
+from truespring.report.quantity import ROUNDING, percent, tolerance_percent
+from truespring.report.result import Result
+
+
+def own_errors(result: Result, name: str) -> tuple[str, str]:
+    """Return how far a reference is itself off, and the model from the refined reference, as texts for a table."""
+    known = result.standings.get(name)
+    if known is None:
+        return "not known", "-"
+    refined = "-" if known.refined_error is None else percent(known.refined_error)
+    return _percent(known.value), refined
+
+
+def _percent(value: float | None) -> str:
+    if value is None:
+        return "not known"
+    return "0 %" if value < ROUNDING else percent(value)
+
+
+def own_error_sentence(result: Result) -> str | None:
+    """Return how far the references are themselves off on their mesh; None where refinement was left out."""
+    known = {name: one for name, one in result.standings.items() if name in result.comparisons}
+    if not known:
+        return None
+    values = [one.value for one in known.values() if one.value is not None]
+    if not values:
+        return f"How far {_who(result, list(known))} on this mesh is itself off is not known."
+    low, high = min(values), max(values)
+    shown = _percent(high) if _percent(low) == _percent(high) else f"{_number(low)} to {_percent(high)}"
+    unknown = [name for name, one in known.items() if one.value is None]
+    rest = f"; of {_who(result, unknown)} it is not known" if unknown else ""
+    return f"{_who(result, [name for name in known if name not in unknown])} on this mesh is itself {shown} off{rest}."
+
+
+def _who(result: Result, names: list[str]) -> str:
+    """One reference by its label; several by what they are."""
+    labels = {result.paths[name].label for name in names}
+    if len(labels) == 1:
+        return labels.pop()
+    kinds = {result.paths[name].kind for name in names}
+    return "FEM" if kinds == {"fem"} else "each reference"
+
+
+def _number(value: float) -> str:
+    return "0" if value < ROUNDING else percent(value).removesuffix(" %")
+
+
+def equally_wrong_sentence(result: Result, who: str, plural: bool, called: dict[str, str]) -> str | None:
+    """Return that agreement with references which are themselves off by more than the tolerance says little.
+
+    `who` is how the model is called, `plural` whether that is several; `called` how the references are.
+    """
+    names = [
+        name
+        for name, one in result.comparisons.items()
+        if _agrees(one) and (known := result.standings.get(name)) and (known.value or 0.0) > result.tolerance
+    ]
+    if not names:
+        return None
+    worst = max(names, key=lambda name: result.standings[name].value or 0.0)
+    known = result.standings[worst]
+    assert known.value is not None  # it is above the tolerance
+    if known.refined_error is None:
+        both = f"{called[worst]} on this mesh is itself about {percent(known.value)} off"
+    else:
+        both = (
+            f"on this mesh {called[worst]} is itself about {percent(known.value)} off, and {who} "
+            f"{'are' if plural else 'is'} {percent(known.refined_error)} off the refined solution"
+        )
+    return f"that agreement says little: {both}, more than {tolerance_percent(result.tolerance)}."
+
+
+def _agrees(one: Comparison) -> bool:
+    """Whether a model is within the tolerance of a reference at full load."""
+    return one.error is not None and one.error < one.tolerance

@@ -1,0 +1,23 @@
+"""How far the references of a study are themselves off, by refinement that costs little beside the study."""
+
+from collections.abc import Mapping, Sequence
+
+from truespring.equilibrium import Path
+from truespring.refining import COST, Standing, own_error, standing, work_of
+from truespring.study.read import Study
+
+
+def standings(study: Study, paths: Mapping[str, Path], names: Sequence[str]) -> dict[str, Standing]:
+    """Return how each reference stands to its own limit; empty where the study leaves refinement out.
+
+    All of it takes at most COST times the work of the study's own paths.
+    """
+    if not study.refine:
+        return {}
+    left = COST * sum(work_of(path) for path in paths.values() if path.solved)
+    found = {}
+    for name in names:
+        own = own_error(paths[name], study.entries[name], study.solver, left)
+        left -= own.work
+        found[name] = standing(paths[study.model], own)
+    return found
