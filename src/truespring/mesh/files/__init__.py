@@ -10,31 +10,40 @@ from typing import NamedTuple
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.vtk import read_vtk
-from truespring.mesh.files.vtu import read_vtu
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
 
+Reader = Callable[[bytes, Path], Contents]
+
+
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
+
 
 class Format(NamedTuple):
-    """How files of a format begin, what reads them, and how a file that cannot be read may be mended."""
+    """How files of a format begin, what reads them, and how one that cannot be read may be mended.
+
+    A reader takes the bytes of a file and the folder that it lies in.
+    """
 
     recognises: Recognises
-    read: Callable[[bytes], Contents]
+    read: Reader
     again: str = ""
 
 
+_GMSH = "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
 _PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(is_msh, read_msh, "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"),
-        ".inp": Format(is_inp, read_inp),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtu, _PARAVIEW),
-        ".vtk": Format(is_vtk, read_vtk, _PARAVIEW),
+        ".msh": Format(is_msh, _alone(read_msh), _GMSH),
+        ".inp": Format(is_inp, _alone(read_inp)),
+        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
@@ -44,7 +53,8 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
     called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    first spelling. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
@@ -76,9 +86,10 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
         )
     form = FORMATS[key]
     try:
-        contents = form.read(data)
+        contents = form.read(data, file.parent)
     except MeshError as error:
-        raise MeshError("; ".join(filter(None, [f"{file}: {error}", form.again]))) from None
+        others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
     try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
