@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from truespring.equilibrium import Path as Equilibria
 from truespring.errors import ReferenceFileError, nearest
-from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, read_as
+from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
 from truespring.mesh.files.vtk_file import VTK_FORMATS
 from truespring.opening import open_file
 from truespring.reference.checks import refuse_unreadable
@@ -29,6 +29,7 @@ class Format(NamedTuple):
     recognises: Recognises
     read: Callable[..., Record]
     options: frozenset[str] = frozenset()
+    is_marked: bool = True  # whether every file of the format is recognised
 
 
 _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
@@ -41,20 +42,29 @@ READERS: MappingProxyType[str, Format] = MappingProxyType(
         **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
         ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
         ".rst": Format(is_rst, read_rst),
-        ".csv": Format(lambda head: False, read_markers, _REST),  # any table: its suffix tells
-        ".stl": Format(is_stl, read_stl_pair, _REST),
+        ".csv": Format(lambda head: False, read_markers, _REST, is_marked=False),  # any table
+        ".stl": Format(is_stl, read_stl_pair, _REST, is_marked=False),  # binary files have no mark
     }
 )
 
 
 def format_of(file: Path) -> str | None:
     """Return the key in READERS of a file's format: by its content, else its suffix; None where neither tells."""
+    return format_by_head(file.suffix, _head(file), {suffix: form.recognises for suffix, form in READERS.items()})
+
+
+def _head(file: Path) -> bytes:
+    """What a file begins with, nothing where it cannot be read: whoever reads it tells why."""
     try:
         with open_file(file, ReferenceFileError) as stream:
-            head = stream.read(HEAD)
-    except (ReferenceFileError, OSError):  # whoever reads it tells why
-        head = b""
-    return format_by_head(file.suffix, head, {suffix: form.recognises for suffix, form in READERS.items()})
+            return stream.read(HEAD)
+    except (ReferenceFileError, OSError):
+        return b""
+
+
+def _is_recognised(file: Path, key: str) -> bool:
+    head = _head(file)
+    return not head or READERS[key].recognises(head)
 
 
 def read_result(
@@ -133,6 +143,11 @@ def read_record(
         raise ReferenceFileError(f"{file}: {name} is not for {key} files, but for {others}")
     if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
         refuse_unreadable(file)
-    record = READERS[key].read(file, reading, **given)
+    try:
+        record = READERS[key].read(file, reading, **given)
+    except ReferenceFileError as error:
+        if not READERS[key].is_marked or _is_recognised(file, key):
+            raise
+        raise ReferenceFileError(f"{error}; it does not begin as {listed_keys(READERS, key)} do, either") from None
     record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, read_as
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
@@ -40,14 +40,13 @@ class Format(NamedTuple):
     again: str = ""
 
 
+_GMSH = "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
 _PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(
-            is_msh, _alone(read_msh), "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
-        ),
+        ".msh": Format(is_msh, _alone(read_msh), _GMSH),
         ".inp": Format(is_inp, read_inp),
         **{suffix: Format(recognises, _beside(read_vtk), _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
@@ -97,7 +96,8 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     try:
         contents = form.read(data, file)
     except MeshError as error:
-        raise MeshError("; ".join(filter(None, [f"{file}: {error}", form.again]))) from None
+        others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
     try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
