@@ -228,7 +228,7 @@ class _Result:
         except ValueError:
             code = -1
         if code < 0:
-            scan.refuse(f"{scan.shown(head)} is no element")
+            scan.refuse(f"{scan.shown(head)} is no element" + ("" if head.endswith(b"\n") else ": the file is cut off"))
         wanted = width * self._n_nodes(code)
         text = b""
         while len(text) < wanted:
