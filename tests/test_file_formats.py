@@ -48,7 +48,8 @@ def test_a_damaged_mesh_is_refused_as_what_its_content_is(tmp_path: Path) -> Non
     with pytest.raises(MeshError, match=r"mesh\.vtk: line \d+: \$"):
         read_mesh(tmp_path / "mesh.vtk")
     (tmp_path / "mesh.vtk").write_bytes(b"nothing of the kind\n")
-    with pytest.raises(MeshError, match=r"mesh\.vtk: this is no \.vtk file"):
+    neither = r"mesh\.vtk: this is no \.vtk file.*; it does not begin as \.msh, \.inp, .* files do, either; if ParaView"
+    with pytest.raises(MeshError, match=neither):
         read_mesh(tmp_path / "mesh.vtk")
     (tmp_path / "mesh.obj").write_bytes(b"v 0 0 0\n")
     both = (
@@ -80,6 +81,12 @@ HEADS = {
 }
 
 
+for suffix, kind in ((".vtp", "PolyData"), (".vts", "StructuredGrid"), (".vtr", "RectilinearGrid")):
+    HEADS[suffix] = f'<VTKFile type="{kind}">\n'.encode()
+for suffix in (".vtu", ".vtp", ".vts", ".vtr"):
+    HEADS[f".p{suffix[1:]}"] = HEADS[suffix].replace(b'type="', b'type="P')
+
+
 @pytest.mark.parametrize("key", HEADS)
 def test_every_format_of_results_is_recognised_by_itself_alone(tmp_path: Path, key: str) -> None:
     assert [known for known, form in READERS.items() if form.recognises(HEADS[key])] == [key]
@@ -87,6 +94,15 @@ def test_every_format_of_results_is_recognised_by_itself_alone(tmp_path: Path, k
         (tmp_path / f"result{suffix}").write_bytes(HEADS[key])
         assert format_of(tmp_path / f"result{suffix}") == key
     assert format_of(tmp_path / f"none{key.upper()}") == key and format_of(tmp_path / "none.out") is None
+
+
+@pytest.mark.parametrize("key", [key for key, form in READERS.items() if form.is_marked])
+def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -> None:
+    (tmp_path / f"result{key}").write_bytes(b"nothing of the kind\n")
+    (tmp_path / "result.inp").write_text("*NODE\n1,0,0\n2,1,0\n3,1,1\n*ELEMENT,TYPE=CPS3\n1,1,2,3\n")
+    others = [other for other in READERS if other != key]
+    with pytest.raises(ReferenceFileError, match=rf"it does not begin as {re.escape(others[0])}, .* do, either"):
+        read_record(tmp_path / f"result{key}")
 
 
 def test_a_table_is_told_by_its_suffix() -> None:

@@ -131,6 +131,18 @@ def test_a_result_that_opens_is_left_as_it_is_and_told() -> None:
     assert found.notes[0].endswith("they were not joined, and faces between them count as surface")
 
 
+def test_inverted_cells_of_a_result_are_turned_and_told(tmp_path: Path) -> None:
+    body = ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron")
+    cells = body.elements.copy()
+    cells[::3] = cells[::3][:, [0, 2, 1, 3]]
+    data = {"displacement": 0.1 * body.nodes}
+    meshio.Mesh(body.nodes, [("tetra", cells)], point_data=data).write(tmp_path / "mixed.vtu")
+    path, mesh = ts.read_result(tmp_path / "mixed.vtu"), ts.read_mesh(tmp_path / "mixed.vtu")
+    told = "4 of 12 elements are inverted"
+    assert any(warning.startswith(told) for warning in path.warnings) and mesh.notes[0].startswith(told)
+    assert path.problem.mesh.measures.tolist() == mesh.measures.tolist()
+
+
 def test_points_alone_are_never_joined() -> None:
     apart, _ = apart_and_whole()
     markers = replace(apart, cells={})
@@ -146,5 +158,6 @@ def test_the_surface_of_a_torn_result_is_that_of_the_whole(tmp_path: Path) -> No
     apart, whole = (ts.read_result(file) for file in files)
     comparison = ts.compare(apart, whole)
     assert comparison.rms_error == pytest.approx(0.0, abs=1e-9)
+    assert comparison.hausdorff is not None and comparison.hausdorff.max < 1e-12
     assert len(apart.problem.mesh.boundary) == len(whole.problem.mesh.boundary)
     assert any("they were joined" in warning for warning in apart.warnings)

@@ -52,27 +52,27 @@ def read_file(file: Path, error: type[TruespringError]) -> bytes:
             raise error(f"{file} cannot be read: {found.strerror}") from None
 
 
-def file_beside(file: Path, name: str, error: type[TruespringError]) -> Path:
-    """Return the file that `file` names: one that lies in its folder or below.
+def file_beside(folder: Path, name: str, error: type[TruespringError], who: str = "it ") -> Path:
+    """Return the file that one in `folder` names: it lies there or below; `who` begins messages.
 
     Raises `error` for an absolute path, a path that leads out of the folder, by `..` or by a link, and for what is
     not there.
     """
-    told = f"{file.name} names '{name[:80]}'"
-    way_out = "a file names others in its own folder or below: put the file there, and name it so"
+    told = f"{who}names '{name[:80]}'"
+    way_out = "a file names others in its own folder or below: put that file there, and name it so"
     parts = PurePosixPath(name).parts + PureWindowsPath(name).parts
     if not name or "\0" in name or ".." in parts or PurePosixPath(name).is_absolute() or PureWindowsPath(name).anchor:
         raise error(f"{told}: {way_out}")
-    one = file.parent / PureWindowsPath(name).as_posix()
+    one = folder / PureWindowsPath(name).as_posix()
     try:
-        is_inside = one.resolve().is_relative_to(file.parent.resolve())
+        is_inside = one.resolve().is_relative_to(folder.resolve())
         is_there = is_inside and one.exists()
     except (OSError, RuntimeError, ValueError):  # too long a name, a circle of links
         is_inside, is_there = True, False
     if not is_inside:
         raise error(f"{told}, a link that leads elsewhere: {way_out}")
     if not is_there:
-        raise error(f"{told}, which is not there: keep it beside {file.name}")
+        raise error(f"{told}, which is not there: keep it beside")
     return one
 
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from truespring.equilibrium import Path as Equilibria
 from truespring.errors import ReferenceFileError, nearest
-from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
+from truespring.mesh.files.vtk_file import VTK_FORMATS
 from truespring.opening import open_file
 from truespring.reference.checks import refuse_unreadable
 from truespring.reference.dat import is_dat, read_dat
@@ -28,6 +29,7 @@ class Format(NamedTuple):
     recognises: Recognises
     read: Callable[..., Record]
     options: frozenset[str] = frozenset()
+    is_marked: bool = True  # whether every file of the format is recognised
 
 
 _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
@@ -37,24 +39,32 @@ READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".frd": Format(is_frd, read_frd),
         ".dat": Format(is_dat, read_dat, frozenset({"mesh"})),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), read_vtk_result, _FIELD),
-        ".vtk": Format(is_vtk, read_vtk_result, _FIELD),
+        **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
         ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
         ".rst": Format(is_rst, read_rst),
-        ".csv": Format(lambda head: False, read_markers, _REST),  # any table: its suffix tells
-        ".stl": Format(is_stl, read_stl_pair, _REST),
+        ".csv": Format(lambda head: False, read_markers, _REST, is_marked=False),  # any table
+        ".stl": Format(is_stl, read_stl_pair, _REST, is_marked=False),  # binary files have no mark
     }
 )
 
 
 def format_of(file: Path) -> str | None:
     """Return the key in READERS of a file's format: by its content, else its suffix; None where neither tells."""
+    return format_by_head(file.suffix, _head(file), {suffix: form.recognises for suffix, form in READERS.items()})
+
+
+def _head(file: Path) -> bytes:
+    """What a file begins with, nothing where it cannot be read: whoever reads it tells why."""
     try:
         with open_file(file, ReferenceFileError) as stream:
-            head = stream.read(HEAD)
-    except (ReferenceFileError, OSError):  # whoever reads it tells why
-        head = b""
-    return format_by_head(file.suffix, head, {suffix: form.recognises for suffix, form in READERS.items()})
+            return stream.read(HEAD)
+    except (ReferenceFileError, OSError):
+        return b""
+
+
+def _is_recognised(file: Path, key: str) -> bool:
+    head = _head(file)
+    return not head or READERS[key].recognises(head)
 
 
 def read_result(
@@ -74,8 +84,8 @@ def read_result(
     """Read a result that another program wrote as a path that can be compared with others.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers, or a .stl file with the body at rest.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m].
@@ -103,8 +113,8 @@ def read_record(
     """Read a result that another program wrote; its content tells the format, else its suffix.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers or a .stl file.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers or a .stl file.
         field: of VTK files, the name of the displacement.
         undeformed: of tables of markers and STL files, the file with the state at rest.
         mesh: of .dat files, the deck with nodes and elements.
@@ -133,6 +143,11 @@ def read_record(
         raise ReferenceFileError(f"{file}: {name} is not for {key} files, but for {others}")
     if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
         refuse_unreadable(file)
-    record = READERS[key].read(file, reading, **given)
+    try:
+        record = READERS[key].read(file, reading, **given)
+    except ReferenceFileError as error:
+        if not READERS[key].is_marked or _is_recognised(file, key):
+            raise
+        raise ReferenceFileError(f"{error}; it does not begin as {listed_keys(READERS, key)} do, either") from None
     record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

@@ -10,33 +10,40 @@ from typing import NamedTuple
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, is_vtk, is_vtk_xml, read_as
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.vtk import read_vtk
-from truespring.mesh.files.vtu import read_vtu
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
 
+Reader = Callable[[bytes, Path], Contents]
+
+
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
+
 
 class Format(NamedTuple):
-    """How files of a format begin, and what reads them."""
+    """How files of a format begin, what reads them, and how one that cannot be read may be mended.
+
+    A reader takes the bytes of a file and the folder that it lies in.
+    """
 
     recognises: Recognises
-    read: Callable[[bytes, Path], Contents]
+    read: Reader
+    again: str = ""
 
 
-def _alone(read: Callable[[bytes], Contents]) -> Callable[[bytes, Path], Contents]:
-    """Return a reader of files that name no others."""
-    return lambda data, file: read(data)
-
+_GMSH = "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
+_PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".msh": Format(is_msh, _alone(read_msh)),
+        ".msh": Format(is_msh, _alone(read_msh), _GMSH),
         ".inp": Format(is_inp, read_inp),
-        ".vtu": Format(is_vtk_xml("UnstructuredGrid"), _alone(read_vtu)),
-        ".vtk": Format(is_vtk, _alone(read_vtk)),
+        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
@@ -49,7 +56,8 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     folder or below. NSET, ELSET and SURFACE become groups, in their first spelling: those of the assembly by
     their name, those of an instance as INSTANCE.NAME, and by their name where no other scope has it; an NSET
     stands before an ELSET of one name where nodes are asked for. Elements that no body is made of are left
-    out. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    out. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
@@ -79,8 +87,13 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
             f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
             "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
         )
+    form = FORMATS[key]
     try:
-        contents = FORMATS[key].read(data, file)
+        contents = form.read(data, file.parent)
+    except MeshError as error:
+        others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
+    try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None

@@ -33,6 +33,7 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
 _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
 _SUPPORTED = "a body is made of triangles, quadrilaterals, tetrahedra or hexahedra"
 
+_AGAIN = "write the file anew with the program that made it, or mend it there"
 _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
 
 # A coordinate beyond this was damaged, whatever the unit; its square still is a number.
@@ -134,6 +135,11 @@ class Contents:
             node_groups[name] = np.union1d(there, facet_nodes(elements, kind, facets))
         notes = [
             *self.notes,
+            *(
+                f"group '{name}' has elements and facets: loads act on its facets, supports hold the nodes of both"
+                for name, facets in facet_groups.items()
+                if facets.size and element_groups.get(name, facets[:0]).size
+            ),
             *self._second_order(body, nodes),
             *self._unreferenced(body, scale),
             *_coincident(positions, self.node_numbers[nodes]),
@@ -167,7 +173,7 @@ class Contents:
         for name, given in self.facet_groups.items():
             found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
         for block in cells:
-            if block.dim == body[0].dim - 1:
+            if block.dim == body[0].dim - 1 and self.cell_groups:
                 facets = find_facets(elements, kind, places(nodes, self._rows(block.corners)))
                 for name, group in self.cell_groups.items():
                     found.setdefault(name, []).append(facets[_found(block.numbers, group)])
@@ -211,13 +217,13 @@ class Contents:
     def _check_nodes(self) -> None:
         twice = _repeated(self.node_numbers)
         if twice is not None:
-            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice")
+            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice: {_AGAIN}")
         lost = ~np.asarray((np.abs(self.points) < _FAR).all(axis=1))
         if lost.any():
             row = int(lost.argmax())
             raise MeshError(
                 f"{_at(self.node_lines, row)}{lost.sum()} of {len(lost)} nodes have a coordinate that is not finite "
-                f"or beyond {_FAR:g}, the first is node {self.node_numbers[row]}"
+                f"or beyond {_FAR:g}, the first is node {self.node_numbers[row]}: {_AGAIN}"
             )
 
     def _check_cells(self, cells: Cells) -> None:
@@ -227,7 +233,7 @@ class Contents:
             node = next(node for node in cells.nodes[row] if self._rows(np.array([node]))[0] < 0)
             raise MeshError(
                 f"{_at(cells.lines, row)}element {cells.numbers[row]} ({cells.kind}) names node {node}, "
-                "which is not in the file"
+                f"which is not in the file: {_AGAIN}"
             )
 
     def _groups(
@@ -318,7 +324,7 @@ def _by_kind(cells: Sequence[Cells]) -> list[Cells]:
     numbers = np.concatenate([block.numbers for block in joined] or [np.zeros(0, dtype=np.int64)])
     twice = _repeated(numbers)
     if twice is not None:
-        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice")
+        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice: {_AGAIN}")
     return joined
 
 
@@ -341,7 +347,9 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
     if unread:
         raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}")
     if len(body) > 1:
-        raise MeshError(f"{listed(body)}: {_SUPPORTED}, of one kind only")
+        raise MeshError(
+            f"{listed(body)}: {_SUPPORTED}, of one kind only; mesh it with one kind (in gmsh without recombining)"
+        )
     return [block for block in cells if block.dim == dim]
 
 

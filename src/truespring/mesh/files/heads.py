@@ -1,7 +1,7 @@
 """The format of a file, by what it begins with and, where that does not tell, by its suffix."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 #: Tells whether a file that begins with some bytes has a format.
 Recognises = Callable[[bytes], bool]
@@ -26,6 +26,12 @@ def read_as(key: str, suffix: str) -> tuple[str, ...]:
     """Say as what a file was read whose suffix tells something else."""
     ending = f"not that of a file that ends in '{suffix}'" if suffix else "though its name does not tell"
     return (f"read as a {key} file, whose form it has, {ending}",) if key != suffix.lower() else ()
+
+
+def listed_keys(formats: Iterable[str], without: str) -> str:
+    """List the files of other formats than one."""
+    others = [key for key in formats if key != without]
+    return f"{', '.join(others[:-1])} or {others[-1]} files"
 
 
 def is_msh(head: bytes) -> bool:

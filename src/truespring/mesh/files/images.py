@@ -1,6 +1,7 @@
 """Label images, segmented organs, by their suffix: .nii, .nii.gz, .nrrd, .mha, .mhd, .vti and .npy."""
 
 import io
+import math
 import tokenize
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,7 @@ from truespring.mesh.files.metaimage import read_metaimage
 from truespring.mesh.files.nifti import read_nifti
 from truespring.mesh.files.nrrd import read_nrrd
 from truespring.mesh.files.raw_image import SAVE_ANEW, n_voxels
-from truespring.mesh.files.vtu import open_vtk
+from truespring.mesh.files.vtu import dims_of, open_vtk
 from truespring.opening import read_file
 
 # Before the name of an image that comes with PyVista: "pyvista:frog_tissues".
@@ -66,19 +67,22 @@ def _vti(file: Path) -> Labels:
     pieces = image.findall("Piece")
     if len(pieces) != 1:
         raise MeshError(f"there are {len(pieces)} pieces: one is wanted")
-    extent = _numbers(image, "WholeExtent", 6)
+    n_points = np.array(dims_of(image, "WholeExtent"))
+    if dims_of(pieces[0]) != n_points.tolist():
+        raise MeshError("its piece is not the whole image: save it in one piece")
+    low = _numbers(image, "WholeExtent", 6)[::2]
     spacing, origin = _numbers(image, "Spacing", 3, "1 1 1"), _numbers(image, "Origin", 3, "0 0 0")
     direction = _numbers(image, "Direction", 9, "1 0 0 0 1 0 0 0 1").reshape(3, 3)
-    low, n_points = extent[::2], (extent[1::2] - extent[::2] + 1).astype(int)
-    for section, counts, shift in (("CellData", n_points - 1, 0.5), ("PointData", n_points, 0.0)):
-        arrays = reader.arrays(pieces[0], section, int(counts.prod()))
-        scalars = {name: values for name, values in arrays.items() if values.ndim == 1 and values.dtype.kind in "iu"}
+    for section, counts, shift in (("CellData", np.maximum(n_points - 1, 1), 0.5), ("PointData", n_points, 0.0)):
+        arrays = reader.arrays(pieces[0], section, math.prod(counts.tolist()))
+        one = {name: values for name, values in arrays.items() if values.ndim == 1}
+        scalars = {name: values for name, values in one.items() if values.dtype.kind in "iu"} or one
         if scalars:
             if len(scalars) > 1:
-                raise MeshError(f"there are several arrays of integers ({', '.join(scalars)}): leave the labels alone")
+                raise MeshError(f"there are several arrays ({', '.join(scalars)}): leave that of the labels alone")
             values = next(iter(scalars.values())).reshape(counts, order="F")
             return Labels(values, spacing, origin + direction @ ((low + shift) * spacing), direction)
-    raise MeshError("there is no array of integers among the points or cells")
+    raise MeshError("there is no array of labels among the points or cells")
 
 
 def _of_pyvista(name: str) -> Labels:

@@ -25,16 +25,16 @@ _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
 _FLAT = "write the deck flat, with its nodes and elements as *NODE and *ELEMENT (in Abaqus/CAE: File, Export)"
 
 
-def read_inp(data: bytes, file: Path | None = None) -> Contents:
+def read_inp(data: bytes, folder: Path | None = None) -> Contents:
     """Read a .inp file; raise MeshError where it is damaged or makes its mesh in a way that is not read.
 
     Args:
         data: what the file holds.
-        file: where it lies: files that it includes are read in its folder or below, and nowhere else.
+        folder: where it lies: files that it includes are read there or below, and nowhere else.
     """
     if b"\0" in data:
         raise MeshError("this is no .inp file: it is binary, not text")
-    lines = Lines(data, file)
+    lines = Lines(data, folder)
     deck = _Deck()
     for card in cards(lines):
         deck.add(card)

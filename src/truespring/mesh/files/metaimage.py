@@ -46,6 +46,7 @@ _OTHERS = (
     *("AcquisitionDate", "AcquisitionTime", "CompressionLevel", "ElementToIntensityFunctionSlope"),
     "ElementToIntensityFunctionOffset",
 )
+_FREE = ("Comment", "Name", "ElementDataFile")  # of any text
 # A header is shorter.
 _LONGEST = 2**16
 
@@ -67,7 +68,7 @@ def read_metaimage(file: Path) -> Labels:
     refuse_large(shape, dtype)
     if n_axes != 3:
         raise MeshError(f"the image has {n_axes} axes: three are wanted")
-    values = _values(header, _stored(file, header, data[begin:]), dtype, shape)
+    values = _values(header, _stored(file.parent, header, data[begin:]), dtype, shape)
     matrix = numbers(_first(header, _MATRIX, "1 0 0 0 1 0 0 0 1"), 9, "TransformMatrix")
     return Labels(
         values,
@@ -90,6 +91,8 @@ def _header(data: bytes) -> tuple[dict[str, str], int]:
         begin = end
         if not line:
             continue
+        if "=" in value and key in _READ + _OTHERS and key not in _FREE:
+            raise MeshError(f"the header has two '=' in the line of {key}: is it damaged? {SAVE_ANEW}")
         if key in header:
             raise MeshError(f"the header has {key[:40]} twice; {SAVE_ANEW}")
         near = [] if key in _READ + _OTHERS else close_words(key, _READ)
@@ -106,17 +109,17 @@ def _is_damaged(key: str, known: str) -> bool:
     return len(key) == len(known) and sum(one != other for one, other in zip(key, known, strict=True)) <= 2
 
 
-def _stored(file: Path, header: dict[str, str], local: bytes) -> list[bytes]:
+def _stored(folder: Path, header: dict[str, str], local: bytes) -> list[bytes]:
     """Return the data of the voxels: behind the header, in a file beside it, or in several."""
     name = header["ElementDataFile"]
     if name.upper() in ("LOCAL", "LOCAL_DATA"):
         return [local]
     if re.fullmatch(r"LIST(\s+\d+)?(\s*D)?", name, re.IGNORECASE):
         names = [line.strip() for line in local.decode("utf-8", errors="replace").splitlines() if line.strip()]
-        return [data_beside(file, one) for one in names]
+        return [data_beside(folder, one) for one in names]
     if "%" in name:
         raise MeshError(f"ElementDataFile is a pattern, '{name[:40]}': list the files (ElementDataFile = LIST)")
-    return [data_beside(file, name)]
+    return [data_beside(folder, name)]
 
 
 def _values(header: dict[str, str], stored: list[bytes], dtype: np.dtype[Any], shape: tuple[int, ...]) -> Values:

@@ -65,9 +65,11 @@ def read_nifti(file: Path) -> Labels:
         values = inflated_values(data, dtype, shape, "gzip", skip=offset)
     else:
         values = raw_values(memoryview(data)[offset:], dtype, shape)
-    matrix, spacing, notes = _places(header)
+    with np.errstate(all="ignore"):  # a damaged header may hold any number: _places looks at what comes out
+        matrix, spacing, notes = _places(header)
+        values = _scaled(values, header)
     direction = matrix[:, :3] / np.linalg.norm(matrix[:, :3], axis=0)
-    return Labels(_scaled(values, header), spacing, matrix[:, 3], direction, notes=tuple(notes))
+    return Labels(values, spacing, matrix[:, 3], direction, notes=tuple(notes))
 
 
 def _header(begin: bytes) -> tuple[Any, _Order]:
@@ -131,10 +133,9 @@ def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
     The places are those of sform where there is one, else of qform. A matrix that is rounded loses some of the spacing,
     which the header tells, too.
     """
-    with np.errstate(all="ignore"):
-        sides = np.asarray(header["pixdim"][1:4], dtype=np.float64)
-        rows = np.asarray(header["rows"], dtype=np.float64)
-        unit = _MILLIMETRES.get(int(header["units"]) & 7)
+    sides = np.abs(header["pixdim"][1:4].astype(np.float64))
+    rows = header["rows"].astype(np.float64)
+    unit = _MILLIMETRES.get(int(header["units"]) & 7)
     if unit is None:
         raise MeshError(f"the header tells an unknown unit of length, {int(header['units']) & 7}; {SAVE_ANEW}")
     by_q = _by_quaternion(header, sides) if int(header["qform"]) > 0 else None

@@ -65,6 +65,7 @@ _SPELLINGS = {
     **{"blocksize": "block size", "axismins": "axis mins", "axismaxs": "axis maxs", "oldmin": "old min"},
     **{"oldmax": "old max", "sampleunits": "sample units"},
 }
+_VECTOR = r"\([^()]*\)"
 _LONGEST = 2**22  # a header is shorter: Slicer writes hundreds of segments into it
 
 
@@ -81,7 +82,7 @@ def read_nrrd(file: Path) -> Labels:
     if dtype.itemsize > 1 and fields.get("encoding", "").lower() not in _TEXTS:
         dtype = dtype.newbyteorder(_endian(_wanted(fields, "endian")))
     refuse_large(sizes, dtype)
-    values = _values(fields, _stored(file, fields, data[begin:]), dtype, sizes)
+    values = _values(fields, _stored(file.parent, fields, data[begin:]), dtype, sizes)
     is_place = _axes_in_space(fields, sizes)
     spacing, origin, direction = _places(fields, is_place)
     # Layers, where there are any, become the last axis.
@@ -136,18 +137,18 @@ def _endian(text: str) -> Literal["<", ">"]:
     return "<" if text.lower() == "little" else ">"
 
 
-def _stored(file: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
+def _stored(folder: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
     """Return what is stored of the voxels, without what the header tells to skip."""
     name = fields.get("data file")
     if name is None:
         data = behind
     elif name.split()[:1] == ["LIST"]:
         names = [line.strip() for line in behind.decode("utf-8", errors="replace").splitlines() if line.strip()]
-        return b"".join(_skipped(fields, data_beside(file, one)) for one in names)
+        return b"".join(_skipped(fields, data_beside(folder, one)) for one in names)
     elif "%" in name:
         raise MeshError(f"'data file' is a pattern, '{name[:40]}': list the files (data file: LIST)")
     else:
-        data = data_beside(file, name)
+        data = data_beside(folder, name)
     return _skipped(fields, data)
 
 
@@ -183,8 +184,8 @@ def _axes_in_space(fields: Mapping[str, str], sizes: tuple[int, ...]) -> Any:
     """Return which axes lie in space: the others have no direction, or are of kind list."""
     is_place = np.ones(len(sizes), dtype=bool)
     if "space directions" in fields:
-        words = re.findall(r"none|\([^)]*\)", fields["space directions"])
-        if len(words) != len(sizes):
+        words = re.findall(rf"none|{_VECTOR}", fields["space directions"])
+        if len(words) != len(sizes) or "".join("".join(words).split()) != "".join(fields["space directions"].split()):
             raise MeshError(f"'space directions' has {len(words)} axes, there are {len(sizes)}; {SAVE_ANEW}")
         is_place = np.array([word != "none" for word in words])
     elif len(sizes) > 3 and "kinds" in fields:
@@ -207,7 +208,7 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
             f"the space '{space[:40]}' is not read; {', '.join(name for name in _SPACES if '-' in name)} are"
         )
     if "space directions" in fields:
-        axes = np.array([_vector(text, dim) for text in re.findall(r"\([^)]*\)", fields["space directions"])]).T
+        axes = np.array([_vector(text, dim) for text in re.findall(_VECTOR, fields["space directions"])]).T
         spacing = np.linalg.norm(axes, axis=0)
         direction = signs[:, None] * axes / np.where(spacing > 0, spacing, 1.0)
     else:
@@ -233,7 +234,9 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
 
 
 def _vector(text: str, dim: int) -> Floats:
-    return np.array(numbers(text.strip("() ").replace(",", " "), dim, text))
+    if not re.fullmatch(rf"{_VECTOR}", text):
+        raise MeshError(f"'{text[:40]}' is no vector, such as (1,0,0); {SAVE_ANEW}")
+    return np.array(numbers(text[1:-1].replace(",", " "), dim, text))
 
 
 def _segments(keys: Mapping[str, str]) -> tuple[Segment, ...]:

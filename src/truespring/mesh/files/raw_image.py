@@ -66,9 +66,9 @@ def text_values(data: bytes, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Va
     return values.astype(dtype).reshape(shape, order="F")
 
 
-def data_beside(file: Path, name: str) -> bytes:
+def data_beside(folder: Path, name: str) -> bytes:
     """Return what stands in a file that a header names; raise MeshError where it lies elsewhere."""
-    return read_file(file_beside(file, name, MeshError), MeshError)
+    return read_file(file_beside(folder, name, MeshError), MeshError)
 
 
 def refuse_large(shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
