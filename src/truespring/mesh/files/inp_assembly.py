@@ -142,7 +142,7 @@ class Assembly:
             raise MeshError(f"{self._lines.at(lines[row])}: element {numbers[row]} is there twice: number one anew")
         for block in scope.elements:
             unknown = places(nodes.numbers, block.nodes) < 0
-            lost = unknown.any(axis=1)
+            lost = np.asarray(unknown.any(axis=1))
             if lost.any() and dimension(block.kind) > 1:
                 row = int(lost.argmax())
                 raise MeshError(
@@ -150,7 +150,7 @@ class Assembly:
                     f"{block.nodes[row, unknown[row].argmax()]}, which is not in the file"
                 )
             if lost.any():
-                self.notes.append(f"{lost.sum()} of {len(lost)} {block.type} name nodes that are not there: left out")
+                self.notes.append(f"{lost.sum()} of {lost.size} {block.type} name nodes that are not there: left out")
             yield Elements(block.type, block.kind, *(column[~lost] for column in block[2:]))
 
     # --- what is named ----------------------------------------------------------------------------
