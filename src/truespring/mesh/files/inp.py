@@ -22,6 +22,8 @@ from truespring.mesh.files.inp_surfaces import Surfaces
 
 # What makes or moves nodes and elements in a way that is not followed here.
 _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
+# What acts between bodies that touch.
+_BETWEEN = {"CONTACT", "CONTACTPAIR", "TIE", "GAP"}
 _FLAT = "write the deck flat, with its nodes and elements as *NODE and *ELEMENT (in Abaqus/CAE: File, Export)"
 
 
@@ -50,11 +52,13 @@ class _Deck:
         self._instances: dict[str, tuple[Scope, Move | None]] = {}
         self._used: set[str] = set()  # keys of parts that instances are made of
         self._here = self._root
+        self._is_apart = False
 
     def add(self, card: Card) -> None:
         """Take what a card says of the mesh."""
         if card.keyword in _UNREAD:
             raise card.error(f"this is not followed: {_FLAT}")
+        self._is_apart = self._is_apart or card.keyword in _BETWEEN
         match card.keyword:
             case "PART":
                 self._here = self._begin(card, self._parts, Scope)
@@ -115,6 +119,7 @@ class _Deck:
             node_groups=groups.nodes,
             cell_groups=groups.cells,
             facet_groups=groups.facets,
+            is_apart=self._is_apart or len(instances) > 1,
             notes=(*lines.notes, *notes, *_lower(assembly), *assembly.notes, *assembly.lost(), *groups.notes),
         )
 
