@@ -72,6 +72,66 @@ def test_binary_and_short_rows_say_the_same(kind: str, tmp_path: Path) -> None:
     assert_same(read_frd(short), read_frd(text))
 
 
+def of_windows(text: str) -> str:
+    """Exponents of three digits, as programs of Windows write them: a number that is negative is one longer."""
+    row = re.compile(r"(?m)^( -1.{10})((?:.{12})+)$")
+    number = re.compile(r" ?(-?\d\.\d{5}E[+-])(\d\d)")
+    return row.sub(lambda one: one[1] + number.sub(r"\g<1>0\2", one[2]) if "E" in one[2] else one[0], text)
+
+
+@needs_ccx
+def test_exponents_of_three_digits_say_the_same(tmp_path: Path) -> None:
+    stem = run(element_deck("C3D20"), tmp_path)
+    linux = stem.with_suffix(".frd").read_text()
+    windows = tmp_path / "windows.frd"
+    windows.write_text(of_windows(linux), newline="\r\n")
+    assert re.search(r"\dE[+-]0\d\d-\d", windows.read_text()) and re.search(r"\dE[+-]0\d\d\d\.", windows.read_text())
+    assert_same(read_frd(windows), read_frd(stem.with_suffix(".frd")))
+    assert_same(read_frd(windows), read_dat(stem.with_suffix(".dat")))
+    tiny = tmp_path / "tiny.frd"  # -1.00000E-100 is longer than its column everywhere
+    tiny.write_text(re.sub(r"(?s)(DISP.*?\n -1 {9}3).{12}", r"\1-1.00000E-100", linux, count=1))
+    assert read_frd(tiny).levels[0].displacement[2, 0] == -1e-100
+    for damaged, message in {
+        of_windows(linux)[: of_windows(linux).index("DISP") + 400]: "cut off",
+        re.sub(r"(\d\.\d{5})E([+-]0\d\d-)", r"\1F\2", of_windows(linux)): "no row of this block: a node and 3 numbers",
+        re.sub(
+            r"(\dE[+-]0\d\d)-", r"\1 1.00000E+000-", of_windows(linux)
+        ): "no row of this block: a node and 3 numbers",
+    }.items():
+        windows.write_text(damaged)
+        with pytest.raises(ReferenceFileError, match=message):
+            read_frd(windows)
+
+
+COMPOSITE = """*NODE, NSET=NALL
+1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,.5,0,0\n6,1,.5,0\n7,.5,1,0\n8,0,.5,0
+*ELEMENT, TYPE=S8R, ELSET=E\n1,1,2,3,4,5,6,7,8
+*MATERIAL, NAME=M\n*ELASTIC\n1000., .3\n*ORIENTATION,NAME=O\n1.,0.,0.,0.,1.,0.
+*SHELL SECTION, ELSET=E, COMPOSITE\n.05,,M,O\n.05,,M,O\n.02,,M,O
+*BOUNDARY\n1,1,6\n4,1,6\n8,1,6\n*STEP\n*STATIC\n*CLOAD\n2,3,.01\n3,3,.01\n*NODE FILE\nU\n*END STEP
+"""
+
+
+@needs_ccx
+def test_all_layers_of_a_composite_shell_are_read(tmp_path: Path) -> None:
+    """One element is announced, three of twenty nodes are there: a layer each, of 1 x 1 and these heights."""
+    text = run(COMPOSITE, tmp_path).with_suffix(".frd")
+    binary = run(COMPOSITE.replace("NODE FILE", "NODE OUTPUT"), tmp_path, "binary").with_suffix(".frd")
+    assert re.search(rb"    3C +1 ", text.read_bytes())
+    for file in (text, binary):
+        record = read_frd(file)
+        cells = record.cells["hexahedron20"]
+        assert np.ptp(record.points[cells], axis=1) == pytest.approx(np.array([[1, 1, h] for h in (0.05, 0.05, 0.02)]))
+        assert record.notes == ("elements (3C): 1 are announced, 3 are there and were taken",)
+        assert np.abs(record.levels[0].displacement[:, 2]).max() > 0.01
+    data = text.read_bytes()
+    begin, end = data.index(b"    3C"), data.index(b" -3", data.index(b"    3C"))
+    for at in range(begin + 80, end + 3, 7):
+        text.write_bytes(data[:at])
+        with pytest.raises(ReferenceFileError, match=r"cut off|no record|wanted"):
+            read_frd(text)
+
+
 def shortened(text: str) -> str:
     """Numbers of nodes in five columns, fifteen a line, as GraphiX calls the short format."""
     text = re.sub(r"(?m)^(    [23]C.*|  100C.*)1$", r"\g<1>0", text)

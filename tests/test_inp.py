@@ -10,8 +10,10 @@ import pytest
 import truespring as ts
 from truespring.arrays import Floats
 from truespring.errors import MeshError
+from truespring.mesh import ELEMENT_KINDS
 from truespring.mesh.files import read_mesh
 from truespring.mesh.files.inp import read_inp
+from truespring.mesh.files.inp_elements import element_type
 
 # A bar of four cubes along x.
 PLACES = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in range(5)]
@@ -107,6 +109,21 @@ def test_several_instances_have_numbers_and_sets_of_their_own(tmp_path: Path) ->
     )
 
 
+def test_bodies_that_touch_stay_apart_unless_asked(tmp_path: Path) -> None:
+    """Two cubes without a common node: parts of an assembly, or in contact; else torn."""
+    nodes = "".join(f"{n}, {x}, {y}, {z}\n" for n, (x, y, z) in enumerate(SOLID, 1))
+    cube = f"*Part, name=Cube\n*Node\n{nodes}*Element, type=C3D8\n1, 1, 2, 3, 4, 5, 6, 7, 8\n*End Part\n"
+    two = "".join(f"*Instance, name=I{x}, part=Cube\n{x}., 0., 0.\n*End Instance\n" for x in range(2))
+    mesh = deck(tmp_path, cube + assembly("", two))
+    assert mesh.n_nodes == 16 and "8 of 16 nodes share their place with another one" in " ".join(mesh.notes)
+    assert read_mesh(tmp_path / "deck.inp", join=True).n_nodes == 12
+    moved = "".join(f"{n + 8}, {x + 1}, {y}, {z}\n" for n, (x, y, z) in enumerate(SOLID, 1))
+    elements = "1, 1, 2, 3, 4, 5, 6, 7, 8\n2, 9, 10, 11, 12, 13, 14, 15, 16\n"
+    flat = f"*NODE\n{nodes}{moved}*ELEMENT, TYPE=C3D8\n{elements}"
+    assert deck(tmp_path, flat).n_nodes == 12
+    assert deck(tmp_path, f"{flat}*CONTACT PAIR, INTERACTION=I\nA, B\n").n_nodes == 16
+
+
 def test_names_may_stand_behind_their_instance_and_within_each_other(tmp_path: Path) -> None:
     of_part = "*Nset, nset=All, generate\n 1, 20, 1\n*Elset, elset=Half\n1, 2\n"
     more = """*Nset, nset=Both
@@ -157,17 +174,15 @@ def test_numbers_that_are_not_there_are_told(tmp_path: Path) -> None:
 
 
 def area(mesh: ts.Mesh, group: str) -> Floats:
-    """Area times the normal of a group of facets, summed, from how a traction of each direction is spread."""
-    facets = mesh.facet_nodes(mesh.facet_groups[group])
-    corners = mesh.nodes[facets]
-    if mesh.dim == 2:
-        along = corners[:, 1] - corners[:, 0]
-        return np.asarray(np.stack([along[:, 1], -along[:, 0]], axis=1).sum(axis=0))
-    fan = [
-        np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
-        for k in range(1, facets.shape[1] - 1)
-    ]
-    return np.asarray(sum(fan).sum(axis=0) / 2)
+    """Length or area times the normal of the facets of a group, added up."""
+    total = np.zeros(mesh.dim)
+    for facet in mesh.facet_nodes(mesh.facet_groups[group]).tolist():
+        at = mesh.nodes[list(dict.fromkeys(facet))]  # a triangle may have a corner twice
+        if mesh.dim == 2:
+            total += [at[1, 1] - at[0, 1], at[0, 0] - at[1, 0]]
+        else:
+            total += sum(np.cross(at[k] - at[0], at[k + 1] - at[0]) for k in range(1, len(at) - 1)) / 2
+    return total
 
 
 # By type: places of the nodes, and area times outward normal of the faces S1, S2, ...
@@ -178,12 +193,25 @@ FACES = {
         [SOLID[0], SOLID[1], SOLID[3], SOLID[4]],
         [(0, 0, -0.5), (0, -0.5, 0), (0.5, 0.5, 0.5), (-0.5, 0, 0)],
     ),
+    "C3D6": (
+        [SOLID[0], SOLID[1], SOLID[3], SOLID[4], SOLID[5], SOLID[7]],
+        [(0, 0, -0.5), (0, 0, 0.5), (0, -1, 0), (1, 1, 0), (-1, 0, 0)],
+    ),
+    "C3D5": (
+        [*SOLID[:4], (0.5, 0.5, 1.0)],
+        [(0, 0, -1), (0, -0.5, 0.25), (0.5, 0, 0.25), (0, 0.5, 0.25), (-0.5, 0, 0.25)],
+    ),
     "CPS4": (SOLID[:4], [(0, -1), (1, 0), (0, 1), (-1, 0)]),
     "CPE3": ([SOLID[0], SOLID[1], SOLID[3]], [(0, -1), (1, 1), (-1, 0)]),
 }
 
 
-@pytest.mark.parametrize("type_", FACES)
+def has_kind(type_: str) -> bool:
+    known = element_type(type_)
+    return known is not None and known.kind in ELEMENT_KINDS
+
+
+@pytest.mark.parametrize("type_", list(filter(has_kind, FACES)))
 def test_faces_are_those_of_the_element_library(type_: str, tmp_path: Path) -> None:
     """Of each face of one element the area and the normal, also where the file turns the element inside out."""
     places, normals = FACES[type_]
@@ -268,7 +296,7 @@ def test_files_are_included_where_the_deck_names_them(tmp_path: Path) -> None:
     mesh = deck(tmp_path, "*NODE\n*INCLUDE, INPUT=nodes.txt\n" + job)
     assert mesh.measures.tolist() == [1, 1, 1, 1] and sizes(mesh) == {"A": 1}
     assert mesh.notes == (
-        "line 9: *INCLUDE: deck.inp names 'loads.dlo', which is not there: keep it beside deck.inp",
+        "line 9: *INCLUDE: the deck names 'loads.dlo', which is not there: keep it beside",
         "line 1 of sub/more.txt is the last one and has no line end: it may be cut off there",
     )
     same = deck(tmp_path, '*NODE, INPUT="nodes.txt"\n' + job)
@@ -292,11 +320,11 @@ def test_what_is_included_is_bounded_and_never_shown(tmp_path: Path) -> None:
         str(tmp_path / "secret"): "in its own folder or below",
         "link": "a link that leads elsewhere",
         ".": "is a folder",
-        "none.inc": "which is not there: keep it beside deck.inp",
+        "none.inc": "which is not there: keep it beside",
         "loop.inc": "line 1 of loop.inc: .INCLUDE: this file includes itself",
         "deck.inp": "this file includes itself",
         "wide.inc": "1000 times at most: write them into one",
-        "secret": "line 1 of secret: this is no .inp file: a keyword such as .NODE is wanted$",
+        "secret": "line 1 of secret: this is no .inp file: a keyword such as .NODE is wanted(;|$)",
         "bad.inc": "line 2 of bad.inc: a coordinate: numbers are wanted here",
         "set.inc": "line 2 of set.inc: what stands there is neither a number nor a set",
         "binary.inc": "this file is binary, not text",

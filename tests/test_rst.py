@@ -9,6 +9,7 @@ import pytest
 from truespring.errors import ReferenceFileError
 from truespring.mesh.cells import CELL_SHAPES
 from truespring.reference import rst
+from truespring.reference.record import Record
 from truespring.reference.rst import read_rst
 from truespring.reference.vtk_cells import sized
 
@@ -20,6 +21,11 @@ def sample() -> Path:
     from ansys.mapdl.reader import examples
 
     return Path(examples.rstfile)
+
+
+@pytest.fixture(scope="module")
+def record(sample: Path) -> Record:
+    return read_rst(sample)
 
 
 def test_all_sets_are_read_at_their_nodes(sample: Path) -> None:
@@ -38,9 +44,8 @@ def test_all_sets_are_read_at_their_nodes(sample: Path) -> None:
     assert record.notes == ("all levels are mode shapes, whose size is arbitrary: they are no displacement",)
 
 
-def test_its_cells_are_those_of_vtk(sample: Path) -> None:
+def test_its_cells_are_those_of_vtk(record: Record) -> None:
     """A beam of 2 x 2 x 10 bricks, 1 x 1 x 5: their middles lie midway, their volumes are 1/8."""
-    record = read_rst(sample)
     ((name, cells),) = record.cells.items()
     assert name == "hexahedron20" and cells.shape == (40, 20)
     shape = CELL_SHAPES[name]
@@ -64,6 +69,38 @@ def test_cells_that_lack_a_middle_become_their_corners() -> None:
     }
     with pytest.raises(ReferenceFileError, match=r"file.rst: a tetra of 9 nodes is not read"):
         sized(types[:1], np.array([0, 9]), connectivity, is_made, Path("file.rst"))
+
+
+def test_a_file_of_ansys_before_14_is_read(sample: Path, record: Record, tmp_path: Path) -> None:
+    """Its header has 40 words, not 80; behind it the record that follows begins with its own length, flag and numbers.
+
+    So it is in files of 13.0, which Ansys' reader takes: words beyond the 40 are none.
+    """
+    data = bytearray(sample.read_bytes())
+    words = np.frombuffer(data, "<i4")
+    assert words[103] == 80
+    old = words.copy()
+    old[103] = 40
+    old[145:155] = [40, 3, -(2**31), 1, 2, 3, 3, 216, -(2**31), 128]
+    old[11] = int.from_bytes(b"0.31", "little")
+    (tmp_path / "old.rst").write_bytes(old.tobytes())
+    found = read_rst(tmp_path / "old.rst")
+    np.testing.assert_array_equal(found.points, record.points)
+    assert [level.time for level in found.levels] == [level.time for level in record.levels]
+    for level, its in zip(found.levels, record.levels, strict=True):
+        np.testing.assert_array_equal(level.displacement, its.displacement)
+
+
+def test_elements_that_are_no_cells_are_left_out() -> None:
+    """Of contact and the like: Ansys' reader gives them VTK's type 0."""
+    cells, n_lost = sized(
+        np.array([10, 0, 0]),
+        np.array([0, 4, 5, 8]),
+        np.array([*range(4), 0, 1, 2, 3]),
+        np.zeros(4, bool),
+        Path("a.rst"),
+    )
+    assert n_lost == 0 and {name: nodes.tolist() for name, nodes in cells.items()} == {"tetra": [[0, 1, 2, 3]]}
 
 
 def test_a_file_that_is_cut_is_refused(sample: Path, tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)
     try:
-        contents = read_inp(read_file(deck, ReferenceFileError), deck)
+        contents = read_inp(read_file(deck, ReferenceFileError), deck.parent)
     except MeshError as error:
         raise ReferenceFileError(f"{deck}: {error}") from None
     refuse_repeated(contents.node_numbers, "*NODE", deck)

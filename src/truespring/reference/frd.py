@@ -154,7 +154,9 @@ class _Result:
             n = min(left, CHUNK)
             if form in _REAL:
                 found = scan.values(np.dtype([("node", _INT), ("values", _REAL[form], (width,))]), n)
-                yield found["node"].astype(np.int64), found["values"].astype(np.float64)
+                with np.errstate(invalid="ignore"):  # damaged values, which are told later
+                    values = found["values"].astype(np.float64)
+                yield found["node"].astype(np.int64), values
                 continue
             lines = scan.lines(n)
             self._refuse_others(lines, n, count - left, count)
@@ -228,7 +230,7 @@ class _Result:
         except ValueError:
             code = -1
         if code < 0:
-            scan.refuse(f"{scan.shown(head)} is no element")
+            scan.refuse(f"{scan.shown(head)} is no element" + ("" if head.endswith(b"\n") else ": the file is cut off"))
         wanted = width * self._n_nodes(code)
         text = b""
         while len(text) < wanted:
@@ -256,6 +258,8 @@ class _Result:
         try:
             n_components = int(line[13:18])
             count, time, form = int(head[24:36]), float(head[12:24]), int(head[73:75] or _LONG)
+            if n_components < 1 or count < 0:
+                raise ValueError("a count is negative")
         except ValueError:
             scan.refuse(f"the head of {scan.shown(name)} cannot be read: {scan.shown(head)}, {scan.shown(line)}")
         self._refuse_form(form)

@@ -21,18 +21,13 @@ Reader = Callable[[bytes, Path], Contents]
 
 def _alone(read: Callable[[bytes], Contents]) -> Reader:
     """Return a reader of files that name no others."""
-    return lambda data, file: read(data)
-
-
-def _beside(read: Callable[[bytes, Path], Contents]) -> Reader:
-    """Return a reader of files that name others in their folder."""
-    return lambda data, file: read(data, file.parent)
+    return lambda data, folder: read(data)
 
 
 class Format(NamedTuple):
-    """How files of a format begin, what reads them, and how a file that cannot be read may be mended.
+    """How files of a format begin, what reads them, and how one that cannot be read may be mended.
 
-    Readers take the bytes of a file, and its name.
+    A reader takes the bytes of a file and the folder that it lies in.
     """
 
     recognises: Recognises
@@ -48,7 +43,7 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".msh": Format(is_msh, _alone(read_msh), _GMSH),
         ".inp": Format(is_inp, read_inp),
-        **{suffix: Format(recognises, _beside(read_vtk), _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
+        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
     }
 )
 
@@ -94,7 +89,7 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
         )
     form = FORMATS[key]
     try:
-        contents = form.read(data, file)
+        contents = form.read(data, file.parent)
     except MeshError as error:
         others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
         raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None

@@ -85,6 +85,7 @@ class Contents:
         facet_groups: facets by name as their elements' own: the number of a cell and that of its facet in the
             `facets` of ELEMENT_KINDS, shape (n, 2).
         node_lines: where the nodes stand in a text file, shape (n,).
+        is_apart: whether the file says that bodies touch without being one: their nodes are joined only if asked.
         notes: what should be known of the file, in words.
         hint: what its program may have left out where there is no body, and how it writes that.
     """
@@ -96,13 +97,15 @@ class Contents:
     cell_groups: Mapping[str, Ints] = field(default_factory=dict)
     facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     node_lines: Ints | None = None
+    is_apart: bool = False
     notes: tuple[str, ...] = ()
     hint: str = ""
 
     def mesh(self, scale: float, join: bool | None = None) -> Mesh:
         """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none.
 
-        `join` makes nodes at one place one; by default where no two elements share a node.
+        `join` makes nodes at one place one; by default where no two elements share a node, unless the file says that
+        bodies touch there.
         """
         with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
             return self._mesh(scale, join)
@@ -113,7 +116,7 @@ class Contents:
         body = _body(cells, self.hint)
         for block in cells:
             self._check_cells(block)
-        if join is not False:
+        if join or (join is None and not self.is_apart):
             whole = self._joined(body, always=bool(join))
             if whole is not self:
                 return whole._mesh(scale, join=False)

@@ -22,19 +22,21 @@ from truespring.mesh.files.inp_surfaces import Surfaces
 
 # What makes or moves nodes and elements in a way that is not followed here.
 _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
+# What acts between bodies that touch.
+_BETWEEN = {"CONTACT", "CONTACTPAIR", "TIE", "GAP"}
 _FLAT = "write the deck flat, with its nodes and elements as *NODE and *ELEMENT (in Abaqus/CAE: File, Export)"
 
 
-def read_inp(data: bytes, file: Path | None = None) -> Contents:
+def read_inp(data: bytes, folder: Path | None = None) -> Contents:
     """Read a .inp file; raise MeshError where it is damaged or makes its mesh in a way that is not read.
 
     Args:
         data: what the file holds.
-        file: where it lies: files that it includes are read in its folder or below, and nowhere else.
+        folder: where it lies: files that it includes are read there or below, and nowhere else.
     """
     if b"\0" in data:
         raise MeshError("this is no .inp file: it is binary, not text")
-    lines = Lines(data, file)
+    lines = Lines(data, folder)
     deck = _Deck()
     for card in cards(lines):
         deck.add(card)
@@ -50,11 +52,13 @@ class _Deck:
         self._instances: dict[str, tuple[Scope, Move | None]] = {}
         self._used: set[str] = set()  # keys of parts that instances are made of
         self._here = self._root
+        self._is_apart = False
 
     def add(self, card: Card) -> None:
         """Take what a card says of the mesh."""
         if card.keyword in _UNREAD:
             raise card.error(f"this is not followed: {_FLAT}")
+        self._is_apart = self._is_apart or card.keyword in _BETWEEN
         match card.keyword:
             case "PART":
                 self._here = self._begin(card, self._parts, Scope)
@@ -115,6 +119,7 @@ class _Deck:
             node_groups=groups.nodes,
             cell_groups=groups.cells,
             facet_groups=groups.facets,
+            is_apart=self._is_apart or len(instances) > 1,
             notes=(*lines.notes, *notes, *_lower(assembly), *assembly.notes, *assembly.lost(), *groups.notes),
         )
 

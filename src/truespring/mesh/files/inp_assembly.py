@@ -150,7 +150,7 @@ class Assembly:
                     f"{block.nodes[row, unknown[row].argmax()]}, which is not in the file"
                 )
             if lost.any():
-                self.notes.append(f"{lost.sum()} of {len(lost)} {block.type} name nodes that are not there: left out")
+                self.notes.append(f"{lost.sum()} of {lost.size} {block.type} name nodes that are not there: left out")
             yield Elements(block.type, block.kind, *(column[~lost] for column in block[2:]))
 
     # --- what is named ----------------------------------------------------------------------------

@@ -32,12 +32,12 @@ class Lines:
         open_ends: places of last lines that have no line end.
     """
 
-    def __init__(self, data: bytes, file: Path | None) -> None:
+    def __init__(self, data: bytes, folder: Path | None) -> None:
         self.notes: list[str] = []
         self.open_ends: set[int] = set()
-        self._file = file
+        self._folder = folder
         self._names = [""]
-        self._open: list[tuple[Path | None, Iterator[tuple[int, bytes]]]] = [(file, self._of(0, data))]
+        self._open: list[tuple[Path | None, Iterator[tuple[int, bytes]]]] = [(None, self._of(0, data))]
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
         """Yield place and text of each line that is neither blank nor a comment."""
@@ -71,9 +71,9 @@ class Lines:
 
         Names are relative to that folder, in files that are included, too: as both programs have it.
         """
-        if self._file is None:
+        if self._folder is None:
             raise MeshError("files are included by a deck that is read from a file")
-        path = file_beside(self._file, name, MeshError)
+        path = file_beside(self._folder, name, MeshError, who="the deck ")
         if path in [one for one, _ in self._open]:
             raise MeshError("this file includes itself: take the line out")
         if len(self._open) > _DEEPEST or len(self._names) > _MOST:
@@ -81,7 +81,7 @@ class Lines:
         data = read_file(path, MeshError)
         if b"\0" in data:
             raise MeshError("this file is binary, not text")
-        self._names.append(path.relative_to(self._file.parent).as_posix())
+        self._names.append(path.relative_to(self._folder).as_posix())
         self._open.append((path, self._of(len(self._names) - 1, data.removeprefix(b"\xef\xbb\xbf"))))
 
 

@@ -157,9 +157,11 @@ class Scope:
     def _add_nodes(self, card: Card) -> None:
         if card.parameters.get("SYSTEM", "R").upper() != "R":
             raise card.error("coordinates that are not rectangular are not read: write them as x, y, z")
-        rows = [fields(row)[:4] for row in _rows(card)]  # behind the coordinates may stand a normal
-        width = max(map(len, rows))
-        short = [(place, row) for row, place in zip(rows, card.places, strict=True) if len(row) < width]
+        split = [(fields(row)[:4], place) for row, place in zip(_rows(card), card.places, strict=True)]
+        split = [one for one in split if one[0]]  # behind the coordinates may stand a normal
+        rows, places = [row for row, _ in split], [place for _, place in split]
+        width = max(map(len, rows), default=0)
+        short = [(place, row) for row, place in split if len(row) < width]
         for place, row in short[-1:]:
             if place in card.deck.open_ends:
                 raise card.error(f"{len(row) - 1} coordinates in the last line, which has no end: it is cut off", place)
@@ -168,11 +170,11 @@ class Scope:
                 f"{len(short)} of {len(rows)} nodes have fewer coordinates than others of their *NODE, the first is "
                 f"node {word_of(short[0][1])} in {card.deck.at(short[0][0])}: what is missing was taken as 0"
             )
-        numbers = card.integers([row[:1] for row in rows], card.places, "the number of a node")
+        numbers = card.integers([row[:1] for row in rows], places, "the number of a node")
         at = [[*(one if one.strip() else b"0" for one in row[1:]), *[b"0"] * (4 - len(row))] for row in rows]
-        points = card.reals(at, card.places, "a coordinate").reshape(-1, 3)
-        self.nodes.append(Nodes(numbers, points, np.array(card.places)))
-        self._extend("NSET", card, Part("", (Numbers(numbers, np.array(card.places)),), card.place))
+        points = card.reals(at, places, "a coordinate").reshape(-1, 3)
+        self.nodes.append(Nodes(numbers, points, np.array(places, dtype=np.int64)))
+        self._extend("NSET", card, Part("", (Numbers(numbers, np.array(places, dtype=np.int64)),), card.place))
 
     def _add_elements(self, card: Card) -> None:
         name = card.parameters.get("TYPE", "").strip().upper()
@@ -201,7 +203,7 @@ class Scope:
         places = [card.place] * len(rows)
         table = card.integers(known, places, f"an element of {name}").reshape(-1, type_.n_nodes + 1)
         nodes = table[:, (1, 3, 2)] if type_.n_nodes == 3 else table[:, 1:]  # the middle stands between the ends
-        self.elements.append(Elements(name, type_.kind, table[:, 0], nodes, np.array(places)))
+        self.elements.append(Elements(name, type_.kind, table[:, 0], nodes, np.array(places, dtype=np.int64)))
         return np.asarray(table[:, 0])
 
     def _add_set(self, card: Card) -> None:
@@ -295,16 +297,17 @@ def _whole_elements(card: Card, name: str, n_nodes: int) -> tuple[Ints, Ints]:
     places: list[int] = []
     width = 1 + n_nodes
     for text, place in zip(card.rows, card.places, strict=True):
+        row = fields(text)
         if rows and len(rows[-1]) < width:  # the element goes on in this line
-            rows[-1] = rows[-1] + fields(text)
-        else:
-            rows.append(fields(text))
+            rows[-1] = rows[-1] + row
+        elif row:
+            rows.append(row)
             places.append(place)
     for row, place in zip(rows, places, strict=True):
         if len(row) != width:
             why = f"an element of {name} takes {width} numbers, here are {len(row)}"
             raise MeshError(f"{card.deck.at(place)}: {why}")
-    return card.integers(rows, places, "an element").reshape(-1, width), np.array(places)
+    return card.integers(rows, places, "an element").reshape(-1, width), np.array(places, dtype=np.int64)
 
 
 def _range(card: Card, row: bytes, place: int) -> Range:
