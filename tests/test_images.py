@@ -243,7 +243,7 @@ def ball(folder: Path, suffix: str, compressed: bool) -> Path:
 
 def beginning_of_voxels(data: bytes, suffix: str) -> int:
     """Where the voxels begin behind a header that is not compressed."""
-    marks = {".mha": b"ElementDataFile = LOCAL\n", ".nrrd": b"\n\n", ".vti": b"<AppendedData ", ".nii.gz": b""}
+    marks = {".mha": b"ElementDataFile = LOCAL\n", ".nrrd": b"\n\n", ".vti": b'format="binary"', ".nii.gz": b""}
     return data.index(marks[suffix]) + len(marks[suffix])
 
 
