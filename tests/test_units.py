@@ -28,6 +28,22 @@ def test_quantities_become_si(given: object, dimension: Dimension, wanted: float
 
 
 @pytest.mark.parametrize(
+    ("given", "dimension", "question"),
+    [
+        ("10 mPa", "stress", "'10 mPa' is 0.01 Pa: is 10 MPa meant?.* write \"0.01 Pa\""),
+        ("-2.5mPa", "stress", "is -2.5 MPa meant"),
+        ("160 Mm", "length", 'is 160 mm meant?.* write "160000 km"'),
+        ("10 mpa", "stress", "upper and lower case matter, is 'MPa' meant?"),
+        ("3 KPa", "stress", "is 'kPa' meant?"),
+    ],
+)
+def test_a_unit_in_the_wrong_case_is_asked_for(given: str, dimension: Dimension, question: str) -> None:
+    with pytest.raises(TruespringError, match=question.replace("?", r"\?")):
+        to_si(given, dimension)
+    assert to_si("0.01 Pa", "stress") == 0.01 and to_si("5 mN", "force") == 5e-3 and to_si("0 mPa", "stress") == 0
+
+
+@pytest.mark.parametrize(
     "given",
     [
         "1,5 N",

@@ -168,6 +168,10 @@ def test_strips_and_lines_become_triangles_and_segments(tmp_path: Path) -> None:
     (tmp_path / "strip.vtk").write_text(strip + "LINES 1 4\n3 0 2 4\nTRIANGLE_STRIPS 1 7\n6 0 1 2 3 4 5\n")
     mesh = read_mesh(tmp_path / "strip.vtk")
     assert len(mesh.elements) == 4 and mesh.measures == pytest.approx(np.full(4, 0.5))
+    grid = read_vtk_grid((tmp_path / "strip.vtk").read_bytes(), tmp_path)
+    triangles = grid.points[grid.connectivity[4:].reshape(4, 3), :2]  # behind the two segments
+    turns = np.linalg.det(triangles[:, 1:] - triangles[:, :1])
+    assert grid.types.tolist() == [3, 3, 5, 5, 5, 5] and turns.tolist() == [-1, -1, -1, -1]  # one way round
 
 
 def test_xml_under_the_suffix_of_the_legacy_format(tmp_path: Path) -> None:

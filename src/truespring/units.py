@@ -119,11 +119,14 @@ def _parse(text: str, unit: str, allowed: str) -> float:
     except pint.DimensionalityError as error:
         raise TruespringError(f"'{text}' is in {error.units1}, not in {unit}: {allowed}") from None
     except pint.UndefinedUnitError:
-        raise TruespringError(f"'{text}' has an unknown unit (upper and lower case matter): {allowed}") from None
-    except (
-        pint.PintError,
-        ArithmeticError,
-        ValueError,
-        TypeError,
-    ) as error:  # as of degC
+        raise TruespringError(
+            f"'{text}' has an unknown unit (upper and lower case matter{_other_case(unit_text, unit)}): {allowed}"
+        ) from None
+    except (pint.PintError, ArithmeticError, ValueError, TypeError) as error:  # as of degC
         raise TruespringError(f"'{text}' cannot be read: {error}: {allowed}") from None
+
+
+def _other_case(text: str, unit: str) -> str:
+    """Ask for a unit of the same letters in another case, the largest of several: MPa of mPa and MPa."""
+    sizes = {name: size for name, (size, base) in _COMMON.items() if base == unit and name.lower() == text.lower()}
+    return f", is '{max(sizes, key=lambda name: sizes[name])}' meant?" if sizes else ""

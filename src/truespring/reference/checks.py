@@ -11,6 +11,9 @@ from truespring.mesh.files.contents import places
 from truespring.opening import open_file
 from truespring.reference.record import Level, Record
 
+# A coordinate beyond this was damaged; its square still is a number.
+_FAR = 1e30
+
 
 def refuse_unreadable(file: Path) -> None:
     """Raise ReferenceFileError for what is not there, is no regular file or is empty."""
@@ -42,7 +45,7 @@ def checked(record: Record) -> Record:
     """Return the record, with a note on levels where some points did not move; raise where one has no displacement."""
     if not record.levels:
         raise ReferenceFileError(f"{record.file} holds no displacement: ask the other program to write it")
-    lost = ~np.isfinite(record.points).all(axis=1)
+    lost = ~np.asarray((np.abs(record.points) < _FAR).all(axis=1))
     if lost.any():
         name = record.names[lost.argmax()] if record.names else int(lost.argmax())
         raise ReferenceFileError(f"{record.file}: {lost.sum()} points have no finite coordinates, the first is {name}")

@@ -132,6 +132,8 @@ def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
 
 
 def _bytes(file: pathlib.Path) -> bytes:
+    if file.is_dir():
+        raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
     data = read_file(file, ReferenceFileError)
     if not data.strip():
         raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")

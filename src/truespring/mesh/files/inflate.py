@@ -33,42 +33,43 @@ def inflated(data: bytes | memoryview, size: int, method: str) -> bytes:
     refuse_too_large(size)
     if size > 64 + _BEST_RATIO.get(method, size) * len(data):
         raise ValueError(f"{size} bytes are wanted, {len(data)} by {method} cannot hold as many")
-    parts, left, stream = [], size, _METHODS[method]()
-    for begin in range(0, len(data), _CHUNK):
-        piece = bytes(data[begin : begin + _CHUNK])
-        while piece:
-            if stream.eof:
-                if method in _MANY and not piece.strip(b"\0"):
-                    break
-                if method not in _MANY:
-                    raise ValueError(f"{method} ends {len(data) - begin} bytes or fewer before the data do")
-                stream = _METHODS[method]()
-            part = _part(stream, piece, left + 1, method)
-            if len(part) > left:
-                raise ValueError(f"more than the {size} bytes that are wanted come out of {method}")
-            parts.append(part)
-            left -= len(part)
-            piece = stream.unused_data
-    if not stream.eof:
-        raise ValueError(f"cut off: {method} has no end mark, {size - left} of {size} bytes are there")
-    if left:
-        raise ValueError(f"{size} bytes are wanted, {size - left} come out of {method}")
-    return b"".join(parts)
+    found, is_ended = _inflated(data, size + 1, method)
+    if len(found) > size:
+        raise ValueError(f"more than the {size} bytes that are wanted come out of {method}")
+    if not is_ended:
+        raise ValueError(f"cut off: {method} has no end mark, {len(found)} of {size} bytes are there")
+    if len(found) < size:
+        raise ValueError(f"{size} bytes are wanted, {len(found)} come out of {method}")
+    return found
 
 
 def beginning(data: bytes, size: int, method: str) -> bytes:
     """Return the first bytes of the inflated data, `size` of them or fewer; raise ValueError where they are damaged."""
-    return _part(_METHODS[method](), data[: size + _CHUNK], size, method)
+    return _inflated(data, size, method)[0]
+
+
+def _inflated(data: bytes | memoryview, most: int, method: str) -> tuple[bytes, bool]:
+    """Return what comes out, `most` bytes at most, and whether the data end with an end mark."""
+    parts, left, stream = [], most, _METHODS[method]()
+    for begin in range(0, len(data), _CHUNK):
+        piece = bytes(data[begin : begin + _CHUNK])
+        while piece and left:
+            if stream.eof:
+                if method in _MANY and not piece.strip(b"\0"):
+                    break
+                if method not in _MANY:
+                    raise ValueError(f"there are more bytes behind the end of {method}")
+                stream = _METHODS[method]()
+            try:
+                parts.append(bytes(stream.decompress(piece, left)))
+            except (zlib.error, lzma.LZMAError, OSError, EOFError) as error:
+                raise ValueError(f"damaged: {method} says '{error}'") from None
+            left -= len(parts[-1])
+            piece = stream.unused_data
+    return b"".join(parts), bool(stream.eof)
 
 
 def refuse_too_large(size: int) -> None:
     """Raise ValueError where so many bytes are more than half of the memory."""
     if size > 2**28 and size > available_memory() // 2:
         raise ValueError(f"{size / 2**30:.3g} GiB are announced, more than half of the memory")
-
-
-def _part(stream: Any, piece: bytes, most: int, method: str) -> bytes:
-    try:
-        return bytes(stream.decompress(piece, most))
-    except (zlib.error, lzma.LZMAError, OSError, EOFError) as error:
-        raise ValueError(f"damaged: {method} says '{error}'") from None

@@ -3,13 +3,14 @@
 Source: https://itk.org/Wiki/ITK/MetaIO/Documentation; a row of TransformMatrix is an axis of the image.
 """
 
+import difflib
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from truespring.errors import MeshError, close_words
+from truespring.errors import MeshError
 from truespring.mesh.files.labels import Labels
 from truespring.mesh.files.raw_image import (
     SAVE_ANEW,
@@ -95,18 +96,13 @@ def _header(data: bytes) -> tuple[dict[str, str], int]:
             raise MeshError(f"the header has two '=' in the line of {key}: is it damaged? {SAVE_ANEW}")
         if key in header:
             raise MeshError(f"the header has {key[:40]} twice; {SAVE_ANEW}")
-        near = [] if key in _READ + _OTHERS else close_words(key, _READ)
-        if near and _is_damaged(key, near[0]):
+        near = [] if key in _READ + _OTHERS else difflib.get_close_matches(key, _READ, 1, 0.85)
+        if near:
             raise MeshError(f"the header has a key {key[:40]} (did you mean '{near[0]}'?): is it damaged? {SAVE_ANEW}")
         header[key] = value
     if header.get("ObjectType", "Image") != "Image":
         raise MeshError(f"ObjectType is {header['ObjectType'][:40]}: an Image is wanted")
     return header, begin
-
-
-def _is_damaged(key: str, known: str) -> bool:
-    """Whether a key is a known one but for a letter or two."""
-    return len(key) == len(known) and sum(one != other for one, other in zip(key, known, strict=True)) <= 2
 
 
 def _stored(folder: Path, header: dict[str, str], local: bytes) -> list[bytes]:

@@ -12,6 +12,8 @@ from truespring.mesh.files.vtk_grid import Arrays, Grid
 
 # Points of two pieces this near, as a share of the body's diameter, are one.
 _SAME_PLACE = 1e-9
+# A coordinate beyond this was damaged; its square still is a number.
+_FAR = 1e30
 # Marks of cells that a piece holds for others to see, or that are not shown: duplicate, refined, hidden.
 _GHOST = 1 | 8 | 32
 # Values of one point in two pieces that differ by more of the largest are two.
@@ -109,7 +111,7 @@ def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    finite = np.flatnonzero((np.abs(points) < _FAR).all(axis=1))
     size = float(np.linalg.norm(np.ptp(points[finite], axis=0))) if finite.size else 0.0
     pairs = finite[KDTree(points[finite]).query_pairs(_SAME_PLACE * size, output_type="ndarray").reshape(-1, 2)]
     n = len(points)
