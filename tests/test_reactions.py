@@ -5,6 +5,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from truespring.report.summary import difference, summary
 from truespring.report.verdict import drive, force_sentence, verdict
 from truespring.solvers import Newton
 from truespring.study import compare_sources, find_sources
+from truespring.validity.curve import curve
+from truespring.validity.solving import Task, run_task
 
 LENGTH, SIDE = 0.06, 0.02
 TWIST = {"rotation": np.pi / 3, "axis": (1, 0, 0)}
@@ -279,6 +282,19 @@ def test_loads_that_balance_drive_along_the_largest_of_them(large: str) -> None:
     loads = [ts.Force("top", pair), ts.Force("bottom", -pair)]
     path = ts.solve(block(ts.Fixed("left"), loads=loads), SPRINGS, Newton(1))
     assert drive(result(path, path)).axis == axis
+
+
+def test_a_map_judges_as_a_comparison_does() -> None:
+    """By the force and the torque of what is moved, each level as `compare` has it, and no better between them."""
+    mesh, ends = ts.rectangle((LENGTH, SIDE), (3, 1)), [ts.Fixed("left"), ts.Fixed("right", rotation=0.4)]
+    problem = ts.Problem(mesh, ts.Material(20e3, 0.3), ts.PlaneStress(0.01), ends)
+    mine, theirs = (run_task(Task(problem, model, 4)) for model in (SPRINGS, RUBBER))
+    reference: Any = SimpleNamespace(solved=theirs, sizes=np.concatenate([[0.01], np.arange(1, 5) / 4]))
+    found = curve(mine, reference, np.linspace(0, 1, 41), None)
+    told = ts.compare(mine.path, theirs.path)
+    assert found.rms_errors[1:] == pytest.approx(told.rms_errors, rel=1e-9)
+    assert found.force_errors[1:] == pytest.approx(told.force_errors, rel=1e-9) and told.force_errors[0] > 0.05
+    assert found.errors[10::10] == pytest.approx(told.errors, rel=1e-9)
 
 
 # --- files --------------------------------------------------------------------------------------------------------

@@ -69,7 +69,7 @@ def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> I
             for axis, component in zip("xyz", value or (), strict=False):
                 yield f"{prefix}.{name}.{axis}", component
         elif name in values:
-            yield f"{prefix}.{name}", "; ".join(value) if name == "warnings" else value
+            yield f"{prefix}.{name}", "; ".join(value or ()) if name == "warnings" else value
 
 
 def _gathered(columns: Iterable[str]) -> list[str]:
