@@ -453,6 +453,8 @@ def faults(verb: str, text: str, folder: Path) -> list[str]:
         found += [] if got.error and not got.output else [f"wrong input: {got.error!r}, {got.output!r}"]
         found += [] if not out.exists() else ["wrong input left an output folder"]
         return found
+    if found:
+        return found
     summary = json.loads(got.output, parse_constant=refuse_constant)
     if verb == "check":
         return found if got.code == 0 else [*found, f"check ended with {got.code}"]

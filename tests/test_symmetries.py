@@ -108,7 +108,7 @@ LOOKS: dict[str, Callable[[int], Floats]] = {
     "numbered otherwise": np.eye,
     "all at once": lambda dim: 0.037 * turn(dim, -1.1) @ mirror(dim),
 }
-# A shear has its place at the first corner of a cell's face: only a turn that leaves each corner first is no other model.
+# A shear has its place at the first corner of a face: a mirror image, or another turn, is another model.
 ON_AXES = [name for name in SOLVED if name.startswith("terzopoulos")]
 
 
