@@ -62,7 +62,8 @@ def study(number: int) -> str:
 def valid(rng: random.Random) -> Tables:
     """Return the tables of a study of a few elements."""
     dim = rng.choice((2, 2, 3))
-    size = [rng.uniform(0.05, 0.2) * (4 if axis == 0 and rng.random() < 0.5 else 1) for axis in range(dim)]
+    scale = 1.0 if rng.random() < 0.85 else 10 ** rng.uniform(-9, 9)
+    size = [scale * rng.uniform(0.05, 0.2) * (4 if axis == 0 and rng.random() < 0.5 else 1) for axis in range(dim)]
     tables: Tables = {"title": rng.choice(("a beam", "Körper № 7", "日本語", "")), "mesh": _mesh(rng, dim, size)}
     tables["material"] = _material(rng)
     if rng.random() < 0.15:
@@ -114,8 +115,8 @@ def _length(rng: random.Random, value: float) -> Any:
 
 
 def _material(rng: random.Random) -> Tables:
-    young = 10 ** rng.uniform(2, 11)
-    poisson = rng.choice((0, 0.25, 0.3, 1 / 3, 0.45, 0.499, -0.3, rng.uniform(-0.9, 0.49)))
+    young = 10 ** (rng.uniform(2, 11) if rng.random() < 0.9 else rng.uniform(-20, 25))
+    poisson = rng.choice((0, 0.25, 0.3, 1 / 3, 0.45, 0.499, 0.49999999, -0.3, rng.uniform(-0.9, 0.49)))
     material: Tables = {"young": rng.choice((young, f"{young / 1000!r} kPa", f"{young / 1e6!r} MPa"))}
     material["poisson"] = poisson
     if rng.random() < 0.3:
@@ -133,7 +134,7 @@ def _si(value: Any) -> float:
 def _moved(rng: random.Random, dim: int, size: list[float]) -> Tables:
     support: Tables = {"on": rng.choice(("right", "right-middle", "right"))}
     if rng.random() < 0.3 and support["on"] == "right":
-        support["rotation"] = rng.choice(("20 deg", 0.3, -0.05))
+        support["rotation"] = rng.choice(("20 deg", 0.3, -0.05, 7.0))
         if dim == 3:
             support["axis"] = rng.choice(([1.0, 0.0, 0.0], [0.0, 1.0, 1.0]))
         if rng.random() < 0.5:
@@ -150,7 +151,8 @@ def _moved(rng: random.Random, dim: int, size: list[float]) -> Tables:
 def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tables:
     key = rng.choice([*schema.LOADS, "force", "traction"])
     key = "force" if dim == 3 and key == "moment" else key  # in space it has no potential
-    stress = young * 10 ** rng.uniform(-5, -1) * rng.choice((1, -1))
+    strain = rng.uniform(-5, -1) if rng.random() < 0.85 else rng.uniform(-14, 2)
+    stress = young * 10**strain * rng.choice((1, -1))
     section = size[1] * (size[2] if dim == 3 else 0.01)
     place = rng.choice(("right", "right", "top", "right-middle", {"x": size[0]}, {"near": list(size)}))
     match key:
