@@ -721,7 +721,13 @@ def _print_json(value: Any) -> None:
 def _console(options: argparse.Namespace) -> "Console":
     from rich.console import Console
 
-    return Console(quiet=options.quiet or options.json, highlight=False, markup=False, emoji=False)
+    class Plain(Console):
+        """A console that leaves it to `main` to say that its reader has gone."""
+
+        def on_broken_pipe(self) -> None:
+            raise  # what is being handled
+
+    return Plain(quiet=options.quiet or options.json, highlight=False, markup=False, emoji=False)
 
 
 @contextmanager

@@ -86,7 +86,8 @@ def make_block(problem: Problem, elements: Ints) -> Block:
     nodes = mesh.nodes[np.concatenate([surface, inside])]
     material = problem.materials[problem.material_numbers[elements[0]]]
     poisson = material.poisson / (1 + material.poisson) if isinstance(section, PlaneStress) else material.poisson
-    influence = Influence(panels, Kelvin(material.lame.mu, poisson, float(np.linalg.norm(np.ptp(nodes, axis=0)))))
+    across = 2 * float(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1).max())  # the same however the body is turned
+    influence = Influence(panels, Kelvin(material.lame.mu, poisson, across))
     G, H = influence.equations()
     traction = np.asarray(np.linalg.solve(G, H), dtype=np.float64)
     K = section.thickness * _at_nodes(influence, traction)

@@ -30,6 +30,9 @@ _WANTED_ITERATIONS = 4
 _STRAIGHT = 0.5
 # A step is cut back to this share of the first one at least.
 _SHORTEST = 2.0**-12
+_NO_WAY = (
+    "the path has no direction at rest: the load moves nothing, or a part of the body gives way without resistance"
+)
 # Where the first step would take a body so many times its size away, the load does not move what is controlled.
 _FAR = 100.0
 # A critical point where no balance is found is taken for a known state this near, as a share of the step.
@@ -186,6 +189,7 @@ def _along(balance: Balance, first: float, max_steps: int, longest: float) -> It
     yield last.state
     tangent = _tangent(balance, last.state, None)
     if tangent is None:
+        yield _with_cost(balance, replace(last.state, converged=False, residual=np.inf, reason=_NO_WAY))
         return
     direction, slope = tangent
     begin = step = first / slope if slope else first
@@ -253,6 +257,8 @@ def _bordered(
     tangent = sparse.csr_array(matrix)[free][:, free]
     along, weights = push.ravel()[free], constraint.weights.ravel()[free]
     size = float(np.abs(tangent.data).max(initial=0.0))
+    if not along.any() or not np.isfinite(size):  # nothing changes with the load factor
+        return np.full_like(push, np.nan), np.nan
     unit = size / max(norm(along), np.finfo(float).tiny)  # of the load factor: its column then is as large as others
     row = np.append(weights, constraint.share * unit)
     large = size / max(norm(row), np.finfo(float).tiny)

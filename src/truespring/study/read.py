@@ -158,6 +158,7 @@ def read_text(file: str | FilePath) -> StudyText:
         source = io.StringIO(read_file(place, StudyError).decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError:
         raise StudyError(f"{place}: is not a text file in UTF-8; a study is TOML") from None
+    _refuse_long_keys(place, source)
     try:
         tables = tomllib.loads(source)
     except RecursionError:
@@ -183,6 +184,16 @@ def _value_error(file: FilePath, source: str, error: ValueError) -> str:
 # Tables in tables and lists in lists; no study has more than four.
 _DEEPEST = 20
 _TOO_DEEP = f"lists and tables are nested more than {_DEEPEST} deep: no key of a study takes that"
+
+
+# Dotted keys, and lists of decimal numbers, have far fewer; tomllib's time grows with the square of a key's.
+_MOST_DOTS = 100
+
+
+def _refuse_long_keys(file: FilePath, source: str) -> None:
+    for number, line in enumerate(source.splitlines(), 1):
+        if any(part.count(".") > _MOST_DOTS for part in line.split("=")):
+            raise StudyError(f"{file}:{number}: more than {_MOST_DOTS} dots: no key and no list of a study is so long")
 
 
 def _refuse_deep(file: FilePath, tables: Mapping[str, Any]) -> None:
