@@ -171,6 +171,18 @@ def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
         yield _Finer(problem, model, "refined", 1 / (1 - 2 ** (-ORDER * halvings)), n_unknowns)
 
 
+def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
+    """Return a problem on simplices of the same nodes, and the model of second order for it.
+
+    None where the model has no such elements, is of them already, or where its elements were chosen by name.
+    """
+    chosen = getattr(model, "element", None) is not None or not hasattr(model, "element")
+    if chosen or problem.mesh.kind.n_nodes == problem.mesh.dim + 1:
+        return None
+    mesh, parents = in_simplices(problem.mesh)
+    return on_mesh(problem, mesh, parents), model
+
+
 def _with_middles(mesh: Mesh, n_unknowns: int) -> int:
     return round(n_unknowns * (1 + len(mesh.edges) / mesh.n_nodes))
 
