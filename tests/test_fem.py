@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import truespring as ts
 from tests.closed_forms import VOIGT, lame, principal_state
 from truespring.arrays import Floats
-from truespring.models.fem import FemPotential
+from truespring.models.fem import ELEMENTS, FemPotential
 from truespring.models.quadratic import QuadraticPotential
 
 LAWS = ("linear", "saint-venant-kirchhoff", "neo-hookean", "hencky")
@@ -29,7 +29,7 @@ SOLID = [
     (kind, e)
     for kind, finer in (("tetrahedron", "quadratic"), ("hexahedron", "mean-dilatation"))
     for e in ("linear", finer)
-]
+] + [("tetrahedron", "quadratic-mean-dilatation")]
 
 
 def distorted(kind: str = "quadrilateral", share: float = 0.25) -> ts.Mesh:
@@ -507,8 +507,9 @@ def test_no_locking_of_quadratic_tetrahedra() -> None:
 def test_true_deflection_of_the_cantilever(poisson: float) -> None:
     """Two families of elements, each extrapolated by its own observed order, meet within 0.3 %."""
     extrapolated = []
-    for kind, cells in (("hexahedron", (5, 7, 10)), ("tetrahedron", (3, 4, 6))):
-        found = [sunk(loaded_at_its_end(kind, poisson, count), None) for count in cells]
+    families = ("hexahedron", "mean-dilatation", (5, 7, 10)), ("tetrahedron", "quadratic", (3, 4, 6))
+    for kind, element, cells in families:
+        found = [sunk(loaded_at_its_end(kind, poisson, count), element) for count in cells]
         assert found == sorted(found)
         if kind == "tetrahedron":
             assert found[-1] / TRUE_DEFLECTION[poisson] == pytest.approx(1.0, abs=0.02)
@@ -524,17 +525,23 @@ def test_true_deflection_of_the_cantilever(poisson: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "section", "finer"),
+    ("mesh", "section", "usual", "tight"),
     [
-        (ts.box((2.0, 1.0, 1.0), (2, 1, 1)), None, "mean-dilatation"),
-        (ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron"), None, "quadratic"),
-        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStrain(1.0), "mean-dilatation"),
-        (ts.rectangle((2.0, 1.0), (2, 1), "triangle"), ts.PlaneStrain(1.0), "quadratic"),
-        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStress(1.0), "mean-dilatation"),
+        (ts.box((2.0, 1.0, 1.0), (2, 1, 1)), None, "linear", "mean-dilatation"),
+        (ts.box((2.0, 1.0, 1.0), (2, 1, 1), "tetrahedron"), None, "quadratic", "quadratic-mean-dilatation"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStrain(1.0), "linear", "mean-dilatation"),
+        (
+            ts.rectangle((2.0, 1.0), (2, 1), "triangle"),
+            ts.PlaneStrain(1.0),
+            "quadratic",
+            "quadratic-mean-dilatation",
+        ),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.PlaneStress(1.0), "linear", "mean-dilatation"),
+        (ts.rectangle((2.0, 1.0), (2, 1), "triangle"), ts.PlaneStress(1.0), "quadratic", "quadratic"),
     ],
 )
 def test_the_default_and_the_warning(
-    mesh: ts.Mesh, section: ts.PlaneStress | ts.PlaneStrain | None, finer: str
+    mesh: ts.Mesh, section: ts.PlaneStress | ts.PlaneStrain | None, usual: str, tight: str
 ) -> None:
     def problem(poisson: float, region: float | None = None) -> ts.Problem:
         regions = [] if region is None else [ts.Region([0], ts.Material(1.0, region))]
@@ -543,21 +550,24 @@ def test_the_default_and_the_warning(
             mesh, ts.Material(1.0, poisson), section, [ts.Fixed("left")], [ts.Force("right", pull)], regions
         )
 
-    plain, tight, mixed = problem(0.4), problem(0.41), problem(0.3, region=0.45)
+    plain, incompressible, mixed = problem(0.4), problem(0.41), problem(0.3, region=0.45)
     locks = not isinstance(section, ts.PlaneStress)
     for law in LAWS:
-        assert ts.Fem(law).chosen_element(plain) == "linear"
-        for stiff in (tight, mixed):
-            assert ts.Fem(law).chosen_element(stiff) == (finer if mesh.dim == 3 else "linear")
-            assert ts.Fem(law, finer).chosen_element(stiff) == finer
-            assert not ts.Fem(law, finer).warnings(stiff)
-            assert any("lock" in said and finer in said for said in ts.Fem(law, "linear").warnings(stiff)) == locks
+        assert ts.Fem(law).chosen_element(plain) == usual
+        for stiff in (incompressible, mixed):
+            assert ts.Fem(law).chosen_element(stiff) == (tight if locks else usual)
+            assert ts.Fem(law, tight).chosen_element(stiff) == tight
+            assert not ts.Fem(law).warnings(stiff) and not ts.Fem(law, tight).warnings(stiff)
+            warnings = ts.Fem(law, "linear").warnings(stiff)
+            assert any("lock" in said and tight in said and "bending" not in said for said in warnings) == locks
         assert not ts.Fem(law, "linear").warnings(plain)
-    asked = ts.solve(tight, ts.Fem("linear", "linear"), ts.Newton(load_steps=1))
+    asked = ts.solve(incompressible, ts.Fem("linear", "linear"), ts.Newton(load_steps=1))
     assert any("lock at a Poisson's ratio of 0.41" in said for said in asked.warnings) == locks
-    other = {"quadratic": "mean-dilatation", "mean-dilatation": "quadratic"}[finer]
-    with pytest.raises(ts.TruespringError, match=f"element = '{other}' is not for a mesh of {mesh.element}"):
-        ts.Fem("linear", other).potential(plain)
+    others = [element for element in ELEMENTS if element not in ("linear", usual, tight)]
+    assert others
+    for other in others:
+        with pytest.raises(ts.TruespringError, match=f"element = '{other}' is not for a mesh of {mesh.element}"):
+            ts.Fem("linear", other).potential(plain)
 
 
 def test_an_unknown_element_is_refused() -> None:

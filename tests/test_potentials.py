@@ -285,15 +285,17 @@ def turn(dim: int, angle: float) -> Floats:
 
 def test_every_rule_law_and_element_is_here() -> None:
     rules = sum(len(entry.elements) for entry in RULES.values())
-    # Two interpolations on each of four kinds of element, the plane ones in two sections.
-    laws = len(LAWS) * 2 * (2 * 2 + 2)
+    # Two interpolations on each of four kinds of element, the plane ones in two sections; on triangles in plane strain
+    # and on tetrahedra another.
+    laws = len(LAWS) * (2 * (2 * 2 + 2) + 2)
     # HEML: one law on every element, the others on simplices; mass-tensor: the linear law likewise, another on these.
     links, tensors = 6 + 3 * (len(HEML_LAWS) - 1), 6 + 3
     assert len(CASES) == 1 + rules + 11 + laws + links + tensors + 3 * len(BOUNDARIES) + 8
     assert rules >= 19 and laws >= 48
     assert {type(potential_of(name)).__name__ for name in CASES} == {
         *("SpringNetwork", "BiquadraticSprings", "VolumeSprings"),
-        *("FemPotential", "MeanDilatationPotential", "QuadraticPotential", "MetricPotential"),
+        *("FemPotential", "MeanDilatationPotential", "QuadraticPotential", "QuadraticMeanPotential"),
+        "MetricPotential",
         *("HyperelasticLinks", "LinearTensors", "NonlinearTensors", "BlockSprings"),
     }
 

@@ -186,8 +186,8 @@ def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
 def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "linear") -> Twin:
     """Return the body as finite elements of first order, or of the second ("quadratic") where it is of tetrahedra.
 
-    Pressure and gravity are the program's own, other loads come as forces on nodes, and so does all that acts on
-    quadratic elements. Raises ExportError for what cannot be said.
+    Pressure and gravity are the program's own, other loads come as forces on nodes; on quadratic elements gravity too.
+    Raises ExportError for what cannot be said.
     """
     check_fem(problem, law)
     kind, nodes, elements = fem_element(problem), problem.mesh.nodes, problem.mesh.elements
@@ -197,7 +197,9 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
         finer = Fem("linear", element).potential(problem)
         if problem.mesh.element != "tetrahedron" or not isinstance(finer, QuadraticPotential):
             raise ExportError(f"quadratic elements are written of tetrahedra, not of a mesh of {problem.mesh.element}s")
-        kind, nodes, elements, loading, own = "C3D10", finer.nodes, finer.elements, finer.loading, []
+        kind, nodes, elements = "C3D10", finer.nodes, finer.elements
+        loading = replace(finer.loading, following=())
+        own = [one for one in own if one.type != "GRAV"]  # which is among our forces
     lines = [
         f"*ELEMENT, TYPE={kind}, ELSET=BODY",
         *(f"{number}, {joined(one)}" for number, one in enumerate((elements + 1).tolist(), 1)),

@@ -1,6 +1,7 @@
 """Geometry that knows no physics: nodes, elements, named sides, selections."""
 
 from truespring.mesh.cells import CELL_SHAPES as CELL_SHAPES
+from truespring.mesh.cells import quadrature as quadrature
 from truespring.mesh.corner_mesh import corner_mesh as corner_mesh
 from truespring.mesh.distance import Gap as Gap
 from truespring.mesh.distance import gap as gap
@@ -11,7 +12,6 @@ from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.measures import corner_measures as corner_measures
 from truespring.mesh.measures import element_corner_measures as element_corner_measures
-from truespring.mesh.measures import quadrature as quadrature
 from truespring.mesh.mesh import Mesh as Mesh
 from truespring.mesh.middles import SecondOrder as SecondOrder
 from truespring.mesh.middles import edge_numbers as edge_numbers

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -65,6 +65,16 @@ class CellShape:
                 slope += self.powers[:, -1] * _product(at, raised)
             found[:, :, axis] = slope @ self._coefficients
         return found
+
+    def smallest_jacobian(self, places: Floats) -> Floats:
+        """Return the smallest Jacobian of cells whose nodes are at `places` [m^dim], shape (n, n_nodes, dim) to (n,).
+
+        At their nodes and at Gauss points; a cell is folded where it is not positive.
+        """
+        smallest = np.full(len(places), np.inf)
+        for slopes in self.slopes(np.concatenate([self.places, quadrature(self.base, 2)[0]])):
+            smallest = np.minimum(smallest, np.linalg.det(np.einsum("nki,ka->nai", places, slopes)))
+        return smallest
 
     def clipped(self, at: Floats) -> Floats:
         """Return own coordinates moved into the cell, shape (n, dim): unchanged inside."""
@@ -172,3 +182,26 @@ CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
         "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _PYRAMID_EDGES),
     }
 )
+
+
+@cache
+def quadrature(base: str, n: int) -> tuple[Floats, Floats]:
+    """Return Gauss points of a cell in its own coordinates, shape (n^dim, dim), and their weights.
+
+    `base` is a cell of CELL_SHAPES: a line, a quad, a triangle or a tetra. Polynomials of order 2 n - 1 are integrated
+    exactly, of a quad along each axis. Those of simplices are of a collapsed cube, by Gauss-Jacobi points along each
+    axis (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
+    """
+    from scipy.special import roots_jacobi
+
+    dim = {"line": 1, "quad": 2, "triangle": 2, "tetra": 3}[base]
+    collapsed = base in ("triangle", "tetra")
+    at, weights, left = np.zeros((1, 0)), np.ones(1), np.ones(1)  # left: of the height 1 of a simplex
+    for axis in range(dim):
+        power = dim - 1 - axis if collapsed else 0
+        places, shares = roots_jacobi(n, power, 0)
+        along, shares = (1 + places) / 2, shares / 2 ** (power + 1)
+        at = np.column_stack([np.repeat(at, n, axis=0), np.outer(left, along).ravel()])
+        weights = np.outer(weights, shares).ravel()
+        left = np.outer(left, 1 - along).ravel() if collapsed else np.ones(len(weights))
+    return at, weights

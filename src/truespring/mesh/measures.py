@@ -1,7 +1,5 @@
 """What each corner's shape function integrates to over edges, faces and elements: how uniform loads are shared."""
 
-from functools import cache
-
 import numpy as np
 
 from truespring.arrays import Floats
@@ -59,26 +57,3 @@ def facet_measures(corners: Floats) -> Floats:
         return np.asarray(corner_measures(corners).sum(axis=1))
     spans = corners[:, 1:] - corners[:, :1]
     return np.asarray(np.sqrt(np.maximum(np.linalg.det(spans @ spans.swapaxes(1, 2)), 0.0)) / 2)
-
-
-@cache
-def quadrature(base: str, n: int) -> tuple[Floats, Floats]:
-    """Return Gauss points of a cell in its own coordinates, shape (n^dim, dim), and their weights.
-
-    `base` is a cell of CELL_SHAPES: a line, a quad, a triangle or a tetra. Polynomials of order 2 n - 1 are integrated
-    exactly, of a quad along each axis. Those of simplices are of a collapsed cube, by Gauss-Jacobi points along each
-    axis (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
-    """
-    from scipy.special import roots_jacobi
-
-    dim = {"line": 1, "quad": 2, "triangle": 2, "tetra": 3}[base]
-    collapsed = base in ("triangle", "tetra")
-    at, weights, left = np.zeros((1, 0)), np.ones(1), np.ones(1)  # left: of the height 1 of a simplex
-    for axis in range(dim):
-        power = dim - 1 - axis if collapsed else 0
-        places, shares = roots_jacobi(n, power, 0)
-        along, shares = (1 + places) / 2, shares / 2 ** (power + 1)
-        at = np.column_stack([np.repeat(at, n, axis=0), np.outer(left, along).ravel()])
-        weights = np.outer(weights, shares).ravel()
-        left = np.outer(left, 1 - along).ravel() if collapsed else np.ones(len(weights))
-    return at, weights

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
 from truespring.mesh.facets import facet_nodes
 from truespring.mesh.forms import Forms, find_forms
@@ -104,9 +105,16 @@ class Mesh:
         if self.element not in ("triangle", "tetrahedron"):
             raise MeshError(f"middles are of triangles and tetrahedra, not of {self.element} elements")
         try:
-            return frozen_floats(middles, self.edges.shape[:1] + (self.dim,), "middles")
+            frozen = frozen_floats(middles, (len(self.edges), self.dim), "middles")
         except ValueError as error:
             raise MeshError(str(error)) from None
+        keys = self.edges[:, 0] * self.n_nodes + self.edges[:, 1]  # ascending, as edges are
+        of_elements = np.searchsorted(keys, self.pair_keys(self.kind.edges).T)
+        places = np.concatenate([self.nodes[self.elements], frozen[of_elements]], axis=1)
+        shape = CELL_SHAPES["triangle6" if self.element == "triangle" else "tetra10"]
+        folded = shape.smallest_jacobian(places) <= 0
+        self._refuse(folded, "elements", "folded by the nodes in the middle of their edges", lambda: self.centres)
+        return frozen
 
     @property
     def _degenerate(self) -> Floats:

@@ -4,13 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats, Ints
-from truespring.mesh.cells import CELL_SHAPES, CellShape
-from truespring.mesh.measures import quadrature
+from truespring.arrays import Floats, Ints
+from truespring.mesh.cells import CELL_SHAPES, quadrature
 from truespring.mesh.mesh import Mesh
 
 # The cell of second order that has so many corners: an edge, a triangle, a tetrahedron.
 _SHAPES = {2: CELL_SHAPES["line3"], 3: CELL_SHAPES["triangle6"], 4: CELL_SHAPES["tetra10"]}
+# Middles this near to straight edges are on them, a share of the body's diameter.
+_STRAIGHT = 1e-9
 # Gauss points along each axis: what a shape function and the Jacobian of a curved tetrahedron make is of fifth order.
 _GAUSS = 3
 
@@ -32,7 +33,7 @@ class SecondOrder(NamedTuple):
         return self.mesh.nodes[self.mesh.edges].mean(axis=1) if own is None else own
 
     def of(self, cells: Ints) -> Ints:
-        """Return the nodes of edges, triangles or tetrahedra given by their corners, in VTK's order; nodes as they are."""
+        """Return all nodes of edges, triangles or tetrahedra given by their corners, in VTK's order."""
         shape = _SHAPES.get(cells.shape[1])
         if shape is None:
             return cells
@@ -58,3 +59,28 @@ def edge_numbers(mesh: Mesh, pairs: Ints) -> Ints:
     low, high = pairs.min(axis=-1), pairs.max(axis=-1)
     keys = mesh.edges[:, 0] * mesh.n_nodes + mesh.edges[:, 1]  # ascending, as the edges are
     return np.asarray(np.searchsorted(keys, low * mesh.n_nodes + high))
+
+
+def fitting_middles(mesh: Mesh, pairs: Ints, places: Floats) -> tuple[Floats | None, int]:
+    """Return the middle of each edge of a mesh [m], None where all are straight, and how many elements did not fit.
+
+    These are folded by the middles given; their edges stay straight, and so do those that have no middle given.
+
+    Args:
+        mesh: of triangles or tetrahedra.
+        pairs: the ends of edges, in any order and any number of times, shape (n, 2); the last one counts.
+        places: the middle of each [m], shape (n, dim).
+    """
+    straight = mesh.nodes[mesh.edges].mean(axis=1)
+    middles = straight.copy()
+    middles[edge_numbers(mesh, pairs)] = places
+    shape, elements = _SHAPES[mesh.elements.shape[1]], SecondOrder(mesh).of(mesh.elements)
+    edges = elements[:, mesh.elements.shape[1] :] - mesh.n_nodes
+    unfit = np.zeros(len(elements), dtype=bool)
+    while np.abs(middles - straight).max() > _STRAIGHT * mesh.diameter:
+        folded = shape.smallest_jacobian(np.concatenate([mesh.nodes, middles])[elements]) <= 0
+        if not folded.any():
+            return middles, int(unfit.sum())
+        unfit |= folded
+        middles[edges[folded]] = straight[edges[folded]]  # which may fold a neighbour, in the next round
+    return None, int(unfit.sum())

@@ -1,16 +1,19 @@
 """Meshes of half the size: each element divided at the middles of its edges, faces and body."""
 
 import itertools
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Ints
+from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError
+from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.facets import children_of_facet, facet_nodes
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.mesh.mesh import Mesh
+from truespring.mesh.middles import SecondOrder, edge_numbers, fitting_middles
 from truespring.mesh.rows import ascending, distinct_rows
 
 # A tetrahedron's corners and middles of its edges, in the order of the kind's own: four corners are cut off, and the
@@ -32,7 +35,8 @@ def refined(mesh: Mesh) -> Mesh:
     """Return the mesh with each edge halved: two elements a line, four a face, eight a body; groups are carried over.
 
     A group of elements or of facets has their parts, and its group of nodes those of the parts. To a group of nodes
-    alone a new node belongs where all nodes that it is the middle of do.
+    alone a new node belongs where all nodes that it is the middle of do. Edges through middles of their own are
+    divided there, and go on as curves.
     """
     parents, children = _division(mesh.element)
     n_corners = mesh.elements.shape[1]
@@ -48,7 +52,7 @@ def refined(mesh: Mesh) -> Mesh:
         found = distinct_rows(ascending(np.ascontiguousarray(corners.T)))
         new = corners[found.first]
         numbers.append(n_nodes + found.of.reshape(-1, len(local)))
-        places.append(mesh.nodes[new].mean(axis=1))
+        places.append(_halfway(mesh, new))
         for inside in groups.values():
             inside.append(np.asarray(inside[0][new].all(axis=1)))
         n_nodes += len(new)
@@ -65,7 +69,26 @@ def refined(mesh: Mesh) -> Mesh:
         if name in facet_groups:
             members.append(facet_nodes(elements, mesh.element, facet_groups[name]).ravel())
         node_groups[name] = np.concatenate(members)
-    return Mesh(np.concatenate(places), elements, mesh.element, node_groups, element_groups, facet_groups, mesh.notes)
+    finer = Mesh(np.concatenate(places), elements, mesh.element, node_groups, element_groups, facet_groups, mesh.notes)
+    return finer if mesh.middles is None else _curved(finer, mesh)
+
+
+def _halfway(mesh: Mesh, groups: Ints) -> Floats:
+    """The middle of groups of nodes [m], shape (n, dim): of the ends of an edge the mesh's own."""
+    if mesh.middles is None:
+        return np.asarray(mesh.nodes[groups].mean(axis=1))
+    return np.asarray(mesh.middles[edge_numbers(mesh, groups)])
+
+
+def _curved(finer: Mesh, mesh: Mesh) -> Mesh:
+    """The refined mesh with edges that lie where those of elements of second order are, inside them too."""
+    whole, (_, children) = SecondOrder(mesh), _division(mesh.element)
+    local_edges = np.array(children)[:, np.array(mesh.kind.edges)].reshape(-1, 2)
+    shape = CELL_SHAPES["triangle6" if mesh.element == "triangle" else "tetra10"]
+    shares = shape.shapes(shape.places[local_edges].mean(axis=1))
+    places = np.einsum("ek,nki->nei", shares, whole.nodes[whole.of(mesh.elements)])
+    pairs = finer.elements[:, np.array(mesh.kind.edges)]
+    return replace(finer, middles=fitting_middles(finer, pairs.reshape(-1, 2), places.reshape(-1, mesh.dim))[0])
 
 
 def _children_of(elements: Ints, count: int) -> Ints:

@@ -14,7 +14,7 @@ from truespring.models.symmetric import contracted, identity, inverted, outer, s
 
 
 class _Volume(NamedTuple):
-    """The part of lambda at the Gauss points, of the mean v of the volume ratio or, of some laws, of the strain's trace.
+    """The part of lambda: a function of the mean v of the volume ratio or, of some laws, of the strain's trace.
 
     Attributes:
         energy, pressure, stiffness: lambda/2 v^2, or lambda/2 (ln v)^2, and its derivatives by v, axes (element, 1).
@@ -84,7 +84,7 @@ class QuadraticMeanPotential(QuadraticPotential):
         volume = self._volume(at)
         along = self._forces(at, np.ascontiguousarray(volume.slope))  # the derivative of the mean, times the volume
         stiffness = (volume.stiffness / at.volumes.sum(axis=1, keepdims=True))[:, :, None]
-        return super()._tangent(at, stress) + stiffness * along[:, :, None] * along[:, None]
+        return np.asarray(super()._tangent(at, stress) + stiffness * along[:, :, None] * along[:, None])
 
 
 def _mean(values: Floats, at: Points) -> Floats:

@@ -192,8 +192,8 @@ def _element_facts(result: Result) -> list[tuple[str, str]]:
     told = {
         "mean-dilatation": "of mean dilatation, which do not lock where the material is nearly incompressible",
         "quadratic": "of second order, with nodes in the middle of the edges",
-        "quadratic-mean-dilatation": "of second order, which take the volume of each as a whole and do not lock where the "
-        "material is nearly incompressible",
+        "quadratic-mean-dilatation": "of second order and mean dilatation, which do not lock where the material is "
+        "nearly incompressible",
     }
     return [("finite elements", words) for name, words in told.items() if name in used]
 

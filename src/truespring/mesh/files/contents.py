@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from truespring.errors import MeshError
 from truespring.mesh.facets import facet_nodes, find_facets, folded, mirrored_facets
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
 from truespring.mesh.mesh import Mesh
+from truespring.mesh.middles import fitting_middles
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
 #: fixed number of corners are here to be refused by name.
@@ -48,7 +49,7 @@ class Cells:
 
     Attributes:
         kind: a key of CELL_KINDS.
-        nodes: the file's node numbers, corners first, shape (n_cells, nodes of a cell).
+        nodes: the file's node numbers, corners first, then middles of edges in VTK's order, shape (n_cells, k).
         numbers: the file's cell numbers, shape (n_cells,).
         lines: where they stand in a text file, shape (n_cells,).
     """
@@ -127,13 +128,13 @@ class Contents:
             *_turned(is_turned, elements, kind, positions),
             *facet_notes,
             *(
-                f"group '{name}' has no node of the body and was left out"
+                f"group '{name}' has {self._none_of(name, body)} and was left out"
                 for name in node_groups
                 if not node_groups[name].size
             ),
         ]
         try:
-            return Mesh(
+            mesh = Mesh(
                 positions,
                 elements,
                 kind,
@@ -142,6 +143,7 @@ class Contents:
                 facet_groups=_not_empty(facet_groups),
                 notes=tuple(notes),
             )
+            return self._curved(mesh, body, nodes, scale)
         except MeshError as error:
             raise MeshError(f"{error}; elements are counted from 0 in the file's order: {_MEND}") from None
 
@@ -207,15 +209,41 @@ class Contents:
             name: _found(self.node_numbers[nodes], np.unique(np.concatenate(group))) for name, group in members.items()
         }
 
+    def _none_of(self, name: str, body: Sequence[Cells]) -> str:
+        """Say what a group without a node at a corner of the body has."""
+        between = np.isin(self.node_groups.get(name, np.zeros(0)), np.concatenate([one.nodes.ravel() for one in body]))
+        return "only nodes between the corners of the body" if between.any() else "no node of the body"
+
     def _second_order(self, body: Sequence[Cells], nodes: Ints) -> list[str]:
         high = [block for block in body if block.nodes.shape[1] > block.corners.shape[1]]
         if not high:
             return []
-        between = np.setdiff1d(np.concatenate([block.nodes.ravel() for block in high]), self.node_numbers[nodes])
-        return [
-            f"{sum(len(block.nodes) for block in high)} elements of second order became their corners; "
-            f"{len(between)} nodes between the corners were left out"
-        ]
+        count = sum(len(block.nodes) for block in high)
+        between = len(np.setdiff1d(np.concatenate([block.nodes.ravel() for block in high]), self.node_numbers[nodes]))
+        if len(_with_middles(body)) == len(high):
+            return [
+                f"{count} elements of second order: finite elements take the {between} nodes in the middle of their "
+                "edges, springs and elements of first order the corners alone"
+            ]
+        left = f"{between} nodes between the corners were left out"
+        return [f"{count} elements of second order became their corners; {left}"]
+
+    def _curved(self, mesh: Mesh, body: Sequence[Cells], nodes: Ints, scale: float) -> Mesh:
+        """Return the mesh with the nodes in the middle of the edges of triangles and tetrahedra."""
+        high = _with_middles(body)
+        if not high:
+            return mesh
+        rows = self._rows(np.concatenate([block.nodes for block in high]))
+        pairs = np.searchsorted(nodes, rows[:, np.array(mesh.kind.edges)]).reshape(-1, 2)
+        places = self.points[rows[:, mesh.kind.n_nodes :].ravel(), : mesh.dim] * scale
+        middles, n_folded = fitting_middles(mesh, pairs, places)
+        if middles is None:
+            return mesh
+        note = (
+            f"{n_folded} elements of second order are folded by the nodes in the middle of their edges: these edges "
+            "were taken for straight"
+        )
+        return replace(mesh, middles=middles, notes=(*mesh.notes, *([note] if n_folded else [])))
 
     def _unreferenced(self, body: Sequence[Cells], scale: float) -> list[str]:
         has_element = np.zeros(len(self.points), dtype=bool)
@@ -303,6 +331,17 @@ def _body(cells: Sequence[Cells]) -> list[Cells]:
     if len(body) > 1:
         raise MeshError(f"{listed(body)}: {_SUPPORTED}, of one kind only")
     return [block for block in cells if block.dim == dim]
+
+
+def _with_middles(body: Sequence[Cells]) -> list[Cells]:
+    """Return the blocks of triangles and tetrahedra that have a node in the middle of each edge and no other."""
+    simplices = [block for block in body if block.kind in ("triangle", "tetrahedron")]
+    kinds = [ELEMENT_KINDS[block.kind] for block in simplices]
+    return [
+        block
+        for block, kind in zip(simplices, kinds, strict=True)
+        if block.nodes.shape[1] == kind.n_nodes + len(kind.edges)
+    ]
 
 
 def _in_their_dimensions(positions: Floats, kind: str) -> Floats:

@@ -39,6 +39,9 @@ _TYPES: dict[int, tuple[str, int]] = {
     14: ("pyramid", 14),
 }
 
+# Where the last two of ten nodes change places with VTK's.
+_TEN = (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)
+
 # Dimension and number of a physical group or of an entity.
 _Tag = tuple[int, int]
 # Numbers, points and lines of nodes.
@@ -395,7 +398,7 @@ def _elements_4(source: _Source, physicals: dict[_Tag, list[int]]) -> _Elements:
         dim, entity, type_, count = source.counts(3, 1)
         kind, n_nodes = source.known(type_)
         table, lines = source.integers(count, 1 + n_nodes)
-        cells.append(Cells(kind, table[:, 1:], table[:, 0], lines))
+        cells.append(Cells(kind, _in_vtk_order(table[:, 1:], kind), table[:, 0], lines))
         for group in physicals.get((dim, entity), []):
             groups.setdefault((dim, group), []).append(table[:, 0])
     source.check_total(sum(len(block.nodes) for block in cells), n_elements)
@@ -416,7 +419,13 @@ def _elements_2(source: _Source) -> _Elements:
             numbers, once = numbers[first[cell]], np.sort(first)
         else:  # a cell is twice in one group: the mesh refuses it
             once = np.arange(len(table))
-        cells.append(Cells(kind, nodes[once], numbers[once], None if lines is None else lines[once]))
+        cells.append(
+            Cells(kind, _in_vtk_order(nodes[once], kind), numbers[once], None if lines is None else lines[once])
+        )
         for number in np.unique(group[group > 0]).tolist():
             groups.setdefault((CELL_KINDS[kind][0], number), []).append(numbers[group == number])
     return cells, groups
+
+
+def _in_vtk_order(nodes: Ints, kind: str) -> Ints:
+    return nodes[:, _TEN] if kind == "tetrahedron" and nodes.shape[1] == len(_TEN) else nodes

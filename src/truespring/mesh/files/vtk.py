@@ -62,6 +62,7 @@ _TYPES: dict[int, tuple[str, int | None]] = {
         )
     },
 }
+_BEZIER = 75
 # Pixels and voxels number their nodes along x, then y, then z.
 _PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
 
@@ -133,6 +134,8 @@ def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cell
         raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
     nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
     order = {8: _PIXEL, 11: _VOXEL}.get(type_)
+    if type_ >= _BEZIER:  # between the corners are control points, which lie on no edge
+        nodes = nodes[:, : CELL_KINDS[kind][1]]
     return Cells(kind, nodes if order is None else nodes[:, order], numbers)
 
 
