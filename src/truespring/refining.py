@@ -97,10 +97,12 @@ def work_of(path: Path) -> float:
     return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
 
 
-def reference_error(problem: Problem, model: Model, solver: Solver | None = None) -> OwnError:
-    """Solve a problem and return how far the solution is from its own limit; see `own_error`."""
+def reference_error(
+    problem: Problem, model: Model, solver: Solver | None = None, most_work: float = math.inf
+) -> OwnError:
+    """Solve a problem and return how far the solution is from its own limit, whatever that costs; see `own_error`."""
     solver = solver or Newton()
-    return own_error(solve(problem, model, solver), model, solver, math.inf)
+    return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
 def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
@@ -118,7 +120,8 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
     found, spent = None, 0.0
     try:
         for finer in _finer(path.problem, model):
-            if spent + _ITERATIONS * finer.n_unknowns**_GROWTH > most_work:
+            cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
+            if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
             limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
             spent += work_of(limit)
