@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
@@ -287,3 +288,36 @@ def difference_errors(function: Callable[[float], Floats], derivative: Floats, s
 def observed_orders(errors: Floats, steps: Sequence[float]) -> Floats:
     """Slopes of the errors against the steps in logarithms, shape (steps - 1,)."""
     return np.asarray(np.diff(np.log(errors)) / np.diff(np.log(np.array(steps))))
+
+
+# --- A pipe under pressure that follows, neo-Hookean, in plane strain -------------------------------------------------
+
+
+def pressed_pipe(pressure: float, young: float, poisson: float, inner: float, outer: float) -> tuple[float, float]:
+    """Return the radius inside and the stored energy of a whole pipe [J/m], pressed from inside, free outside.
+
+    The only equation is along the radius, dP/dR + (P - Q) / R = 0 with P and Q the nominal stress along and around, of
+    W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2. It is integrated from the radius inside, where P is -p times the
+    stretch around, and that radius is the one that leaves the outside free.
+    """
+    lam, mu = young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
+
+    def along(radial: float, around: float) -> float:
+        return mu * radial + (lam * math.log(radial * around) - mu) / radial
+
+    def slope(place: float, values: Floats) -> list[float]:
+        radius, stress, _ = values
+        around = radius / place
+        radial = float(brentq(lambda one: along(one, around) - stress, 0.05, 5.0, xtol=1e-15, rtol=1e-14))
+        volume = math.log(radial * around)
+        hoop = mu * around + (lam * volume - mu) / around
+        density = mu / 2 * (radial**2 + around**2 - 2) - mu * volume + lam / 2 * volume**2
+        return [radial, (hoop - stress) / place, 2 * math.pi * place * density]
+
+    def outside(inside: float) -> Floats:
+        start = [inside, -pressure * inside / inner, 0.0]
+        found = solve_ivp(slope, (inner, outer), start, rtol=1e-10, atol=1e-12 * young)
+        return np.asarray(found.y[:, -1])
+
+    inside = float(brentq(lambda one: outside(one)[1], inner, 1.5 * inner, xtol=1e-12))
+    return inside, float(outside(inside)[2])

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,13 @@ from tests.studies import STUDY, changed, written
 from tests.test_examples import EXAMPLES
 from truespring.calibration import turned
 from truespring.cli import main
+from truespring.comparison import compare
+from truespring.equilibrium import solve
 from truespring.errors import MeshError, StudyError
 from truespring.loading import Fixed, Moment
 from truespring.material import Material
-from truespring.mesh import box, rectangle
-from truespring.models import GivenSprings, Springs
+from truespring.mesh import box, in_simplices, rectangle, refined
+from truespring.models import Fem, GivenSprings, Springs
 from truespring.problem import Problem
 from truespring.report.result import head_note
 from truespring.report.series import write_mesh
@@ -34,7 +37,7 @@ UP = changed(REFERENCE, ('["0 N", "-0.01 N"]', '["0.002 N", "0.008 N"]'))
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the verb wrote for a small study, with another load held out."""
     folder = tmp_path_factory.mktemp("calibrate")
-    study, held = written(folder, changed(REFERENCE)), written(folder, UP, "up.toml")
+    study, held = written(folder, changed(REFERENCE, ("refine = false", ""))), written(folder, UP, "up.toml")
     assert main(["calibrate", str(study), "--held-out", str(held), "--out", str(folder / "out"), "--quiet"]) == 0
     return folder / "out" / "study"
 
@@ -59,11 +62,28 @@ def test_the_calibrated_study_runs_and_gives_the_errors_that_it_tells(out: Path)
     result = run(study)
     fitted = next(one for one in values["cases"] if not one["held_out"])
     assert result.converged
-    assert result.comparisons["neo"].rms_error == pytest.approx(fitted["error_after"], rel=1e-6)
+    # The study's own reference is of first order; what was fitted to is that refined.
+    assert result.standings["neo"].refined_error == pytest.approx(fitted["error_after"], rel=1e-6)
+    assert "neo-Hookean FEM of second order on the same nodes, itself about" in values["headline"]
     rule = result.paths["springs"]
     assert rule.moduli is not None and result.paths["calibrated"].moduli is None  # none are told that are the rule's
     head = result.note
     assert values["headline"] in head and "springs (lloyd)" in head.lower()
+
+
+def test_what_springs_are_fitted_to_is_the_truth_and_not_the_elements_of_their_own_mesh(out: Path) -> None:
+    """Four-node elements two deep are 9 % too stiff; the truth is of second order, on a mesh twice halved."""
+    study = read_study(out / "calibrated.toml")
+    mesh = refined(refined(in_simplices(study.problem.mesh)[0]))
+    truth = solve(replace(study.problem, mesh=mesh), Fem("neo-hookean"), study.solver)
+    springs, four_node = (
+        solve(study.problem, one, study.solver) for one in (study.entries["calibrated"], Fem("neo-hookean"))
+    )  # type: ignore[arg-type]
+    values = json.loads((out / "calibrate.json").read_text(encoding="utf-8"))
+    fitted = next(one for one in values["cases"] if not one["held_out"])
+    told = compare(springs, truth).error
+    assert told is not None and compare(four_node, truth).error > 0.08  # type: ignore[operator]
+    assert told == pytest.approx(fitted["error_after"], abs=0.006) and told < 0.03
 
 
 def test_what_it_is_exported_to_tells_the_error_in_its_header(out: Path, tmp_path: Path) -> None:

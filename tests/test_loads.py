@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from tests.closed_forms import pressed_pipe
 from truespring.arrays import Bools, Floats
 from truespring.errors import TruespringError
 from truespring.potential import Potential, Refined
@@ -272,6 +273,18 @@ def pipe(n: int, inner: float = 1.0, outer: float = 2.0, **more: object) -> ts.P
         [ts.Fixed(bottom, ["y"]), ts.Fixed(left, ["x"])],  # type: ignore[arg-type]
         **values,  # type: ignore[arg-type]
     )
+
+
+def test_a_soft_pipe_stores_what_its_equation_along_the_radius_says() -> None:
+    """Neo-Hookean, widened by half: the one equation that is left, integrated, to the second order of the elements."""
+    radius, energy = pressed_pipe(150.0, 1000.0, 0.3, 1.0, 2.0)
+    errors = []
+    for n in (4, 8):
+        problem = pipe(n, loads=ts.Pressure(pipe(n).loads[0].on, 150.0))  # type: ignore[union-attr]
+        state = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(load_steps=5)).states[-1]
+        errors.append(abs(4 * state.energy / energy - 1))
+        assert state.positions[0, 0] == pytest.approx(radius, rel=0.25 / n**2)
+    assert errors[1] < 0.007 and errors[0] / errors[1] == pytest.approx(4, rel=0.05)
 
 
 def test_a_pipe_widens_as_lame_says() -> None:

@@ -97,10 +97,12 @@ def work_of(path: Path) -> float:
     return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
 
 
-def reference_error(problem: Problem, model: Model, solver: Solver | None = None) -> OwnError:
-    """Solve a problem and return how far the solution is from its own limit; see `own_error`."""
+def reference_error(
+    problem: Problem, model: Model, solver: Solver | None = None, most_work: float = math.inf
+) -> OwnError:
+    """Solve a problem and return how far the solution is from its own limit, whatever that costs; see `own_error`."""
     solver = solver or Newton()
-    return own_error(solve(problem, model, solver), model, solver, math.inf)
+    return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
 def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
@@ -118,7 +120,8 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
     found, spent = None, 0.0
     try:
         for finer in _finer(path.problem, model):
-            if spent + _ITERATIONS * finer.n_unknowns**_GROWTH > most_work:
+            cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
+            if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
             limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
             spent += work_of(limit)
@@ -169,6 +172,18 @@ def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
     for halvings in range(1, _LEVELS + 1):
         problem, n_unknowns = refined_problem(problem), growth * n_unknowns
         yield _Finer(problem, model, "refined", 1 / (1 - 2 ** (-ORDER * halvings)), n_unknowns)
+
+
+def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
+    """Return a problem on simplices of the same nodes, and the model of second order for it.
+
+    None where the model has no such elements, is of them already, or where its elements were chosen by name.
+    """
+    chosen = getattr(model, "element", None) is not None or not hasattr(model, "element")
+    if chosen or problem.mesh.kind.n_nodes == problem.mesh.dim + 1:
+        return None
+    mesh, parents = in_simplices(problem.mesh)
+    return on_mesh(problem, mesh, parents), model
 
 
 def _with_middles(mesh: Mesh, n_unknowns: int) -> int:

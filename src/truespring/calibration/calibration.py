@@ -144,7 +144,10 @@ class Calibration:
                 "fitted to."
             )
         told = [f"{_off(one.both[1])} on {one.case.name} ({_off(one.both[0])} before)" for one in self.held_out]
-        return f"On loads that took no part the calibrated springs are off by {_joined(told)}."
+        against = list(dict.fromkeys(one.case.against for one in self.held_out))
+        return (
+            f"On loads that took no part the calibrated springs are off by {_joined(told)}, against {_joined(against)}."
+        )
 
     @property
     def rows(self) -> list[dict[str, Any]]:

@@ -63,6 +63,7 @@ class LoadCase:
         reference: a path solved on any mesh, or read from a file: of a body of cells full fields, else markers.
         curve: a measured force-displacement curve.
         solver: how equilibrium is found; the levels that are compared are among its load steps.
+        against: what the reference is, in words, and how far it is itself off; by default its label.
         field: full displacement fields on the nodes of the problem, None where the reference holds none.
 
     Raises ProblemError where nothing is known at any level of the solver.
@@ -73,8 +74,12 @@ class LoadCase:
     reference: Path | None = None
     curve: Curve | None = None
     solver: Newton = field(default_factory=Newton)
+    against: str = ""
 
     def __post_init__(self) -> None:
+        if not self.against:
+            known = "what was measured" if self.reference is None else self.reference.label
+            object.__setattr__(self, "against", known)
         if not isinstance(self.solver, Newton):
             raise ProblemError(
                 f'{self.name}: springs are calibrated under load control, with Newton: take control = "load"'

@@ -51,6 +51,37 @@ def fem_bending_factors(
     return bending_factors(problem, None, dict(sizes))
 
 
+@remembered
+def bending_excess(problem: Problem) -> float:
+    """Return by what share linear elements of the whole body are too stiff when its longest side is bent.
+
+    The energy of the nodes of the mesh in pure bending of unit curvature about the body's middle,
+    u = (-x y, (x^2 + nu (y^2 - z^2)) / 2, nu y z), over the exact E / 2 times the integral of y^2, less 1; the larger
+    of both directions in space. For simplices; springs along their edges strain as they do.
+    """
+    material, section = require_body(problem)
+    mesh = problem.mesh
+    young, poisson = section.apparent_moduli(material)
+    sides = np.argsort(mesh.lower - mesh.upper, kind="stable")
+    at = (mesh.nodes - mesh.measures @ mesh.centres / mesh.measures.sum())[:, sides]
+    matrices, found = element_matrices(problem), []
+    for up, aside in ((1, 2), (2, 1))[: mesh.dim - 1]:
+        bent = np.zeros_like(at)
+        bent[:, 0], bent[:, up] = -at[:, 0] * at[:, up], (at[:, 0] ** 2 + poisson * at[:, up] ** 2) / 2
+        if mesh.dim == 3:
+            bent[:, up] -= poisson * at[:, aside] ** 2 / 2
+            bent[:, aside] = poisson * at[:, up] * at[:, aside]
+        moved = np.empty_like(bent)
+        moved[:, sides] = bent
+        by_element = moved[mesh.elements].reshape(len(mesh.elements), -1)
+        energy = np.einsum("ei,eij,ej->", by_element, matrices, by_element) / 2
+        heights = at[:, up][mesh.elements]
+        squares = ((heights**2).sum(axis=1) + heights.sum(axis=1) ** 2) @ mesh.measures
+        exact = young / 2 * section.thickness * squares / ((mesh.dim + 1) * (mesh.dim + 2))
+        found.append(float(energy / exact) - 1)
+    return max(found)
+
+
 def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int, ...]) -> float:
     """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
 

@@ -12,6 +12,7 @@ from truespring.loading import Fixed
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.memory import remembered
 from truespring.mesh import Mesh, box, rectangle
+from truespring.models.bending import bending_excess
 from truespring.models.elasticity import hooke, lattice_classes
 from truespring.models.fem import fem_potential, locks
 from truespring.models.moduli import Moduli, moduli, spring_counts
@@ -26,6 +27,7 @@ from truespring.problem import Problem
 _CAUCHY = {2: 1 / 3, 3: 1 / 4}
 
 # Meshes on which plain springs can be isotropic, by the kind of element that mostly is no such mesh.
+_PLURAL = {"triangle": "triangles", "tetrahedron": "tetrahedra"}
 _ISOTROPIC_MESH = {
     "triangle": "equilateral triangles, or squares",
     "tetrahedron": 'body-centred-cubic tetrahedra (of a box: element = "bcc-tetrahedron")',
@@ -37,7 +39,8 @@ class Fitness:
     """A judgement of springs.
 
     Attributes:
-        fit: whether they realise every material of the body in every direction, within the tolerance.
+        fit: whether they realise every material of the body in every direction, within the tolerance, and are not
+            elements that are too stiff.
         reasons: why they do not, empty where they do.
         better: springs that do, where these do not: plain ones before those with a volume term before coupled ones.
         sentence: all of it in words, with what should be known even of springs that are fit.
@@ -60,14 +63,19 @@ def judge(problem: Problem, springs: Springs, tolerance: float = 0.05) -> Fitnes
     the unbalanced force, is by how much a body deforms otherwise than its moduli tell: disorder from element
     to element averages out, regions that are too stiff or too soft do not.
 
-    What finer elements mend is remarked upon and decides nothing: the bending factor, and the patch test of
+    Coupled springs, which are finite elements of first order, must besides not lock at the Poisson's ratio, and on
+    triangles and tetrahedra, which then strain uniformly, not be too stiff by more than `tolerance` when the whole body
+    is bent: that they are the elements does not make them right. They are still what is better where other springs fail
+    for their moduli, with that said.
+
+    What finer elements mend is else remarked upon and decides nothing: the bending factor, and the patch test of
     a body that is cut from a lattice and fails at its outer elements only.
 
     Raises ModelError where the springs do not go with the mesh, or do not resist every strain.
     """
     judged = _Judge(problem, tolerance)
-    reasons = judged.said(lambda twin: judged.faults(twin, springs))
-    better = judged.better() if reasons else None
+    reasons = judged.said(lambda twin: (*judged.faults(twin, springs), *judged.of_elements(twin, springs)))
+    better = judged.better(springs) if reasons else None
     sentences = judged.against(springs, better) if reasons else judged.in_favour(springs)
     return Fitness(not reasons, reasons, better, " ".join(sentences))
 
@@ -100,8 +108,21 @@ class _Judge:
                     f"{off if math.isfinite(patch.error) else lost}"
                 )
 
-    def better(self) -> Springs | None:
-        """The plain springs that are nearest to the material, or else the first others that are fit."""
+    def of_elements(self, twin: Problem, springs: Springs) -> Iterator[str]:
+        """Why springs that are finite elements of first order are too stiff, though their moduli are right."""
+        material = twin.material
+        assert material is not None  # springs have asked for it
+        kind = twin.mesh.element
+        if springs.coupled and springs_lock(twin, springs):
+            yield f"they are linear finite elements, which lock at a Poisson's ratio of {material.poisson:g}"
+        elif springs.coupled and kind in _PLURAL and (excess := bending_excess(twin)) > self.tolerance:
+            yield (
+                f"they are finite elements of linear {_PLURAL[kind]}, which on this mesh are too stiff in bending by "
+                f"{100 * excess:.2g} %"
+            )
+
+    def better(self, than: Springs) -> Springs | None:
+        """The plain springs that are nearest to the material, or else the first others whose moduli are right."""
         rules = [name for name, rule in RULES.items() if self.problem.mesh.element in rule.elements]
         plain = [Springs(name) for name in rules if not RULES[name].coupled]
         # Plain springs that are nearly isotropic are nearly at Cauchy's ratio: for others none need be tried.
@@ -112,7 +133,7 @@ class _Judge:
         lattice = lattice_classes(self.problem.mesh) is not None  # others have no volume term
         others = [Springs(one.rule, volume=True) for one in plain if lattice]
         others += [Springs(name) for name in rules if RULES[name].coupled]
-        return next((springs for springs in others if self._is_fit(springs)), None)
+        return next((springs for springs in others if springs != than and self._is_fit(springs)), None)
 
     def _above_cauchy(self) -> list[float]:
         """How far each material's Poisson's ratio is above that of an isotropic lattice of plain springs."""
@@ -143,15 +164,21 @@ class _Judge:
 
     def against(self, springs: Springs, better: Springs | None) -> Iterator[str]:
         """Say of springs that they are not fit, and which are better."""
-        found = self.said(lambda twin: ["; ".join(self.faults(twin, springs)) or "they are fit"])
+        found = self.said(
+            lambda twin: ["; ".join((*self.faults(twin, springs), *self.of_elements(twin, springs))) or "they are fit"]
+        )
         yield f"Not fit for {self._whom()}: {'; '.join(found)}."
         if better is None:
-            yield "No rule here is better on this mesh."
+            mend = " Finite elements of second order are, and finer meshes." if springs.coupled else ""
+            yield f"No rule here is better on this mesh.{mend}"
+            yield from self._remarks(springs) if springs.coupled else ()
             yield from self._bending(springs)
             return
         key = f'rule = "{better.rule}"' + (", volume = true" if better.volume else "")
         exact = self._deviation(better) < 1e-6
         yield f"Better here: {key}{', which realises it exactly' if exact else f': {self._realised(better)}'}."
+        for text in self.said(lambda twin: self.of_elements(twin, better)):
+            yield f"But {text}, and so fit for no more than a first look; finite elements of second order are not."
         yield from self._remarks(better)
         simpler = min(self._above_cauchy()) >= -self.tolerance  # below, the volume term is negative on any mesh
         if better.coupled and simpler and self.problem.mesh.element in _ISOTROPIC_MESH:
@@ -227,10 +254,13 @@ def _remarks(twin: Problem, springs: Springs, tolerance: float) -> Iterator[str]
             f"{100 * _patch_test(twin, springs).error:.0f} % off a uniform strain"
         )
     if springs.coupled:
-        yield "coupled springs cost more than plain ones and soften in compression, as St. Venant-Kirchhoff's law does"
+        yield (
+            "coupled springs cost more than plain ones; their law is St. Venant-Kirchhoff's, which softens in "
+            "compression and is far from others, such as the neo-Hookean, from strains of some percent on"
+        )
     if _unbounded(twin, springs):
         yield "the volume term is negative: at large stretch nothing bounds the energy from below"
-    if springs_lock(twin, springs):
+    if springs_lock(twin, springs) and not springs.coupled:  # of these it is a fault
         yield f"at a Poisson's ratio of {material.poisson:g} this mesh locks with them, as with linear finite elements"
 
 

@@ -1,5 +1,7 @@
 """How far references are themselves off, in words: what errors against them are worth."""
 
+from collections.abc import Iterable
+
 from truespring.comparison import Comparison
 from truespring.report.quantity import ROUNDING, percent, tolerance_percent
 from truespring.report.result import Result
@@ -20,28 +22,39 @@ def _percent(value: float | None) -> str:
     return "0 %" if value < ROUNDING else percent(value)
 
 
-def own_error_sentence(result: Result) -> str | None:
-    """Return how far the references are themselves off on their mesh; None where refinement was left out."""
+def own_error_sentence(result: Result, called: dict[str, str]) -> str | None:
+    """Return how far the references are themselves off on their mesh, and the model from them refined.
+
+    None where refinement was left out. `called` is how the references are called.
+    """
     known = {name: one for name, one in result.standings.items() if name in result.comparisons}
+    told = {name: one.value for name, one in known.items() if one.value is not None}
     if not known:
         return None
-    values = [one.value for one in known.values() if one.value is not None]
-    if not values:
-        return f"How far {_who(result, list(known))} on this mesh is itself off is not known."
-    low, high = min(values), max(values)
+    if not told:
+        return f"how far {_who(result, list(known), 'is', 'are')} off is not known."
+    low, high = min(told.values()), max(told.values())
     shown = _percent(high) if _percent(low) == _percent(high) else f"{_number(low)} to {_percent(high)}"
-    unknown = [name for name, one in known.items() if one.value is None]
-    rest = f"; of {_who(result, unknown)} it is not known" if unknown else ""
-    return f"{_who(result, [name for name in known if name not in unknown])} on this mesh is itself {shown} off{rest}."
+    unknown = [name for name in known if name not in told]
+    rest = f"; of {_listed(called[name] for name in unknown)} it is not known" if unknown else ""
+    refined = {name: one.refined_error for name, one in known.items() if one.refined_error is not None}
+    against = [f"{called[name]} {percent(refined[name])}" for name in sorted(refined, key=lambda name: refined[name])]
+    truth = f"; against it refined, {', '.join(against)}" if against else ""
+    return f"{_who(result, list(told), 'is', 'are')} {shown} off{truth}{rest}."
 
 
-def _who(result: Result, names: list[str]) -> str:
-    """One reference by its label; several by what they are."""
+def _who(result: Result, names: list[str], one: str, several: str) -> str:
+    """A reference by its label, several by what they are, on their mesh, and their verb."""
     labels = {result.paths[name].label for name in names}
-    if len(labels) == 1:
-        return labels.pop()
     kinds = {result.paths[name].kind for name in names}
-    return "FEM" if kinds == {"fem"} else "each reference"
+    if kinds == {"springs"}:
+        return f"springs on this mesh {several} themselves"
+    who = labels.pop() if len(labels) == 1 else "FEM" if kinds == {"fem"} else "each reference"
+    return f"{who} on this mesh {one} itself"
+
+
+def _listed(parts: Iterable[str]) -> str:
+    return ", ".join(parts)
 
 
 def _number(value: float) -> str:

@@ -369,7 +369,7 @@ def _agreement(result: Result) -> Iterator[str]:
                 yield f"{errors}."
         who, plural = _subject(result)
         names = {name: display_name(result, name) for name in result.comparisons}
-        yield from filter(None, (equally_wrong_sentence(result, who, plural, names), own_error_sentence(result)))
+        yield from filter(None, (equally_wrong_sentence(result, who, plural, names), own_error_sentence(result, names)))
     for name, one in result.comparisons.items():
         if name not in measured or not _meets_at_full_load(one):
             yield _short_of_full_load(result, name, one)
