@@ -8,7 +8,7 @@ import skfem
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.loading import nodal_force
-from truespring.mesh import SecondOrder, edge_numbers
+from truespring.mesh import Grid, SecondOrder, edge_numbers
 from truespring.models.fem import FemPotential, Reference, reference_element
 from truespring.potential import Loading, Turn
 
@@ -38,6 +38,11 @@ class QuadraticPotential(FemPotential):
     def elements(self) -> Ints:
         """Corners, then middles of the edges, shape (n_elements, 6 or 10)."""
         return self._second_order.of(self.mesh.elements)
+
+    @property
+    def grid(self) -> Grid:
+        """All nodes and elements, by which a displacement goes on between them."""
+        return Grid(self.nodes, {f"{self.mesh.kind.vtk}{self.elements.shape[1]}": self.elements})
 
     @property
     def parents(self) -> Ints:
