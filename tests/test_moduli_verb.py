@@ -70,9 +70,9 @@ BCC, SOFT_BCC = (body(ts.box((3.0, 3.0, 3.0), (3, 3, 3), "bcc-tetrahedron"), poi
 
 
 def solved_error(problem: ts.Problem, springs: ts.Springs) -> float:
-    """Rms distance from linear FEM on the same mesh, under a small load."""
+    """Rms distance from linear FEM of first order on the same mesh, under a small load."""
     once = ts.Newton(load_steps=1)
-    error = ts.compare(ts.solve(problem, springs, once), ts.solve(problem, ts.Fem("linear"), once)).rms_error
+    error = ts.compare(ts.solve(problem, springs, once), ts.solve(problem, ts.Fem("linear", "linear"), once)).rms_error
     assert error is not None
     return error
 

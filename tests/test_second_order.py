@@ -285,6 +285,17 @@ def test_mirrored_elements_keep_them_too(tmp_path: Path) -> None:
     assert measure_of(found) == pytest.approx(measure_of(mesh), rel=1e-12)
 
 
+@pytest.mark.parametrize(("kind", "curved"), [(22, True), (69, True), (76, False)])
+def test_control_points_are_no_middles(tmp_path: Path, kind: int, curved: bool) -> None:
+    """Of Bezier cells the points between the corners lie beside the edges; of Lagrange's and quadratic ones on them."""
+    points = "0 0 0  1 0 0  0 1 0  .5 -.1 0  .6 .6 0  -.1 .5 0"
+    (tmp_path / "cell.vtk").write_text(
+        f"# vtk DataFile Version 3.0\ncell\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 double\n{points}\n"
+        f"CELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n{kind}\n"
+    )
+    assert (read_mesh(tmp_path / "cell.vtk").middles is not None) == curved
+
+
 def test_straight_edges_have_no_middles_of_their_own(tmp_path: Path) -> None:
     as_written(octant(2, 1)).write(tmp_path / "body.vtu")
     found = read_mesh(tmp_path / "body.vtu")
