@@ -487,3 +487,21 @@ def test_damage_of_a_deck_of_parts_ends_in_a_mesh_or_a_message(tmp_path: Path) -
         except MeshError as error:
             assert str(error).startswith(f"{tmp_path / 'deck.inp'}: ")
     assert 5 < n_read < 55
+
+
+def test_an_instance_may_hold_its_own_mesh_and_a_part_its_own_surface(tmp_path: Path) -> None:
+    """As meshes that are not dependent are written; a tool, rigid and out of shells, is left out beside it."""
+    own = f"*Instance, name=I-1, part=Empty\n0., 0., 7.\n{BAR}*Nset, nset=Set-1\n1,\n*End Instance\n"
+    tool = "*Part, name=Tool\n*Node\n1, 9., 9., 9.\n2, 8., 9., 9.\n3, 8., 8., 9.\n4, 9., 8., 9.\n*Node\n5, 9., 9., 1.\n"
+    tool += "*Element, type=R3D4\n1, 1, 2, 3, 4\n*Surface, type=CYLINDER, name=Round\nSTART, 0., 0.\n*End Part\n"
+    of_part = "*Elset, elset=E\n1, 4\n*Surface, name=Top\nE, S5\n"
+    instances = own + "*Instance, name=I-2, part=Bar\n*End Instance\n*Instance, name=T, part=Tool\n*End Instance\n"
+    text = "*Part, name=Empty\n*End Part\n" + tool + part(more=of_part)
+    mesh = deck(tmp_path, text + assembly("*Surface, name=All\nI-2.E, S5\nI-1.1, S6\n", instances))
+    assert (mesh.n_nodes, len(mesh.elements)) == (40, 8) and sizes(mesh)["I-1.Set-1"] == 1
+    assert mesh.nodes[mesh.node_groups["Set-1"]].tolist() == [[0, 0, 7]]
+    assert area(mesh, "I-2.Top").tolist() == area(mesh, "Top").tolist() == [0, 2, 0]
+    assert area(mesh, "All").tolist() == [-1, 2, 0]
+    notes = " ".join(mesh.notes)
+    assert "left out: 1 R3D4" in notes and "5 of 45 nodes are unreferenced" in notes
+    assert "surface 'T.Round' is left out: TYPE=CYLINDER is not read" in notes

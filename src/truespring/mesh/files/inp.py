@@ -24,7 +24,7 @@ from truespring.mesh.files.inp_surfaces import Surfaces
 _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
 # What acts between bodies that touch.
 _BETWEEN = {"CONTACT", "CONTACTPAIR", "TIE", "GAP"}
-_FLAT = "write the deck flat, with its nodes and elements as *NODE and *ELEMENT (in Abaqus/CAE: File, Export)"
+_FLAT = "write nodes and elements out, as *NODE and *ELEMENT (Abaqus/CAE does: import the model, write a job's input)"
 
 
 def read_inp(data: bytes, folder: Path | None = None) -> Contents:
