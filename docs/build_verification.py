@@ -228,7 +228,7 @@ def irregular() -> Iterator[Row]:
     """Nearly equilateral triangles of about 40 by 46 nodes, shaken, in tension: E of springs and of finite elements."""
     for jitter, tabulated in JITTERED.items():
         mesh = triangulated(jitter, seed=1)
-        models: list[ts.Fem | ts.Springs] = [ts.Fem("linear")]
+        models: list[ts.Fem | ts.Springs] = [ts.Fem("linear", "linear")]
         models += [ts.Springs(rule, allow_negative=True) for rule in ("projected", "van-gelder", "lloyd")]
         for model, wanted in zip(models, tabulated, strict=True):
             what = f"triangles, nodes moved by up to {jitter:g} of an edge, {model.label}: E"

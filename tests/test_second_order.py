@@ -344,6 +344,18 @@ def test_a_refined_mesh_is_the_same_curved_body(kind: str) -> None:
     assert finer.nodes[: len(there)] == pytest.approx(there, abs=1e-15)
 
 
+def test_where_parts_would_be_folded_edges_are_divided_as_straight() -> None:
+    """A tetrahedron whose Jacobian is positive though the chord of a part goes over its middle."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    plain = ts.Mesh(corners, [[0, 1, 2, 3]], "tetrahedron")
+    aside = np.random.default_rng(38).uniform(-0.3, 0.3, (6, 3))
+    curved = replace(plain, middles=corners[plain.edges].mean(axis=1) + aside)
+    straight = refined(curved)
+    assert straight.middles is None and "divided along straight edges" in straight.notes[0]
+    assert (straight.nodes == refined(plain).nodes).all()
+    assert refined(replace(curved, middles=corners[plain.edges].mean(axis=1) + aside / 2)).middles is not None
+
+
 def test_a_file_of_second_order_is_solved_by_its_own_elements(tmp_path: Path) -> None:
     """A cantilever of one tetrahedral layer: F L^3 / 3 E I within 2 %; springs of its corners are too stiff."""
     body = ts.box((8.0, 1.0, 1.0), (8, 1, 1), "tetrahedron")

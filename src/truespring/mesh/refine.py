@@ -36,8 +36,18 @@ def refined(mesh: Mesh) -> Mesh:
 
     A group of elements or of facets has their parts, and its group of nodes those of the parts. To a group of nodes
     alone a new node belongs where all nodes that it is the middle of do. Edges through middles of their own are
-    divided there, and go on as curves.
+    divided there, and go on as curves; where parts would be folded all are taken for straight, and a note says so.
     """
+    try:
+        return _refined(mesh)
+    except MeshError:
+        if mesh.middles is None:
+            raise
+        note = "divided along straight edges: parts of the curved ones would be folded"
+        return _refined(replace(mesh, middles=None, notes=(*mesh.notes, note)))
+
+
+def _refined(mesh: Mesh) -> Mesh:
     parents, children = _division(mesh.element)
     n_corners = mesh.elements.shape[1]
     numbers = [mesh.elements]
