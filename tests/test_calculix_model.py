@@ -109,7 +109,7 @@ def test_check_tells_of_it_and_converge_runs_it(tmp_path: Path, capsys: pytest.C
 def test_shipped_studies_agree(name: str, law: str) -> None:
     """Plane stress is a layer of bricks there; in space both are the same elements, to the digits printed."""
     study = read_study(EXAMPLES / f"{name}.toml")
-    theirs = CalculiX(law).run(study.problem, study.solver)
+    theirs = CalculiX(law, element="linear").run(study.problem, study.solver)
     ours = ts.solve(study.problem, ts.Fem(law, "linear"), study.solver)  # type: ignore[arg-type]
     assert theirs.status is ts.Status.CONVERGED
     near = {"bending": 7e-3, "stretching": 5e-4}.get(name, 1e-6)
@@ -203,7 +203,7 @@ def test_triangles() -> None:
         return ts.Problem(mesh, ts.Material(10e3, 0.3), section, [ts.Fixed("left")], [force])
 
     def apart(asked: ts.Problem) -> tuple[str, float]:
-        theirs = CalculiX().run(asked, ts.Newton(load_steps=4))
+        theirs = CalculiX(element="linear").run(asked, ts.Newton(load_steps=4))
         ours = ts.solve(asked, ts.Fem("saint-venant-kirchhoff", "linear"), ts.Newton(load_steps=4))
         return theirs.label, gap(theirs, ours)
 
@@ -211,6 +211,28 @@ def test_triangles() -> None:
     assert label == "CalculiX CPE3 NLGEOM" and strain < 1e-6
     coarse, fine = (apart(problem(ts.PlaneStress(0.002), rows)) for rows in (4, 8))
     assert fine[0] == "CalculiX CPS3 NLGEOM" and fine[1] < 7e-3 and fine[1] < 0.4 * coarse[1]
+
+
+@needs_ccx
+@pytest.mark.parametrize("kind", ["triangle", "tetrahedron"])
+def test_elements_of_second_order_are_the_default_on_simplices(kind: str) -> None:
+    """CPE6 and C3D10: what CalculiX tells between the corners is kept, and reactions balance the loads."""
+    space = kind == "tetrahedron"
+    mesh = ts.box((0.08, 0.02, 0.02), (4, 1, 1), kind) if space else ts.rectangle((0.08, 0.02), (4, 1), kind)
+    section = None if space else ts.PlaneStrain(0.02)
+    load = ts.Traction("right", (0.0, -20.0, 8.0)[: mesh.dim])
+    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), section, [ts.Fixed("left")], [load])
+    newton = ts.Newton(load_steps=4)
+    theirs = CalculiX().run(problem, newton)
+    ours = ts.solve(problem, ts.Fem("saint-venant-kirchhoff"), newton)
+    assert theirs.label == f"CalculiX {'C3D10' if space else 'CPE6'} NLGEOM"
+    one, other = theirs.states[-1], ours.states[-1]
+    size = np.abs(other.displacement).max()
+    assert size > 0.1 * 0.08
+    assert np.abs(theirs.whole.points - ours.whole.points).max() < 1e-15
+    assert np.abs(one.all_positions - other.all_positions).max() < 1e-6 * size
+    assert np.abs(one.reaction - other.reaction).max() < 1e-5 * np.abs(other.reaction).max()
+    assert one.energy == pytest.approx(other.energy, rel=1e-5) and theirs.n_unknowns == ours.n_unknowns
 
 
 @needs_ccx

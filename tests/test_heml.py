@@ -294,7 +294,8 @@ def test_a_study_of_them(tmp_path: Path) -> None:
                 ('kind = "springs"\nrule = "lloyd"', f'kind = "heml"\nlaw = "{SAME}"'),
                 (
                     'kind = "fem"\nlaw = "linear"',
-                    'kind = "fem"\nlaw = "linear"\n[models.rubber]\nkind = "heml"\nlaw = "neo-hookean"\n'
+                    'kind = "fem"\nlaw = "linear"\nelement = "linear"\n'
+                    '[models.rubber]\nkind = "heml"\nlaw = "neo-hookean"\n'
                     f'[models.tensors]\nkind = "mass-tensor"\nlaw = "{SAME}"\n'
                     '[models.sums]\nkind = "mass-tensor"\nlaw = "linear"',
                 ),

@@ -214,6 +214,28 @@ def test_a_moment_bends_triangles_of_second_order_exactly(section: ts.PlaneStres
     assert (end[0, 0] - end[1, 0]) / 0.04 == pytest.approx(wanted, rel=1e-9)
 
 
+def test_a_rim_held_in_pieces_closes_a_pressed_surface() -> None:
+    """As it does on elements of first order: the middles of its edges are held where both ends are."""
+    mesh = ts.box((1.0, 1.0, 1.0), (2, 2, 2), "tetrahedron")
+    x, y, z = mesh.nodes.T
+    rim = (y == 1) & ((x == 0) | (x == 1) | (z == 0) | (z == 1))
+    pieces = [ts.Fixed(np.flatnonzero(rim & there).tolist()) for there in (x < 0.3, x > 0.3)]
+    problem = ts.Problem(mesh, ts.Material(1e3, 0.3), None, [*pieces, ts.Fixed("bottom")], ts.Pressure("top", 1.0))
+    whole = replace(problem, supports=[ts.Fixed(np.flatnonzero(rim).tolist()), ts.Fixed("bottom")])
+    held = [ts.Fem("linear").potential(one).loading.held for one in (problem, whole)]  # type: ignore[attr-defined]
+    assert np.array_equal(*held)
+
+
+def test_a_body_turned_by_its_curved_faces_is_not_strained() -> None:
+    mesh = with_round_edges(quarter("triangle"))
+    outer = np.flatnonzero(np.isclose(np.linalg.norm(mesh.nodes, axis=1), OUTER))
+    turns = [ts.Fixed(on, rotation=1.0, about=(0.0, 0.0)) for on in ("inner", outer.tolist())]
+    problem = ts.Problem(mesh, ts.Material(1e5, 0.3), ts.PlaneStrain(1.0), turns)
+    path = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(load_steps=2))
+    assert path.status is ts.Status.CONVERGED
+    assert path.states[-1].energy < 1e-12 * 1e5 * float(mesh.measures.sum())
+
+
 # --- files -----------------------------------------------------------------------------------------------------------
 
 #: Of each format, and the name of the cell with nodes between its corners.
@@ -261,6 +283,17 @@ def test_mirrored_elements_keep_them_too(tmp_path: Path) -> None:
     found = read_mesh(tmp_path / "body.vtu")
     assert any("mirrored" in note for note in found.notes)
     assert measure_of(found) == pytest.approx(measure_of(mesh), rel=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "curved"), [(22, True), (69, True), (76, False)])
+def test_control_points_are_no_middles(tmp_path: Path, kind: int, curved: bool) -> None:
+    """Of Bezier cells the points between the corners lie beside the edges; of Lagrange's and quadratic ones on them."""
+    points = "0 0 0  1 0 0  0 1 0  .5 -.1 0  .6 .6 0  -.1 .5 0"
+    (tmp_path / "cell.vtk").write_text(
+        f"# vtk DataFile Version 3.0\ncell\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 double\n{points}\n"
+        f"CELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n{kind}\n"
+    )
+    assert (read_mesh(tmp_path / "cell.vtk").middles is not None) == curved
 
 
 def test_straight_edges_have_no_middles_of_their_own(tmp_path: Path) -> None:

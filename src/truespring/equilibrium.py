@@ -25,7 +25,7 @@ from truespring.models import (
     moduli,
     refuse_mechanism,
 )
-from truespring.potential import Loading, Potential, Refined, Stretched
+from truespring.potential import Loading, Potential, Refined, Stretched, on_the_mesh
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, leading_support, support_forces
 from truespring.solvers import ArcLength, Cost, DisplacementControl, Equilibrium, Newton, Reporter
@@ -356,11 +356,8 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
     stretch = potential.stretch(found.positions) if isinstance(potential, Stretched) else None
     n_nodes = problem.mesh.n_nodes
     positions = found.positions[:n_nodes]
-    if isinstance(potential, Refined):  # what acts between two nodes of the mesh acts on both by half
-        further = reaction[n_nodes:]
-        reaction = reaction[:n_nodes].copy()
-        for end in (0, 1):
-            np.add.at(reaction, potential.parents[:, end], further / 2)
+    if isinstance(potential, Refined):
+        reaction = on_the_mesh(reaction, potential.parents)
     return State(
         load_factor=found.load_factor,
         positions=positions,

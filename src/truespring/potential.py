@@ -188,6 +188,18 @@ class Refined(Potential, Protocol):
         ...
 
 
+def on_the_mesh(force: Floats, parents: Ints) -> Floats:
+    """Return forces on all nodes of a refined potential [N] as forces on those of the mesh, shape (n_nodes, dim).
+
+    What acts between two nodes of the mesh acts on both by half.
+    """
+    n_nodes = len(force) - len(parents)
+    found, further = force[:n_nodes].copy(), force[n_nodes:]
+    for end in (0, 1):
+        np.add.at(found, parents[:, end], further / 2)
+    return found
+
+
 class Pattern:
     """The fixed sparsity of a sum of element matrices, built once and filled many times.
 

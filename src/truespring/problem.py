@@ -168,6 +168,12 @@ class Problem:
                     found.append(load.following(body, held))
         return tuple(found)
 
+    @property
+    def rims(self) -> Ints:
+        """The edges around the surfaces that a pressure acts on, by their ends, shape (n, 2)."""
+        none = np.zeros((0, 2), dtype=np.int64)
+        return np.concatenate([none, *(load.rim(self.mesh) for load in self.loads if isinstance(load, Pressure))])
+
     def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
         clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))
         if clash.size:

@@ -19,6 +19,7 @@ from truespring.exports.decks import (
     levels_of,
     real,
     spring_twin,
+    usual_element,
 )
 from truespring.exports.exported import Exported
 
@@ -31,8 +32,9 @@ def abaqus(exported: Exported) -> dict[str, str]:
     ]
     try:
         check_fem(problem, "saint-venant-kirchhoff")
-        twin = fem_twin(problem, "saint-venant-kirchhoff", _DIALECT.force_unit)
-        what = f"Abaqus {fem_element(problem)} elements, NLGEOM=YES"
+        element = usual_element(problem)
+        twin = fem_twin(problem, "saint-venant-kirchhoff", _DIALECT.force_unit, element)
+        what = f"Abaqus {fem_element(problem, element)} elements, NLGEOM=YES"
         header = [*described(exported, what, springs=False), *_explained("fem"), *_FEM]
         files["fem.inp"] = deck(_DIALECT, twin, levels, nonlinear=True, continuum=True, header=header)
     except ExportError as error:

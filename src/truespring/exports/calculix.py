@@ -20,6 +20,7 @@ from truespring.exports.decks import (
     levels_of,
     real,
     spring_twin,
+    usual_element,
 )
 from truespring.exports.exported import Exported
 from truespring.models import SpringNetwork
@@ -39,13 +40,13 @@ _CONTROLS = ["*CONTROLS, PARAMETERS=FIELD", "1.E-7, 1.E-7, , , 1.E-7"]
 def fem_deck(
     problem: Problem, levels: Sequence[float], law: str, element: str = "linear", header: Sequence[str] = ()
 ) -> str:
-    """Write a problem as finite elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4, or "quadratic" C3D10.
+    """Write a problem as finite elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4, or "quadratic" CPS6, CPE6 or C3D10.
 
     Args:
         problem: what is asked; its regions are sets of elements of their own material.
         levels: load factors in (0, 1], ascending: a step each.
         law: "linear", or "saint-venant-kirchhoff", which is NLGEOM.
-        element: "linear", or "quadratic" for tetrahedra.
+        element: "linear", or "quadratic" for triangles and tetrahedra.
         header: comment lines.
 
     Each step prints to the .dat file the displacement of all nodes [m], the forces on held ones [uN] and the strain
@@ -75,9 +76,10 @@ def calculix(exported: Exported) -> dict[str, str]:
     ]
     try:
         check_fem(exported.problem, "saint-venant-kirchhoff")
-        what = f"CalculiX {fem_element(exported.problem)} elements, NLGEOM"
+        element = usual_element(exported.problem)
+        what = f"CalculiX {fem_element(exported.problem, element)} elements, NLGEOM"
         header = [*described(exported, what, springs=False), *_explained("fem"), *_FEM]
-        files["fem.inp"] = fem_deck(exported.problem, levels, "saint-venant-kirchhoff", header=header)
+        files["fem.inp"] = fem_deck(exported.problem, levels, "saint-venant-kirchhoff", element, header)
     except ExportError as error:
         notes.append(f"There is no fem.inp beside this file: {error}.")
     header = [*described(exported, "CalculiX SPRINGA elements", springs=True), *_explained("springs"), *notes]
@@ -97,7 +99,7 @@ def _explained(name: str) -> tuple[str, ...]:
 
 _FEM = (
     "*ELASTIC under NLGEOM is St. Venant-Kirchhoff's law. Gravity and pressure are CalculiX's own *DLOAD; pressure "
-    "follows the faces, other loads are forces on nodes. CPS4 and CPS3 are a layer of bricks or wedges with free "
+    "follows the faces, other loads are forces on nodes. CPS4 and CPS6 are a layer of bricks or wedges with free "
     "faces: plane stress in the mean, and a pressure acts on the thickness as it becomes.",
 )
 

@@ -17,6 +17,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
+from truespring.loading.following import FaceMoment
 from truespring.material import PlaneStrain
 from truespring.mesh import outer_facets
 from truespring.models import Fem, SpringNetwork
@@ -47,6 +48,11 @@ _FACES = {
 }
 _SOLIDS = {"tetrahedron": "C3D4", "hexahedron": "C3D8"}
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
+# Of elements of second order.
+_SECOND_ORDER = {"triangle": "6", "tetrahedron": "C3D10"}
+
+#: Interpolations that both programs have: full integration of first order, and of second order on simplices.
+ELEMENTS = ("linear", "quadratic")
 
 
 class Step(NamedTuple):
@@ -184,24 +190,23 @@ def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
 
 
 def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "linear") -> Twin:
-    """Return the body as finite elements of first order, or of the second ("quadratic") where it is of tetrahedra.
+    """Return the body as finite elements of first order, or of the second ("quadratic") on triangles and tetrahedra.
 
     Pressure and gravity are the program's own, other loads come as forces on nodes; on quadratic elements gravity too.
     Raises ExportError for what cannot be said.
     """
-    check_fem(problem, law)
-    kind, nodes, elements = fem_element(problem), problem.mesh.nodes, problem.mesh.elements
+    check_fem(problem, law, element)
+    nodes, elements = problem.mesh.nodes, problem.mesh.elements
     own = list(_own_loads(problem, force_unit))
     loading = replace(problem.loading, external_force=_spread_by_us(problem), following=())
-    if element == "quadratic":
-        finer = Fem("linear", element).potential(problem)
-        if problem.mesh.element != "tetrahedron" or not isinstance(finer, QuadraticPotential):
-            raise ExportError(f"quadratic elements are written of tetrahedra, not of a mesh of {problem.mesh.element}s")
-        kind, nodes, elements = "C3D10", finer.nodes, finer.elements
-        loading = replace(finer.loading, following=())
+    finer = second_order(problem, element)
+    if finer is not None:
+        nodes, elements = finer.nodes, finer.elements
+        at_rest = [one for one in finer.loading.following if isinstance(one, FaceMoment)]
+        loading = replace(replace(finer.loading, following=tuple(at_rest)).at_rest(nodes), following=())
         own = [one for one in own if one.type != "GRAV"]  # which is among our forces
     lines = [
-        f"*ELEMENT, TYPE={kind}, ELSET=BODY",
+        f"*ELEMENT, TYPE={fem_element(problem, element)}, ELSET=BODY",
         *(f"{number}, {joined(one)}" for number, one in enumerate((elements + 1).tolist(), 1)),
     ]
     for number in range(len(problem.materials)):
@@ -209,8 +214,19 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
     return Twin(nodes, lines, loading, own)
 
 
-def check_fem(problem: Problem, law: str) -> None:
-    """Raise ExportError where a problem has no continuum, or a load that none can have."""
+def usual_element(problem: Problem) -> str:
+    """Return the interpolation that is the default: that of our own elements, where the programs have it."""
+    return "quadratic" if problem.mesh.element in _SECOND_ORDER else "linear"
+
+
+def second_order(problem: Problem, element: str) -> QuadraticPotential | None:
+    """Return our own elements of second order, whose nodes the program has too; None where it is of the first."""
+    finer = Fem("linear", element).potential(problem)
+    return finer if isinstance(finer, QuadraticPotential) else None
+
+
+def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
+    """Raise ExportError where a problem has no continuum, a load that none can have, or no such elements."""
     if problem.material is None or problem.section is None:
         raise ExportError("a plain network of springs has no continuum: give its mesh elements and a material")
     if law != "linear" and any(isinstance(load, Moment) for load in problem.loads):
@@ -218,13 +234,19 @@ def check_fem(problem: Problem, law: str) -> None:
             "a moment that turns with a face has no keyword: prescribe the rotation of the face instead (a support "
             "with rotation), or take the linear law, where it is forces on nodes"
         )
+    if element not in ELEMENTS or (element == "quadratic" and problem.mesh.element not in _SECOND_ORDER):
+        raise ExportError(
+            f"element = '{element}' is not written of a mesh of {problem.mesh.element} elements: \"linear\" is of all, "
+            f'"quadratic" of {" and ".join(f"{name}s" for name in _SECOND_ORDER)}'.replace("tetrahedrons", "tetrahedra")
+        )
 
 
-def fem_element(problem: Problem) -> str:
-    """Return the type of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4."""
+def fem_element(problem: Problem, element: str = "linear") -> str:
+    """Return the type of the elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; "quadratic" CPS6, CPE6 or C3D10."""
     plane = "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
-    element = problem.mesh.element
-    return _SOLIDS[element] if element in _SOLIDS else plane + _PLANES[element]
+    names = {**_SOLIDS, **_PLANES} if element == "linear" else _SECOND_ORDER
+    name = names[problem.mesh.element]
+    return name if problem.mesh.dim == 3 else plane + name
 
 
 def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:

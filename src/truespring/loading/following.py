@@ -17,6 +17,7 @@ from truespring.errors import ProblemError
 from truespring.loading.dead import Body
 from truespring.loading.values import number
 from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
+from truespring.mesh.rows import ascending, distinct_rows
 from truespring.potential import Pattern, SparseMatrix
 
 # Forces of a pressure are polynomials of second order along a straight way: two Gauss points give its work exactly.
@@ -45,6 +46,15 @@ class Pressure:
         if pressure:
             load.refuse_open_edges()
         return load
+
+    def rim(self, mesh: Mesh) -> Ints:
+        """Return the edges around the surface in space, by their ends, shape (n, 2)."""
+        facets = outer_facets(mesh, self.on)
+        if mesh.dim == 2:
+            return np.zeros((0, 2), dtype=np.int64)
+        edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+        found = distinct_rows(ascending(edges.T))
+        return np.asarray(edges[found.first[found.count == 1]])
 
 
 @dataclass(frozen=True)

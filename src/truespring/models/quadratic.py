@@ -8,7 +8,7 @@ import skfem
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.loading import nodal_force
-from truespring.mesh import SecondOrder, edge_numbers
+from truespring.mesh import Grid, SecondOrder, edge_numbers
 from truespring.models.fem import FemPotential, Reference, reference_element
 from truespring.potential import Loading, Turn
 
@@ -40,6 +40,11 @@ class QuadraticPotential(FemPotential):
         return self._second_order.of(self.mesh.elements)
 
     @property
+    def grid(self) -> Grid:
+        """All nodes and elements, by which a displacement goes on between them."""
+        return Grid(self.nodes, {f"{self.mesh.kind.vtk}{self.elements.shape[1]}": self.elements})
+
+    @property
     def parents(self) -> Ints:
         """The two nodes of the mesh between which each further node stands, shape (n_edges, 2)."""
         return self.mesh.edges
@@ -56,8 +61,9 @@ class QuadraticPotential(FemPotential):
         """The problem's loading, consistent with quadratic elements.
 
         An edge is held where one support holds both its ends, where both ends have a support of their own, as
-        nodes with a motion each do, and on a boundary facet whose corners all are held alike, as where several
-        supports make up one. Edges that run from one support to another through the body are free.
+        nodes with a motion each do, and where all corners of a boundary facet, or both ends on the rim of a pressed
+        surface, are held alike, as where several supports make up one. Edges that run from one support to another
+        through the body are free.
         """
         given, ends = self.problem.loading, self.mesh.edges
         by_edge = np.zeros((len(ends), self.mesh.dim), dtype=bool)
@@ -68,13 +74,9 @@ class QuadraticPotential(FemPotential):
             by_edge |= inside[ends].all(axis=1)
             alone |= inside & (len(nodes) == 1)
         by_edge |= alone[ends].all(axis=1)
-        facets = self.mesh.boundary
-        alike = (given.held[facets] == given.held[facets[:, :1]]).all(axis=(1, 2))
-        motion = given.motion()
-        alike &= (motion[facets] == motion[facets[:, :1]]).all(axis=(1, 2))
-        local = np.array([(i, j) for j in range(facets.shape[1]) for i in range(j)])
-        edges = edge_numbers(self.mesh, facets[alike][:, local]).ravel()
-        by_edge[edges] |= given.held[ends[edges, 0]]
+        for cells in (self.mesh.boundary, self.problem.rims):
+            edges = self._held_alike(cells)
+            by_edge[edges] |= given.held[ends[edges, 0]]
         held = np.concatenate([given.held, by_edge])
         displacement = np.concatenate([given.displacement, given.displacement[ends].mean(axis=1)])
         turns = tuple(self._turn(turn, np.asarray(by_edge.all(axis=1))) for turn in given.turns)
@@ -82,11 +84,22 @@ class QuadraticPotential(FemPotential):
         force = nodal_force(self.problem.spreads(body), self.nodes.shape)
         return Loading(force, held, np.where(held, displacement, 0.0), turns, self.problem.following(body, held))
 
+    def _held_alike(self, cells: Ints) -> Ints:
+        """The edges of cells, given by their corners, all of whose corners are held and moved alike."""
+        given = self.problem.loading
+        motion = given.motion()
+        alike = (given.held[cells] == given.held[cells[:, :1]]).all(axis=(1, 2))
+        alike &= (motion[cells] == motion[cells[:, :1]]).all(axis=(1, 2))
+        local = np.array([(i, j) for j in range(cells.shape[1]) for i in range(j)])
+        return edge_numbers(self.mesh, cells[alike][:, local]).ravel()
+
     def _turn(self, turn: Turn, held: Bools) -> Turn:
         """A turn of the held edges between its nodes too."""
-        arms = np.full(self.mesh.nodes.shape, np.nan)
+        mesh = self.mesh
+        arms = np.full(mesh.nodes.shape, np.nan)
         arms[turn.nodes] = turn.arms
-        middles = arms[self.mesh.edges].mean(axis=1)
+        aside = self._second_order.middles - mesh.nodes[mesh.edges].mean(axis=1)
+        middles = arms[mesh.edges].mean(axis=1) + aside
         inside = np.flatnonzero(held & ~np.isnan(middles).any(axis=1))
-        nodes = np.concatenate([turn.nodes, self.mesh.n_nodes + inside])
+        nodes = np.concatenate([turn.nodes, mesh.n_nodes + inside])
         return turn._replace(nodes=nodes, arms=np.concatenate([turn.arms, middles[inside]]))

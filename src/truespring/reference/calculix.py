@@ -13,11 +13,13 @@ from truespring.arrays import Floats
 from truespring.equilibrium import Path, Solver, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
-from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside
+from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside, second_order, usual_element
 from truespring.exports.exported import plain_springs
 from truespring.loading import Pressure
 from truespring.material import PlaneStress
 from truespring.models import Fem, SpringModel, SpringNetwork
+from truespring.models.quadratic import QuadraticPotential
+from truespring.potential import on_the_mesh
 from truespring.problem import Problem
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
 from truespring.reference.dat import read_dat
@@ -50,15 +52,17 @@ class Program(Protocol):
 
 @dataclass(frozen=True)
 class CalculiX:
-    """The problem in CalculiX: finite elements of first order, or the SPRINGA twin of a spring model.
+    """The problem in CalculiX: finite elements, or the SPRINGA twin of a spring model.
 
     Attributes:
         law: "linear", or "saint-venant-kirchhoff", which is NLGEOM; not asked for where there are springs.
         springs: a model or network of springs instead of a continuum.
+        element: "linear", or "quadratic" on triangles and tetrahedra, where it is the default; not of springs.
     """
 
     law: str = "saint-venant-kirchhoff"
     springs: SpringModel | None = None
+    element: str | None = None
 
     kind = "calculix"
 
@@ -70,7 +74,14 @@ class CalculiX:
         """Return the label, with the type of the elements."""
         if self.springs is not None:
             return "CalculiX SPRINGA NLGEOM"
-        return f"CalculiX {fem_element(problem)} {'linear' if self._linear else 'NLGEOM'}"
+        return f"CalculiX {fem_element(problem, self._element(problem))} {'linear' if self._linear else 'NLGEOM'}"
+
+    def _element(self, problem: Problem) -> str:
+        return self.element or usual_element(problem)
+
+    def _finer(self, problem: Problem) -> QuadraticPotential | None:
+        """Elements of second order that have the nodes of CalculiX's."""
+        return None if self.springs is not None else second_order(problem, self._element(problem))
 
     @property
     def _linear(self) -> bool:
@@ -78,7 +89,8 @@ class CalculiX:
 
     def second_order(self, problem: Problem) -> Fem | None:
         """Return finite elements of second order of the same law, to which the elements of CalculiX converge too."""
-        return None if self.springs is not None else Fem(self.law)
+        first = self.springs is None and self._element(problem) == "linear"
+        return Fem(self.law) if first else None
 
     def check(self, problem: Problem, solver: Solver) -> None:
         """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""
@@ -86,7 +98,7 @@ class CalculiX:
             raise ModelError('CalculiX follows the load only: take control = "load", or leave this model out')
         find_ccx()
         if self._network(problem) is None:
-            check_fem(problem, self.law)
+            check_fem(problem, self.law, self._element(problem))
 
     def _network(self, problem: Problem) -> SpringNetwork | None:
         """The springs; refused where they are more than SPRINGA elements can be."""
@@ -107,7 +119,12 @@ class CalculiX:
         assert isinstance(solver, Newton)
         levels = [(number + 1) / solver.load_steps for number in range(solver.load_steps)]
         network = self._network(problem)
-        deck = fem_deck(problem, levels, self.law) if network is None else spring_deck(problem, network, levels)
+        if network is None:
+            deck = fem_deck(problem, levels, self.law, self._element(problem))
+        else:
+            deck = spring_deck(problem, network, levels)
+        finer = self._finer(problem)
+        nodes = problem.mesh.nodes if finer is None else finer.nodes
         before = int(network is not None and is_led_aside(problem, network))  # steps that are no load level
 
         def reached(step: int, share: float) -> None:
@@ -121,17 +138,24 @@ class CalculiX:
             file.write_text(deck, encoding="utf-8")
             finished = run_ccx(file, reached=reached)
             try:
-                found = _results(file.with_suffix(".dat"), problem.mesh.n_nodes)
+                found = _results(file.with_suffix(".dat"), len(nodes))
             except ReferenceFileError as error:  # as where ccx was ended while it wrote
                 found, finished = [], replace(finished, errors=(*finished.errors, str(error)))
-        rest = Level(0.0, np.zeros((problem.mesh.n_nodes, 3)), 0.0)
-        states = [self._state(problem, 0.0, rest, np.zeros((problem.mesh.n_nodes, 3)), None, network)]
+        still = np.zeros((len(nodes), 3))
+        states = [self._state(problem, 0.0, Level(0.0, still, 0.0), still, None, network, finer)]
         for place, (load_factor, (level, force)) in enumerate(zip(levels, found, strict=False)):
             effort = finished.efforts.get(place + before + 1)
-            states.append(self._state(problem, load_factor, level, force, effort, network))
-        return self._path(problem, states, levels, finished)
+            states.append(self._state(problem, load_factor, level, force, effort, network, finer))
+        return self._path(problem, states, levels, finished, finer)
 
-    def _path(self, problem: Problem, states: list[State], levels: list[float], finished: Finished) -> Path:
+    def _path(
+        self,
+        problem: Problem,
+        states: list[State],
+        levels: list[float],
+        finished: Finished,
+        finer: QuadraticPotential | None,
+    ) -> Path:
         status, warnings = Status.CONVERGED, []
         if any(state.area_ratio <= 0 for state in states) and not self._linear:
             status = Status.INVERTED
@@ -169,7 +193,8 @@ class CalculiX:
             status=status,
             warnings=tuple(warnings),
             seconds=finished.seconds,
-            n_unknowns=int((~problem.loading.held).sum()),
+            grid=None if finer is None else finer.grid,
+            n_unknowns=int((~(problem if finer is None else finer).loading.held).sum()),
         )
 
     def _state(
@@ -180,20 +205,23 @@ class CalculiX:
         internal: Floats,
         effort: Effort | None,
         network: SpringNetwork | None,
+        finer: QuadraticPotential | None,
     ) -> State:
         """A state of what was read: displacement, energy, and the internal force in each node [N]."""
-        mesh, loading = problem.mesh, problem.loading
-        displacement = level.displacement[:, : mesh.dim]
-        positions = mesh.nodes + displacement
-        external = loading.force(mesh.nodes if self._linear else positions, load_factor)
+        mesh, loading = problem.mesh, problem.loading if finer is None else finer.loading
+        nodes = mesh.nodes if finer is None else finer.nodes
+        everywhere = nodes + level.displacement[:, : mesh.dim]
+        positions = everywhere[: mesh.n_nodes]
+        external = loading.force(nodes if self._linear else everywhere, load_factor)
+        reaction = np.where(loading.held, internal[:, : mesh.dim] - external, 0.0)
         energy = math.nan if level.energy is None or (effort and effort.increments > 1) else level.energy
         stretch = None if network is None else network.stretch(positions)
         return State(
             load_factor=load_factor,
             positions=positions,
-            all_positions=positions,
-            displacement=displacement,
-            reaction=np.where(loading.held, internal[:, : mesh.dim] - external, 0.0),
+            all_positions=everywhere,
+            displacement=positions - mesh.nodes,
+            reaction=reaction if finer is None else on_the_mesh(reaction, finer.parents),
             applied_force=external.sum(axis=0),
             energy=energy if network is None else network.energy(positions),
             iterations=0 if effort is None else effort.iterations,

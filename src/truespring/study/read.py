@@ -314,7 +314,8 @@ class _Builder:
                     return self.network
                 case schema.CalculixTable():
                     springs = None if table.springs is None else self.springs_of(problem, name, table.springs)
-                    program = CalculiX(springs=springs) if table.law is None else CalculiX(table.law, springs)
+                    law = {} if table.law is None else {"law": table.law}
+                    program = CalculiX(springs=springs, element=table.element, **law)
                     program.check(problem, solver)
                     return program
                 case schema.FemTable():

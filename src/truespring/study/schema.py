@@ -359,9 +359,14 @@ class CalculixTable(Table):
     kind: Literal["calculix"]
     law: Literal["linear", "saint-venant-kirchhoff"] | None = None
     springs: str | None = None
+    element: Literal["linear", "quadratic"] | None = None
 
     @model_validator(mode="after")
     def _one_body(self) -> "CalculixTable":
+        if self.element is not None and self.springs is not None:
+            raise ValueError(
+                "element and springs are given: an element is of a continuum, springs name a model; give one"
+            )
         if self.law is not None and self.springs is not None:
             raise ValueError("law and springs are given: a law is for a continuum, springs name a model; give one")
         return self
