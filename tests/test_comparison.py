@@ -94,7 +94,8 @@ def test_a_copy_moved_as_a_whole_is_apart_by_the_motion(solid: ts.Path) -> None:
     found = ts.compare(as_read(solid, motion), solid)
     assert found.rms_distances == pytest.approx(np.linalg.norm(motion) * found.load_factors, rel=1e-12)
     assert found.max_distances == pytest.approx(found.rms_distances, rel=1e-12)
-    size = np.sqrt((solid.states[-1].displacement ** 2).sum(axis=1).mean())
+    free = solid.problem.mesh.nodes[:, 0] > 0  # those that are held move as they are told
+    size = np.sqrt((solid.states[-1].displacement[free] ** 2).sum(axis=1).mean())
     assert found.rms_error == pytest.approx(0.013 / size)
     assert found.hausdorff is not None and 0.9 * 0.013 < found.hausdorff.max <= 0.013 * (1 + 1e-12)
 

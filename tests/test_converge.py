@@ -11,7 +11,7 @@ import truespring as ts
 from truespring.cli import main
 from truespring.errors import TruespringError
 from truespring.mesh import refined
-from truespring.settling import settle
+from truespring.settling import Attempt, refinement, settle
 
 MESHES = {
     "squares": ts.rectangle((4.0, 3.0), (3, 2)),
@@ -104,6 +104,120 @@ def test_what_does_not_settle_is_said(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(arguments) == 1
     assert "settled" not in capsys.readouterr().out
     assert main([*arguments, "--tolerance", "2"]) == 2
+
+
+INVERTED = """
+[mesh]
+shape = "rectangle"
+size = ["100 mm", "10 mm"]
+elements = [20, 2]
+[material]
+young = "50 kPa"
+poisson = 0.2
+[section]
+kind = "plane-strain"
+thickness = "10 mm"
+[[support]]
+on = "left"
+[[support]]
+on = "right"
+[[load]]
+on = "bottom"
+pressure = "2 kPa"
+[solver]
+load_steps = 4
+[models.springs]
+kind = "springs"
+rule = "isotropic"
+volume = true
+[compare]
+references = []
+probe = "bottom-middle"
+"""
+
+
+@pytest.mark.verification
+def test_a_mesh_that_is_inverted_settles_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "inverted.toml"
+    file.write_text(INVERTED)
+    assert main(["converge", str(file), "--out", str(tmp_path / "out"), "--meshes", "3", "--tolerance", "0.3"]) == 1
+    said = capsys.readouterr().out
+    assert "settled" not in said and "It does not settle: springs is inverted on 729 nodes" in said
+    assert "inverted on 729 nodes" in (tmp_path / "out" / "inverted" / "converge.html").read_text()
+
+
+def attempts(*statuses: str, model: str = "a") -> list[Attempt]:
+    return [
+        Attempt(
+            model,
+            10 * 4**place,
+            status,
+            1.0 if status != "not-converged" else 0.4,
+            "load less",
+            status != "not-converged",
+        )
+        for place, status in enumerate(statuses)
+    ]
+
+
+def values(*several: float) -> list[tuple[int, float]]:
+    return [(10 * 4**place, value) for place, value in enumerate(several)]
+
+
+def test_only_sound_meshes_settle() -> None:
+    """Of the three that tell the order none may be inverted, unstable, or short of full load."""
+    known = {("a", "energy", "J"): values(1.0, 1.0, 1.0)}
+    sound = refinement(attempts(*["converged"] * 3), known, 0.01)
+    assert sound.settled and sound.ended and "has settled to 1 % on 3 meshes, the finest of 160 nodes" in sound.sentence
+    for place, bad in itertools.product(range(3), ("inverted", "unstable")):
+        found = refinement(attempts(*[bad if place == other else "converged" for other in range(3)]), known, 0.01)
+        assert not found.settled and not found.ended and f"a is {bad} on {10 * 4**place} nodes" in found.sentence
+        assert not any(one.settled for one in found.quantities)
+    short = refinement(attempts("converged", "not-converged"), {("a", "energy", "J"): values(1.0)}, 0.01)
+    assert short.ended and not short.settled
+    assert "a is not-converged beyond load factor 0.4 on 40 nodes" in short.sentence
+    nothing = refinement(attempts("not-converged"), {}, 0.01)
+    assert nothing.ended and not nothing.settled
+
+
+def test_what_is_zero_neither_hinders_nor_settles() -> None:
+    """Of a quantity that is zero by symmetry there is only rounding, which settles nowhere and hinders nothing."""
+    rounding = {("a", "ux", "m"): values(3e-17, -1e-17, 2e-17), ("a", "uz", "m"): values(0.0, 0.0, 0.0)}
+    tip = {("a", "uy", "m"): values(1.0, 1.001, 1.0015)}
+    found = refinement(attempts(*["converged"] * 3), {**rounding, **tip}, 0.01)
+    assert [one.quantity for one in found.quantities if one.zero] == ["ux", "uz"]
+    assert found.settled and [one.settled for one in found.quantities] == [False, False, True]
+    coarse = refinement(attempts(*["converged"] * 3), {**rounding, ("a", "uy", "m"): values(1.0, 1.2, 1.3)}, 0.01)
+    assert not coarse.settled and not any(one.settled for one in coarse.quantities)
+    assert "uy of a is 7.1 % off" in coarse.sentence  # 1.4 at h = 0
+    alone = refinement(attempts(*["converged"] * 3), rounding, 0.01)
+    assert not alone.settled
+
+
+MOVED = STUDY.replace(
+    '[[load]]\non = "right"\nforce = [0.0, -1.0]', '[[support]]\non = "right"\nrotation = 0.1'
+).replace('[models.springs]\nkind = "springs"\nrule = "isotropic"\n', "")
+
+
+def test_force_and_torque_of_supports_settle_and_the_loop_stops_at_what_it_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "turned.toml"
+    file.write_text(MOVED)
+    found = list(ts.converge(file, 0.05, 5))
+    assert [one.ended for one in found] == [False] * (len(found) - 1) + [True]
+    assert found[-1].settled and 3 <= len(found) < 5
+    watched = {one.quantity: one for one in found[-1].quantities}
+    assert watched["torque of right"].settled and not watched["torque of right"].zero
+    assert main(["converge", str(file), "--out", str(tmp_path / "out"), "--tolerance", "0.05"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("turned: ") == len(found) and "All that is watched has settled to 5 %" in " ".join(out.split())
+    page = (tmp_path / "out" / "turned" / "converge.html").read_text(encoding="utf-8")
+    assert (
+        "torque of right" in page
+        and "has settled" in page
+        and "http" not in page.split("</style>")[1].split("data:")[0]
+    )
 
 
 def test_a_network_is_as_fine_as_it_is() -> None:

@@ -392,19 +392,45 @@ def test_springs_unstable_without_load_are_not_loaded() -> None:
     assert np.linalg.eigvalsh(path.potential.hessian(problem.mesh.nodes).toarray())[0] < 0
 
 
-@pytest.mark.parametrize("model", [ts.Springs("isotropic"), ts.Fem("linear"), ts.Fem("saint-venant-kirchhoff")])
-@pytest.mark.parametrize("share", [1e-3, 1e-5, 1e-7])
-def test_a_slender_body_follows_a_load_that_nearly_drowns(model: ts.Springs | ts.Fem, share: float) -> None:
-    """Under tiny loads the answer is linear in them, though rounding of the positions makes forces as large."""
+def slender(share: float) -> tuple[ts.Problem, float]:
+    """A beam of 400 by 2 elements under a force that bends it by a share of its length, and that deflection [m]."""
     length, height = 1.0, 0.005
-    tip = share * length
-    problem = ts.Problem(
-        mesh=ts.rectangle((length, height), (400, 2)),
-        material=ts.Material(1e6, 1 / 3),
-        section=ts.PlaneStress(1.0),
-        supports=[ts.Fixed("left")],
-        loads=[ts.Force("right", (0.0, -3 * 1e6 * height**3 / 12 * tip))],
-    )
+    force = ts.Force("right", (0.0, -3 * 1e6 * height**3 / 12 * share * length))
+    mesh, material = ts.rectangle((length, height), (400, 2)), ts.Material(1e6, 1 / 3)
+    return ts.Problem(mesh, material, ts.PlaneStress(1.0), [ts.Fixed("left")], [force]), share * length
+
+
+@pytest.mark.parametrize("share", [1e-7, 1e-9])
+def test_a_load_that_drowns_in_rounding_is_not_balanced(share: float) -> None:
+    """What is unbalanced is no longer small beside the load: no such state is called converged."""
+    problem, _ = slender(share)
+    path = ts.solve(problem, ts.Springs("isotropic"), ts.Newton(load_steps=2))
+    assert path.status is ts.Status.NOT_CONVERGED and len(path.states) == 1
+    assert path.best is not None and path.best.residual > 1e-3
+    assert any("drowns in rounding" in text for text in path.warnings)
+
+
+def test_a_motion_is_told_from_one_that_drowns_in_rounding() -> None:
+    """Of a body moved as a whole all forces are rounding: no harm, unless its coordinates do not hold the motion."""
+    mesh, material = ts.rectangle((0.1, 0.05), (4, 2)), ts.Material(1e9, 0.3)
+
+    def moved(left: float, right: float) -> ts.Path:
+        ends = [ts.Fixed(on, displacement=(way, 0.0)) for on, way in (("left", left), ("right", right))]
+        return ts.solve(ts.Problem(mesh, material, ts.PlaneStress(0.01), ends), ts.Springs("lloyd"), ts.Newton(2))
+
+    whole = moved(1e-7, 1e-7)
+    assert whole.status is ts.Status.CONVERGED
+    assert whole.states[-1].displacement[:, 0] == pytest.approx(1e-7, rel=1e-6)
+    assert moved(0.0, 1e-7).status is ts.Status.CONVERGED
+    drowned = moved(0.0, 1e-16)  # a few times what 0.1 is rounded to
+    assert drowned.status is ts.Status.NOT_CONVERGED and drowned.best is not None and drowned.best.residual > 1e-3
+
+
+@pytest.mark.parametrize("model", [ts.Springs("isotropic"), ts.Fem("linear"), ts.Fem("saint-venant-kirchhoff")])
+@pytest.mark.parametrize("share", [1e-3, 1e-5])
+def test_a_slender_body_follows_a_load_that_nearly_drowns(model: ts.Springs | ts.Fem, share: float) -> None:
+    """Under tiny loads the answer is linear in them, though rounding of the positions makes forces nearly as large."""
+    problem, tip = slender(share)
     path = ts.solve(problem, model, ts.Newton(load_steps=4))
     assert path.status is ts.Status.CONVERGED
     moved = [-state.displacement[ts.named_point(problem.mesh, "right-middle"), 1] for state in path.states]

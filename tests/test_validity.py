@@ -59,7 +59,10 @@ def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) ->
     """Both moved between smooth plates: uniform stress; they differ in the force and in the stretch across."""
     found = map_validity(study, law=law, loads=["stretch"], rules=list(LATTICES), y=None)
     nodes = found.body.problem.mesh.nodes
-    along, across = (nodes**2).mean(axis=0)
+    # Two corners are held along by the plates and across by the plane below: they tell nothing of a model.
+    corners = np.isin(nodes[:, 0], [nodes[:, 0].min(), nodes[:, 0].max()]) & (nodes[:, 1] == nodes[:, 1].min())
+    assert corners.sum() == 2
+    along, across = (nodes[~corners] ** 2).mean(axis=0)
     for one in found.maps:
         (curve,) = one.curves.values()
         for strain in (0.1, 0.2, 0.3, 0.5):

@@ -113,19 +113,21 @@ class Refinement:
         troubled = [one for one in self.last if not one.sound]
         if troubled:
             one = troubled[0]
-            where = "" if one.complete else f" from load factor {one.load_factor:.4g} on"
-            return f"Not settled: {one.model} is {one.status}{where} on {one.n_nodes:,} nodes: {one.advice}."
+            where = "" if one.complete else f" beyond load factor {one.load_factor:.4g}"
+            return f"It does not settle: {one.model} is {one.status}{where} on {one.n_nodes:,} nodes: {one.advice}."
         coarse = [one for one in self.attempts if not one.sound and one.n_nodes in self.n_nodes[-_MESHES:]]
         if coarse:
             one = coarse[-1]
-            return f"Not settled on {count}: {one.model} is {one.status} on {one.n_nodes:,} nodes, which tell nothing."
+            return f"It does not settle on {count}: {one.model} is {one.status} on {one.n_nodes:,} nodes."
         if len(self.n_nodes) < _MESHES:
-            return f"Not settled on {count}: it takes {_MESHES} to tell."
+            return f"It is too early to tell on {count}: that takes {_MESHES}."
         if not self.told:
-            return f"Nothing can settle on {count}: all that is watched is zero."
+            return f"Nothing settles on {count}: all that is watched is zero."
         worst = max((one for one in self.told if not one.settled), key=lambda one: one.error or 0.0)
         off = "not known" if worst.error is None else f"{_percent(worst.error)} off"
-        return f"Not settled to {_percent(self.tolerance)} on {count}: {worst.quantity} of {worst.model} is {off}."
+        return (
+            f"It does not settle to {_percent(self.tolerance)} on {count}: {worst.quantity} of {worst.model} is {off}."
+        )
 
 
 def _percent(share: float) -> str:

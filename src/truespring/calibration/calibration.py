@@ -53,20 +53,27 @@ class CaseResult:
         known = [one.level for one in self.case.observations if one.quantity == quantity]
         return self.errors(path, quantity).get(max(known)) if known else None
 
-    def decisive(self, path: Path) -> Decisive | None:
-        """Return the error of a path that decides at the last level that is known; None where it does not get there.
+    def deciding(self, path: Path) -> dict[float, Decisive]:
+        """Return the error of a path that decides, by load factor, at levels that are known and that it reaches.
 
         As of a comparison: the larger of the rms error and that of a moved support's force or torque.
         """
-        last = max(one.level for one in self.case.observations)
+        levels = sorted({one.level for one in self.case.observations})
         if self.case.field is not None and self.case.reference is not None and path.states:
             found = compare(path, self.case.reference)
-            there = np.flatnonzero(np.isclose(found.load_factors, last, rtol=0, atol=1e-9))
-            return found.decisive[int(there[0])] if there.size else None
+            at = {level: np.flatnonzero(np.isclose(found.load_factors, level, rtol=0, atol=1e-9)) for level in levels}
+            return {level: found.decisive[int(place[0])] for level, place in at.items() if place.size}
         quantities = dict.fromkeys(one.quantity for one in self.case.observations)
-        told = {quantity: self.errors(path, quantity).get(last) for quantity in quantities}
-        errors = [Decisive(error, quantity) for quantity, error in told.items() if error is not None]
-        return largest(errors) if errors else None
+        told = {quantity: self.errors(path, quantity) for quantity in quantities}
+        errors = {
+            level: [Decisive(found[level], quantity) for quantity, found in told.items() if level in found]
+            for level in levels
+        }
+        return {level: largest(several) for level, several in errors.items() if several}
+
+    def decisive(self, path: Path) -> Decisive | None:
+        """Return the error of a path that decides at the last level that is known; None where it does not get there."""
+        return self.deciding(path).get(max(one.level for one in self.case.observations))
 
     @cached_property
     def both(self) -> tuple[Decisive | None, Decisive | None]:

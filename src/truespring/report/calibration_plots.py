@@ -33,7 +33,7 @@ def calibration_figures(found: Calibration) -> Iterator[tuple[str, Sheet]]:
     if found.unknowns.problem.mesh.dim == 2 and len(found.unknowns.springs) <= _MOST_SPRINGS:
         yield "lattice", lattice_figure(found)
     for number, one in enumerate(found.cases, 1):
-        if len(one.errors(one.before, one.quantity)) > 1:
+        if len(one.deciding(one.before)) > 1:
             yield f"case_{number}", case_figure(one)
 
 
@@ -192,10 +192,10 @@ def case_figure(one: CaseResult) -> Sheet:
         (one.before, "by the rule", "#5b6168", "--", "s"),
         (one.after, "calibrated", BLUE, "-", "o"),
     ):
-        errors = one.errors(path, one.quantity)
-        x, y = np.array(list(errors)), 100 * np.array(list(errors.values()))
+        errors = one.deciding(path)
+        x, y = np.array(list(errors)), 100 * np.array([found.error for found in errors.values()])
         if x.size:
             curves.append(Curve(x, y, color, dashes, marker, label, strong=path is one.after))
     role = "held out" if one.held_out else "fitted"
-    what = "error" if one.quantity == "displacement" else "error of the force"
+    what = "error" if one.quantity == "displacement" else f"error, at full load of the {one.quantity}"
     return plot(f"{one.case.name} ({role})", "load factor", f"{what} [%]", curves, to_right=1.0).sheet

@@ -45,14 +45,14 @@ def write_series(path: Path, folder: FilePath, name: str) -> None:
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
 
 
-def write_mesh(mesh: Mesh, file: FilePath, held: Bools) -> None:
-    """Write the body at rest by its elements as VTU [m], with the directions of nodes that supports hold as 1."""
+def write_mesh(mesh: Mesh, file: FilePath, held: Bools | None = None) -> None:
+    """Write the body at rest by its elements as VTU [m]; with the directions of nodes that supports hold as 1."""
     import meshio
 
-    body = meshio.Mesh(
-        _in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data={"held": _in_space(held.astype(float))}
+    fields = {} if held is None else {"held": _in_space(held.astype(float))}
+    meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data=fields).write(
+        file, file_format="vtu"
     )
-    body.write(file, file_format="vtu")
 
 
 def _state_mesh(path: Path, state: State) -> "meshio.Mesh":

@@ -68,10 +68,8 @@ def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> I
         if name in _VECTORS:
             for axis, component in zip("xyz", value or (), strict=False):
                 yield f"{prefix}.{name}.{axis}", component
-        elif name == "warnings":
-            yield f"{prefix}.{name}", "; ".join(value or ())
         elif name in values:
-            yield f"{prefix}.{name}", value
+            yield f"{prefix}.{name}", "; ".join(value or ()) if name == "warnings" else value
 
 
 def _gathered(columns: Iterable[str]) -> list[str]:
