@@ -18,7 +18,7 @@ NAMES = ("stretching", "bending", "soft_block", "tissue")
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
-    return {name: run(read_study(EXAMPLES / f"{name}.toml")) for name in NAMES}
+    return {name: run(read_study(EXAMPLES / f"{name}.toml"), refining=False) for name in NAMES}
 
 
 def script(name: str) -> ModuleType:
@@ -35,7 +35,7 @@ def test_every_example_is_run_here() -> None:
 
 
 def test_six_methods_stand_side_by_side() -> None:
-    result = run(read_study(EXAMPLES / "six_methods.toml"))
+    result = run(read_study(EXAMPLES / "six_methods.toml"), refining=False)
     assert result.converged
     assert {path.kind for path in result.paths.values()} == {
         "springs",

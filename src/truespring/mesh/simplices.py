@@ -5,6 +5,7 @@ import numpy as np
 from truespring.arrays import Ints
 from truespring.errors import MeshError
 from truespring.mesh.facets import find_facets
+from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.mesh.mesh import Mesh
 
 
@@ -21,23 +22,7 @@ def in_simplices(mesh: Mesh) -> tuple[Mesh, Ints]:
         raise MeshError("a network of lines has no inside to be divided")
     if mesh.kind.n_nodes == mesh.dim + 1:
         return mesh, np.arange(len(mesh.elements))
-    tops = mesh.elements.argmin(axis=1)
-    found, whose = [], []
-    for top in range(mesh.kind.n_nodes):
-        numbers = np.flatnonzero(tops == top)
-        corners = mesh.elements[numbers]
-        for facet in mesh.kind.facets:
-            if top in facet:
-                continue
-            for base in _fanned(corners[:, facet]):
-                # Seen from outside a facet turns anticlockwise: from its own cone's top, clockwise.
-                turned = base[:, ::-1] if mesh.dim == 3 else base
-                cone = (turned, corners[:, [top]]) if mesh.dim == 3 else (corners[:, [top]], turned)
-                found.append(np.concatenate(cone, axis=1))
-                whose.append(numbers)
-    parents = np.concatenate(whose)
-    order = np.argsort(parents, kind="stable")
-    elements, parents = np.concatenate(found)[order], parents[order]
+    elements, parents = _cones(mesh.element, mesh.elements)
     kind = "triangle" if mesh.dim == 2 else "tetrahedron"
     groups = {name: np.flatnonzero(np.isin(parents, of)) for name, of in mesh.element_groups.items()}
     facets = {
@@ -45,6 +30,27 @@ def in_simplices(mesh: Mesh) -> tuple[Mesh, Ints]:
         for name, of in mesh.facet_groups.items()
     }
     return Mesh(mesh.nodes, elements, kind, mesh.node_groups, groups, facets, mesh.notes), parents
+
+
+def _cones(element: str, elements: Ints) -> tuple[Ints, Ints]:
+    """The simplices of elements of one kind, and the element that each is a part of, in the order of these."""
+    kind = ELEMENT_KINDS[element]
+    tops = elements.argmin(axis=1)
+    found, whose = [], []
+    for top in range(kind.n_nodes):
+        numbers = np.flatnonzero(tops == top)
+        corners = elements[numbers]
+        for facet in kind.facets:
+            if top in facet:
+                continue
+            for base in _fanned(corners[:, facet]):
+                # Seen from outside a facet turns anticlockwise, seen from the cone's top clockwise.
+                parts = (base[:, ::-1], corners[:, [top]]) if kind.dim == 3 else (corners[:, [top]], base)
+                found.append(np.concatenate(parts, axis=1))
+                whose.append(numbers)
+    parents = np.concatenate(whose)
+    order = np.argsort(parents, kind="stable")
+    return np.concatenate(found)[order], parents[order]
 
 
 def _fanned(facets: Ints) -> list[Ints]:

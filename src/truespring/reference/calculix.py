@@ -91,7 +91,8 @@ class CalculiX:
 
     def second_order(self, problem: Problem) -> Fem | None:
         """Return finite elements of second order of the same law, to which the elements of CalculiX converge too."""
-        return None if self.springs is not None else Fem(self.law)
+        first = self.springs is None and self._element(problem) == "linear"
+        return Fem(self.law) if first else None
 
     def check(self, problem: Problem, solver: Solver) -> None:
         """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""
