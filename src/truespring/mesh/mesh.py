@@ -1,10 +1,11 @@
-"""The mesh: nodes, elements of one kind, and what follows from them alone."""
+"""The mesh: nodes, elements of one kind or of several, and what follows from them alone."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -14,22 +15,28 @@ from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
 from truespring.mesh.forms import Forms, find_forms
-from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind, Links
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links, counted
+from truespring.mesh.merged import merged, unmerged, width
 from truespring.mesh.rows import ascending, distinct_rows
+from truespring.mesh.sides import facet_columns, facet_keys, halved
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
 _DEGENERATE = 1e-9
 
 
+_NONE: Mapping[str, Ints] = MappingProxyType({})
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Nodes joined by elements of one kind.
+    """Nodes joined by elements, of one kind or of several; see `of_kinds`.
 
     Attributes:
         nodes: reference positions [m], shape (n_nodes, dim).
-        elements: node numbers, shape (n_elements, nodes of the kind).
-        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses).
+        elements: node numbers, shape (n_elements, nodes of the kind). Of several kinds each is a quadrilateral or
+            hexahedron, some of whose corners are one as `ElementKind.merged` tells.
+        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses); "mixed" of several.
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
         notes: what should be known of a mesh that was read, in words.
@@ -46,14 +53,15 @@ class Mesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.element not in ELEMENT_KINDS:
-            allowed = ", ".join(ELEMENT_KINDS)
+        if self.element not in ELEMENT_KINDS and self.element != MIXED:
+            allowed = ", ".join([*ELEMENT_KINDS, MIXED])
             raise MeshError(
                 f"element = '{self.element}' is unknown{nearest(self.element, ELEMENT_KINDS)}; allowed: {allowed}"
             )
         try:
             object.__setattr__(self, "nodes", frozen_floats(self.nodes, (None, None), "nodes"))
-            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, self.kind.n_nodes), "elements"))
+            corners = width(self.dim) if self.element == MIXED else self.kind.n_nodes
+            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, corners), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
         object.__setattr__(self, "node_groups", _groups(self.node_groups, self.n_nodes, "node"))
@@ -61,12 +69,35 @@ class Mesh:
         self._check()
 
     def __repr__(self) -> str:
-        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
+        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.kinds})"
+
+    @classmethod
+    def of_kinds(
+        cls,
+        nodes: Floats,
+        cells: Mapping[str, Ints],
+        node_groups: Mapping[str, Ints] = _NONE,
+        element_groups: Mapping[str, Ints] = _NONE,
+        notes: tuple[str, ...] = (),
+    ) -> "Mesh":
+        """Return a mesh of elements of one kind or several.
+
+        `cells` are node numbers by kind, keys of ELEMENT_KINDS, each of shape (n, nodes of the kind). Elements are
+        numbered kind after kind. They should meet face to face: where two triangles of other elements lie on a
+        quadrilateral, nodes are joined but not what lies between them.
+        """
+        there = {kind: elements for kind, elements in cells.items() if len(elements)}
+        if len(there) == 1:
+            ((kind, elements),) = there.items()
+            return cls(nodes, elements, kind, node_groups, element_groups, notes=notes)
+        if not there:
+            raise MeshError("a mesh without elements is empty")
+        return cls(nodes, merged(there), MIXED, node_groups, element_groups, notes=notes)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):
             raise MeshError(f"a mesh of {len(self.nodes)} nodes and {len(self.elements)} elements is empty")
-        if self.element != "line" and self.dim != self.kind.dim:
+        if self.element not in ("line", MIXED) and self.dim != self.kind.dim:
             raise MeshError(f"a {self.element} has {self.kind.dim} dimensions, the nodes have {self.dim}")
         if self.elements.min() < 0 or self.elements.max() >= len(self.nodes):
             raise MeshError(
@@ -85,12 +116,15 @@ class Mesh:
         )
         if self.element != "line":  # springs may be parallel
             twice = np.ones(len(self.elements), dtype=bool)
-            twice[distinct_rows(ascending(self.elements.T)).first] = False
+            for numbers, part in self.blocks:
+                twice[numbers[distinct_rows(ascending(part.elements.T)).first]] = False
             self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
 
     @property
     def _degenerate(self) -> Floats:
         """The corner Jacobian below which an element is degenerate [m^dim], shape (n_elements,)."""
+        if self.element == MIXED:
+            return self._by_block(lambda part: part._degenerate)
         longest = np.zeros(len(self.elements))
         if self.element != "line":
             for part, at in corners_in_slices(self.nodes, self.elements):
@@ -108,8 +142,59 @@ class Mesh:
 
     @property
     def kind(self) -> ElementKind:
-        """The table entry of the elements."""
+        """The table entry of the elements; raises MeshError where they are of several kinds."""
+        if self.element == MIXED:
+            raise MeshError(f"this is for elements of one kind, the mesh has {self.kinds}: take springs or fem")
         return ELEMENT_KINDS[self.element]
+
+    @cached_property
+    def blocks(self) -> tuple["Block", ...]:
+        """The elements kind by kind."""
+        if self.element != MIXED:
+            return (Block(np.arange(len(self.elements)), self),)
+        return tuple(
+            Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items()
+        )
+
+    def _part(self, kind: str, elements: Ints) -> "Mesh":
+        """Some elements of one kind on all the nodes, which need not all be theirs: checked with the whole."""
+        part = object.__new__(Mesh)
+        none: Mapping[str, Ints] = MappingProxyType({})
+        own = {"elements": elements, "element": kind, "node_groups": none, "element_groups": none, "notes": ()}
+        part.__dict__.update(self.__dict__ | own)
+        for name in _OF_ELEMENTS:
+            part.__dict__.pop(name, None)
+        return part
+
+    def _by_block(self, values: Callable[["Mesh"], Floats]) -> Floats:
+        """What each kind's elements have, in the order of the elements, shape (n_elements,)."""
+        found = np.empty(len(self.elements))
+        for numbers, part in self.blocks:
+            found[numbers] = values(part)
+        return found
+
+    @property
+    def element_kinds(self) -> tuple[str, ...]:
+        """The kinds of its elements, keys of ELEMENT_KINDS."""
+        return (self.element,) if self.element != MIXED else tuple(part.element for _, part in self.blocks)
+
+    @property
+    def kinds(self) -> str:
+        """The kind of its elements, in words: "hexahedron"; of several each with its count."""
+        if self.element != MIXED:
+            return self.element
+        *some, last = (counted(len(numbers), part.element) for numbers, part in self.blocks)
+        return f"{', '.join(some)} and {last}" if some else last
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """The elements by VTK's names of their kinds, in the order of `blocks`."""
+        return {part.kind.vtk: part.elements for _, part in self.blocks}
+
+    @property
+    def element_dim(self) -> int:
+        """The dimensions that its elements fill."""
+        return self.dim if self.element == MIXED else self.kind.dim
 
     @property
     def dim(self) -> int:
@@ -139,6 +224,11 @@ class Mesh:
     @property
     def centres(self) -> Floats:
         """The mean of each element's nodes [m], shape (n_elements, dim)."""
+        if self.element == MIXED:
+            found = np.empty((len(self.elements), self.dim))
+            for numbers, part in self.blocks:
+                found[numbers] = part.centres
+            return found
         total = np.zeros((len(self.elements), self.dim))
         for corner in self.elements.T:
             total += self.nodes[corner]
@@ -159,31 +249,41 @@ class Mesh:
     @cached_property
     def edges(self) -> Ints:
         """Every edge of the elements once, shape (n_edges, 2)."""
-        keys = self.pair_keys(self.kind.edges).ravel()
+        keys = np.concatenate([part.pair_keys(part.kind.edges).ravel() for _, part in self.blocks])
         keys.sort(kind="stable")
         return np.stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], self.n_nodes), axis=1)
 
     @cached_property
     def facets(self) -> Ints:
-        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k)."""
+        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k).
+
+        Beside quadrilaterals triangles name their last corner twice.
+        """
         return self.facets_of(self.elements)[0]
 
     @cached_property
     def boundary(self) -> Ints:
-        """The facets that belong to one element only, in that element's own order of nodes, shape (n, k)."""
+        """The facets that belong to one element only, in that element's own order of nodes, shape (n, k).
+
+        Beside quadrilaterals triangles name their last corner twice. A quadrilateral on which two triangles of other
+        elements lie does not bound the body, nor do they.
+        """
         facets, alone = self.facets_of(self.elements)
-        return np.asarray(facets[alone])
+        found = np.asarray(facets[alone])
+        return found[~halved(found)] if self.element == MIXED and self.dim == 3 else found
 
     def facets_of(self, elements: Ints, within: Bools | None = None) -> tuple[Ints, Bools]:
         """Return each facet of `elements` once, and whether but one of them has it; shapes (n, k) and (n,).
 
         With `within`, true for some nodes, only the facets all of whose nodes are among these.
         """
-        local = np.array(self.kind.facets).T
-        facets = elements.T[local].reshape(len(local), -1)  # a column each, those of all elements by facet
+        own = [(self.element, elements)]
+        if self.element == MIXED:
+            own = [(kind, part) for kind, (_, part) in unmerged(elements).items()]
+        facets = facet_columns(own)
         if within is not None:
             facets = facets[:, within[facets].all(axis=0)]
-        found = distinct_rows(ascending(facets))
+        found = distinct_rows(facet_keys(facets))
         return np.ascontiguousarray(facets[:, found.first].T), np.asarray(found.count == 1)
 
     @cached_property
@@ -201,8 +301,16 @@ class Mesh:
     def corner_jacobians(self, positions: Floats) -> Floats:
         """Return the Jacobian at each corner of each element [m^dim], shape (n_elements, corners).
 
-        For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive.
+        For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive. Of several
+        kinds those with fewer corners have their last one repeated.
         """
+        if self.element == MIXED:
+            most = max(len(part.kind.corners) for _, part in self.blocks)
+            found = np.empty((len(self.elements), most))
+            for numbers, part in self.blocks:
+                own = part.corner_jacobians(positions)
+                found[numbers] = own[:, np.minimum(np.arange(most), own.shape[1] - 1)]
+            return found
         found = np.empty((len(self.elements), len(self.kind.corners) or 1))
         for part, at in corners_in_slices(positions, self.elements):
             for corner, jacobian in enumerate(self._jacobians(at)):
@@ -214,6 +322,8 @@ class Mesh:
 
         In space it is a ratio of volumes. Not a number where a position is none.
         """
+        if self.element == MIXED:
+            return float(np.min([part.smallest_area_ratio(positions) for _, part in self.blocks]))
         smallest = np.inf
         with np.errstate(over="ignore", invalid="ignore"):  # a solver may ask of a state that has run away
             for part, at in corners_in_slices(positions, self.elements):
@@ -234,6 +344,8 @@ class Mesh:
 
     def measures_at(self, positions: Floats) -> Floats:
         """Signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact for each kind."""
+        if self.element == MIXED:
+            return self._by_block(lambda part: part.measures_at(positions))
         found = np.zeros(len(self.elements))
         for part, at in corners_in_slices(positions, self.elements):
             for determinant in determinants(at, self.kind.simplices):
@@ -247,6 +359,17 @@ class Mesh:
         ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
         graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+#: What a mesh keeps that follows from its elements, which a part of it has for itself.
+_OF_ELEMENTS = tuple(name for name, value in vars(Mesh).items() if isinstance(value, cached_property))
+
+
+class Block(NamedTuple):
+    """The elements of one kind: their numbers in the mesh, ascending, and a mesh of them alone on all its nodes."""
+
+    numbers: Ints
+    mesh: Mesh
 
 
 def _frozen(array: Floats) -> Floats:

@@ -211,7 +211,7 @@ def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
     whole = n_inside == mesh.elements.shape[1]
     if _reach(mesh.elements[whole], nodes):
         return mesh.elements[whole], element_corner_measures(mesh)[whole]
-    facets, alone = mesh.facets_of(mesh.elements[n_inside >= len(mesh.kind.facets[0])], inside)
+    facets, alone = mesh.facets_of(mesh.elements[n_inside >= mesh.dim], inside)
     for cells in (facets[alone], facets):
         if _reach(cells, nodes):
             return cells, corner_measures(mesh.nodes[cells])
@@ -227,7 +227,8 @@ def _reach(cells: Ints, nodes: Ints) -> bool:
 def facets_within(mesh: Mesh, nodes: Ints) -> Ints:
     """Return the facets of the boundary all of whose nodes are among `nodes`, seen from outside anticlockwise.
 
-    Shape (n, 2 to 4). Raises MeshError where there is none.
+    Shape (n, 2 to 4); beside quadrilaterals triangles name their last corner twice. Raises MeshError where there is
+    none.
     """
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[nodes] = True

@@ -229,9 +229,9 @@ class BlockSprings:
         return np.unique(np.sort(pairs, axis=1), axis=0)
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The springs as lines, then the edges of the block's elements, shape (n_springs + n_edges, 2)."""
-        return "line", np.concatenate([self.springs, self._edges])
+        return {"line": np.concatenate([self.springs, self._edges])}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each line.

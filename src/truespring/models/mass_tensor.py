@@ -81,7 +81,7 @@ class _Tensors:
         return self.fem.nodes
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The elements, shape (n_elements, nodes)."""
         return self.fem.cells
 

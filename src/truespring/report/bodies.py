@@ -47,7 +47,7 @@ def path_lines(path: Path) -> Ints:
     if spring_lines(path) is None:
         return path.problem.mesh.edges
     assert isinstance(path.potential, Visible)  # as all that have springs are
-    return path.potential.cells[1]
+    return path.potential.cells["line"]
 
 
 def magnification(result: Result) -> float:

@@ -1,0 +1,65 @@
+"""Elements of several kinds in one table: each as a quadrilateral or hexahedron, some of whose corners are one."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from truespring.arrays import Ints
+from truespring.errors import MeshError
+from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind
+
+#: The kind whose corners each element has, by the dimensions that it fills.
+_WHOLE = {2: "quadrilateral", 3: "hexahedron"}
+
+
+def width(dim: int) -> int:
+    """Return the number of corners that the table has for each element; raise MeshError where there is no such."""
+    if dim not in _WHOLE:
+        raise MeshError(f"elements of several kinds fill 2 or 3 dimensions, the nodes have {dim}")
+    return ELEMENT_KINDS[_WHOLE[dim]].n_nodes
+
+
+def merged(cells: Mapping[str, Ints]) -> Ints:
+    """Return elements of several kinds in one table, shape (n_elements, 4 or 8), kind after kind."""
+    tables = []
+    for kind, elements in cells.items():
+        own = ELEMENT_KINDS.get(kind)
+        if own is None or not own.merged:
+            allowed = ", ".join(name for name, other in ELEMENT_KINDS.items() if other.merged)
+            raise MeshError(f"'{kind}' is no kind of element that others stand beside; allowed: {allowed}")
+        given = np.asarray(elements)
+        if given.ndim != 2 or given.shape[1] != own.n_nodes:
+            raise MeshError(f"elements of kind {kind} have {own.n_nodes} nodes each, not shape {given.shape}")
+        tables.append(given[:, own.merged])
+    if len({table.shape[1] for table in tables}) != 1:
+        raise MeshError(f"{', '.join(cells)}: the elements of a mesh all are plane or all are solid")
+    return np.concatenate(tables)
+
+
+def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
+    """Find the kinds in a table: of each the numbers of its elements, ascending, and their own nodes.
+
+    Raises MeshError where corners are one that are not in any kind.
+    """
+    found, known = {}, np.zeros(len(elements), dtype=bool)
+    for name, kind in ELEMENT_KINDS.items():
+        if len(kind.merged) == elements.shape[1]:
+            is_own = _are(elements, kind) & ~known
+            known |= is_own
+            numbers = np.flatnonzero(is_own)
+            if numbers.size:
+                found[name] = (numbers, elements[numbers][:, [kind.merged.index(node) for node in range(kind.n_nodes)]])
+    if not known.all():
+        first = int(known.argmin())
+        raise MeshError(f"element {first} has corners that are one as in no kind of element: {elements[first].tolist()}")
+    return found
+
+
+def _are(elements: Ints, kind: ElementKind) -> Ints:
+    """Tell which elements have just those corners as one that the kind has."""
+    own = np.ones(len(elements), dtype=bool)
+    for one in range(elements.shape[1]):
+        for other in range(one):
+            same = elements[:, one] == elements[:, other]
+            own &= same == (kind.merged[one] == kind.merged[other])
+    return own
