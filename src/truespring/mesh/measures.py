@@ -21,7 +21,8 @@ def element_corner_measures(mesh: Mesh) -> Floats:
     if mesh.element in ("pyramid", "wedge"):
         share = np.zeros(mesh.elements.shape)
         parts = whole(mesh.nodes[mesh.elements[:, mesh.kind.merged]])
-        np.add.at(share, (slice(None), mesh.kind.merged), parts)
+        for corner, part in zip(mesh.kind.merged, parts.T, strict=True):
+            share[:, corner] += part
         return share
     k = mesh.elements.shape[1]
     return np.repeat(mesh.measures[:, None] / k, k, axis=1)

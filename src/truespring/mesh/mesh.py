@@ -305,10 +305,10 @@ class Mesh:
         kinds those with fewer corners have their last one repeated.
         """
         if self.element == MIXED:
-            most = max(len(part.kind.corners) for _, part in self.blocks)
+            most = max(len(block.kind.corners) for _, block in self.blocks)
             found = np.empty((len(self.elements), most))
-            for numbers, part in self.blocks:
-                own = part.corner_jacobians(positions)
+            for numbers, block in self.blocks:
+                own = block.corner_jacobians(positions)
                 found[numbers] = own[:, np.minimum(np.arange(most), own.shape[1] - 1)]
             return found
         found = np.empty((len(self.elements), len(self.kind.corners) or 1))

@@ -71,6 +71,11 @@ class BemSprings:
     def _parts(self, problem: Problem) -> tuple[Bools, SpringNetwork]:
         """Which elements are the block, shape (n_elements,), and the springs beside it."""
         require_body(problem)
+        if any(len(set(facet)) < len(facet) for facet in problem.mesh.kind.facets):
+            raise ModelError(
+                f"boundary elements are all triangles or all quadrilaterals, but a {problem.mesh.kinds} has both: take "
+                "springs, or fem"
+            )
         chosen = self._chosen(problem)
         _refuse_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
         return chosen, _springs_beside(problem, self.rule, chosen)

@@ -167,13 +167,21 @@ def fem_potential(
     problem: Problem, law: str, kind: "type[FemPotential] | None" = None
 ) -> "FemPotential | SummedElements":
     """Set up quadrature and constants of `law` on the problem's mesh, of several kinds of elements on each of them."""
-    if problem.material is None or problem.section is None or problem.mesh.element == "line":
-        kinds = ", ".join((*_SKFEM, *_QUADRATURE))
-        raise ModelError(f"finite elements need a material, a section and elements of a kind among {kinds}")
+    _require_continuum(problem)
     if problem.mesh.element == MIXED:
         from truespring.models.summed import SummedElements
 
-        return SummedElements(tuple(fem_potential(part, law, kind) for _, part in problem.blocks), problem)
+        return SummedElements(tuple(_of_one_kind(part, law, kind) for _, part in problem.blocks), problem)
+    return _of_one_kind(problem, law, kind)
+
+
+def _require_continuum(problem: Problem) -> None:
+    if problem.material is None or problem.section is None or problem.mesh.element == "line":
+        kinds = ", ".join((*_SKFEM, *_QUADRATURE))
+        raise ModelError(f"finite elements need a material, a section and elements of a kind among {kinds}")
+
+
+def _of_one_kind(problem: Problem, law: str, kind: "type[FemPotential] | None") -> "FemPotential":
     plane_stress = isinstance(problem.section, PlaneStress)
     if len(problem.materials) == 1:
         constants = Constants(*problem.materials[0].lame, plane_stress)
@@ -193,10 +201,9 @@ def element_matrices(problem: Problem) -> Floats:
 
 def fem_of_one_kind(problem: Problem, law: str) -> "FemPotential":
     """Return the finite elements of a mesh of one kind; raises MeshError for others."""
+    _require_continuum(problem)
     _ = problem.mesh.kind
-    found = fem_potential(problem, law)
-    assert isinstance(found, FemPotential)
-    return found
+    return _of_one_kind(problem, law, None)
 
 
 class Reference(NamedTuple):

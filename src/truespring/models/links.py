@@ -29,19 +29,21 @@ def in_a_row(mesh: Mesh, values: Floats) -> Floats:
 
     Of several kinds rows are as long as that of the kind with most links; what is beyond an element's own is no link's.
     """
+    if len(mesh.blocks) == 1:
+        return values.ravel()
     return np.concatenate([values[numbers, : len(part.kind.links)].ravel() for numbers, part in mesh.blocks])
 
 
-def in_rows(mesh: Mesh, values: Callable[[Mesh, Ints], Floats]) -> Floats:
-    """Return what each kind's elements, of these numbers, have for their links, shape (n_elements, links).
+def by_kind(problem: Problem, values: Callable[[Problem], Floats]) -> Floats:
+    """Return what `values` makes of the elements of each kind for their links, shape (n_elements, links).
 
     Of several kinds zero beyond an element's own links.
     """
-    if len(mesh.blocks) == 1:
-        return values(mesh, mesh.blocks[0].numbers)
-    found = np.zeros((len(mesh.elements), n_links(mesh)))
-    for numbers, part in mesh.blocks:
-        found[numbers, : len(part.kind.links)] = values(part, numbers)
+    if len(problem.blocks) == 1:
+        return values(problem)
+    found = np.zeros((len(problem.mesh.elements), n_links(problem.mesh)))
+    for numbers, part in problem.blocks:
+        found[numbers, : len(part.mesh.kind.links)] = values(part)
     return found
 
 

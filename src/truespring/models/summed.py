@@ -8,7 +8,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from scipy import sparse
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, ShortInts
+from truespring.mesh import Mesh
 from truespring.models.fem import FemPotential
 from truespring.models.linked import LinkedElements
 from truespring.potential import SparseMatrix
@@ -20,8 +21,8 @@ Part = TypeVar("Part", FemPotential, LinkedElements)
 class _Blocks(NamedTuple):
     """The blocks of a sum of matrices: as of a BSR matrix, and the place of those of each part among them."""
 
-    starts: Ints
-    columns: Ints
+    starts: ShortInts
+    columns: ShortInts
     places: tuple[Ints, ...]
 
 
@@ -36,6 +37,11 @@ class _Summed(Generic[Part]):
 
     parts: tuple[Part, ...]
     problem: Problem
+
+    @property
+    def mesh(self) -> Mesh:
+        """The problem's mesh."""
+        return self.problem.mesh
 
     @property
     def nodes(self) -> Floats:
@@ -89,7 +95,7 @@ class _Summed(Generic[Part]):
             keys = [row * n_nodes + one.indices for row, one in zip(rows, matrices, strict=True)]
             every = np.unique(np.concatenate(keys))
             starts = np.searchsorted(every, np.arange(n_nodes + 1) * n_nodes).astype(np.int32)
-            places = tuple(np.searchsorted(every, own) for own in keys)
+            places = tuple(np.asarray(np.searchsorted(every, own)) for own in keys)
             self.__dict__["_found"] = _Blocks(starts, (every % n_nodes).astype(np.int32), places)
         found: _Blocks = self.__dict__["_found"]
         return found
@@ -98,6 +104,13 @@ class _Summed(Generic[Part]):
         """Values on the cells of all parts, part after part."""
         found = [values(part) for part in self.parts]
         return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+
+
+def summed_links(problem: Problem, make: Callable[[Problem], LinkedElements]) -> "LinkedElements | SummedLinks":
+    """Return what `make` makes of a problem; of one of several kinds of elements the sum of what it makes of each."""
+    if len(problem.blocks) == 1:
+        return make(problem)
+    return SummedLinks(tuple(make(part) for _, part in problem.blocks), problem)
 
 
 class SummedElements(_Summed[FemPotential]):
@@ -141,6 +154,6 @@ class SummedLinks(_Summed[Any]):
         """Tension [N], stretch [-], stiffness at rest [N/m] and strain energy [J] of each link, over all elements."""
         springs, of = self._shared
         fields = self._by_part(lambda part: part.cell_fields(positions))
-        found = {name: np.bincount(of, values, len(springs)) for name, values in fields.items()}
+        found = {name: np.bincount(of, values, len(springs)).astype(np.float64) for name, values in fields.items()}
         found["stretch"][of] = fields["stretch"]
         return found
