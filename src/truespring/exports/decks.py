@@ -18,7 +18,7 @@ from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.material import PlaneStrain
-from truespring.mesh import facets_within, select
+from truespring.mesh import outer_facets
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import Loading
@@ -251,7 +251,7 @@ def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
             direction = [*(np.array(load.acceleration) / (size or 1.0)), 0.0][:3]
             yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
         elif isinstance(load, Pressure):
-            pressed = np.sort(facets_within(mesh, select(mesh, load.on)), axis=1)
+            pressed = np.sort(outer_facets(mesh, load.on), axis=1)
             for face, local in enumerate(_FACES[mesh.element], 1):
                 theirs = np.sort(mesh.elements[:, local], axis=1)
                 for number in np.flatnonzero(_rows_in(theirs, pressed)).tolist():

@@ -44,10 +44,10 @@ def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
 
 @dataclass(frozen=True)
 class Force:
-    """A dead load: the `total` force [N], one value a direction, shared consistently over the nodes `on`.
+    """A dead load: the `total` force [N], one value a direction, shared consistently over what is `on`.
 
-    `on` is a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point
-    ("right-middle"), a Plane, a Box, a Near or node numbers.
+    `on` is a group of the mesh (its facets where it has some), a side ("left", "right", "bottom", "top", "back",
+    "front"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
     """
 
     on: Selection
@@ -57,15 +57,16 @@ class Force:
         """Return the load over the cells that carry it: those that cover the nodes, else the nodes alone."""
         total = components(self.total, body.mesh.dim, "force", "N")
         nodes = select(body.mesh, self.on)
-        cells, measures = covering(body.mesh, nodes) or (nodes[:, None], np.ones((len(nodes), 1)))
+        cells, measures = covering(body.mesh, self.on) or (nodes[:, None], np.ones((len(nodes), 1)))
         return Spread(cells, measures, np.tile(total / measures.sum(), (len(cells), 1)))
 
 
 @dataclass(frozen=True)
 class Traction:
-    """A dead load: force per area at rest [Pa], one value a direction, on the facets of the boundary `on`.
+    """A dead load: force per area at rest [Pa], one value a direction, on the facets `on`.
 
-    `on` is a side, a group of the mesh, a Plane, a Box or node numbers: all facets whose nodes are among them.
+    `on` is a group of facets, which may lie inside the body, or a side, another group of the mesh, a Plane, a Box or
+    node numbers: all facets of the boundary whose nodes are among them.
     """
 
     on: Selection
@@ -74,7 +75,7 @@ class Traction:
     def spread(self, body: Body) -> Spread:
         """Return the load over the facets."""
         traction = components(self.traction, body.mesh.dim, "traction", "Pa")
-        facets = facets_within(body.mesh, select(body.mesh, self.on))
+        facets = facets_within(body.mesh, self.on)
         density = np.tile(body.thickness * traction, (len(facets), 1))
         return Spread(facets, corner_measures(body.mesh.nodes[facets]), density)
 

@@ -16,7 +16,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ProblemError
 from truespring.loading.dead import Body
 from truespring.loading.values import number
-from truespring.mesh import Mesh, Selection, facets_within, select, shares
+from truespring.mesh import Mesh, Selection, outer_facets, shares
 from truespring.potential import Pattern, SparseMatrix
 
 # Forces of a pressure are polynomials of second order along a straight way: two Gauss points give its work exactly.
@@ -30,7 +30,8 @@ _SYMMETRIC, _DEFORMED = 1e-9, 0.05
 class Pressure:
     """A `pressure` [Pa] that presses on the facets of the boundary `on` and stays normal to them as they move.
 
-    `on` is a side, a group of the mesh, a Plane, a Box or node numbers: all facets whose nodes are among them.
+    `on` is a group of facets, or a side, another group of the mesh, a Plane, a Box or node numbers: all facets of the
+    boundary whose nodes are among them.
     """
 
     on: Selection
@@ -39,7 +40,7 @@ class Pressure:
     def following(self, body: Body, held: Bools) -> "SurfacePressure":
         """Return the potential; raise ProblemError where the load has none."""
         pressure = number(self.pressure, "pressure", "Pa")
-        facets = facets_within(body.mesh, select(body.mesh, self.on))
+        facets = outer_facets(body.mesh, self.on)
         load = SurfacePressure(body.mesh.nodes, facets, body.thickness * pressure, held)
         if pressure:
             load.refuse_open_edges()
@@ -65,10 +66,10 @@ class Moment:
                 "a moment in space has no potential: its work depends on the order of turns about several axes; "
                 "prescribe the rotation of the face instead (a support with rotation and axis)"
             )
-        nodes = select(mesh, self.on)
+        nodes, weights = shares(mesh, self.on)
         if len(nodes) < 2:
             raise ProblemError("a moment turns a face: select at least two nodes")
-        return FaceMoment(mesh.nodes, nodes, shares(mesh, nodes), moment, _way_to(mesh, nodes, held))
+        return FaceMoment(mesh.nodes, nodes, weights, moment, _way_to(mesh, nodes, held))
 
 
 @dataclass(frozen=True)

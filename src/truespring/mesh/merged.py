@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from truespring.arrays import Ints
+from truespring.arrays import Bools, Ints
 from truespring.errors import MeshError
-from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED, ElementKind
 
 #: The kind whose corners each element has, by the dimensions that it fills.
 _WHOLE = {2: "quadrilateral", 3: "hexahedron"}
@@ -51,11 +51,31 @@ def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
                 found[name] = (numbers, elements[numbers][:, [kind.merged.index(node) for node in range(kind.n_nodes)]])
     if not known.all():
         first = int(known.argmin())
-        raise MeshError(f"element {first} has corners that are one as in no kind of element: {elements[first].tolist()}")
+        raise MeshError(
+            f"{int((~known).sum())} elements have corners that are one as in no kind of element, the first is element "
+            f"{first}, of nodes {', '.join(map(str, elements[first].tolist()))}"
+        )
     return found
 
 
-def _are(elements: Ints, kind: ElementKind) -> Ints:
+def kinds_in(elements: Ints, kind: str) -> list[tuple[str, Ints, Ints]]:
+    """Return the kinds in a table of elements of a kind or "mixed": of each its name, numbers and nodes of elements."""
+    if kind != MIXED:
+        return [(kind, np.arange(len(elements)), elements)]
+    return [(name, numbers, own) for name, (numbers, own) in unmerged(elements).items()]
+
+
+def mirrored(elements: Ints, kind: str, which: Bools) -> Ints:
+    """Return a table of elements of a kind or "mixed", some of them in the order of their mirror images."""
+    found = elements.copy()
+    for name, numbers, own in kinds_in(elements, kind):
+        here = which[numbers]
+        turned = own[here][:, MIRRORED[name]]
+        found[numbers[here]] = turned if kind != MIXED else turned[:, ELEMENT_KINDS[name].merged]
+    return found
+
+
+def _are(elements: Ints, kind: ElementKind) -> Bools:
     """Tell which elements have just those corners as one that the kind has."""
     own = np.ones(len(elements), dtype=bool)
     for one in range(elements.shape[1]):

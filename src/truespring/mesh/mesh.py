@@ -14,11 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
+from truespring.mesh.facets import facet_columns, facet_keys, facet_nodes, halved, n_facets
 from truespring.mesh.forms import Forms, find_forms
-from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links, counted
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links
 from truespring.mesh.merged import merged, unmerged, width
 from truespring.mesh.rows import ascending, distinct_rows
-from truespring.mesh.sides import facet_columns, facet_keys, halved
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
@@ -39,6 +39,9 @@ class Mesh:
         element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses); "mixed" of several.
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
+        facet_groups: facets by name, shape (n, 2): an element and the number of its facet in its kind's `facets`, in
+            lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
+            becomes one: the facets' nodes.
         notes: what should be known of a mesh that was read, in words.
 
     Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
@@ -50,6 +53,7 @@ class Mesh:
     element: str = "quadrilateral"
     node_groups: Mapping[str, Ints] = field(default_factory=dict)
     element_groups: Mapping[str, Ints] = field(default_factory=dict)
+    facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -64,8 +68,10 @@ class Mesh:
             object.__setattr__(self, "elements", frozen_ints(self.elements, (None, corners), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
-        object.__setattr__(self, "node_groups", _groups(self.node_groups, self.n_nodes, "node"))
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
+        object.__setattr__(self, "facet_groups", self._facet_groups())
+        nodes = {name: np.unique(self.facet_nodes(facets)) for name, facets in self.facet_groups.items()}
+        object.__setattr__(self, "node_groups", _groups({**nodes, **self.node_groups}, self.n_nodes, "node"))
         self._check()
 
     def __repr__(self) -> str:
@@ -78,6 +84,7 @@ class Mesh:
         cells: Mapping[str, Ints],
         node_groups: Mapping[str, Ints] = _NONE,
         element_groups: Mapping[str, Ints] = _NONE,
+        facet_groups: Mapping[str, Ints] = _NONE,
         notes: tuple[str, ...] = (),
     ) -> "Mesh":
         """Return a mesh of elements of one kind or several.
@@ -89,10 +96,10 @@ class Mesh:
         there = {kind: elements for kind, elements in cells.items() if len(elements)}
         if len(there) == 1:
             ((kind, elements),) = there.items()
-            return cls(nodes, elements, kind, node_groups, element_groups, notes=notes)
+            return cls(nodes, elements, kind, node_groups, element_groups, facet_groups, notes)
         if not there:
             raise MeshError("a mesh without elements is empty")
-        return cls(nodes, merged(there), MIXED, node_groups, element_groups, notes=notes)
+        return cls(nodes, merged(there), MIXED, node_groups, element_groups, facet_groups, notes)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):
@@ -140,11 +147,32 @@ class Mesh:
                 f"{int(bad.sum())} of {len(bad)} {what} are {why}; the first is {what[:-1]} {first} at ({place}) m"
             )
 
+    def _facet_groups(self) -> Mapping[str, Ints]:
+        """Freeze groups of facets: each facet once; raise MeshError for one that is empty or does not exist."""
+        frozen = {}
+        for name, facets in self.facet_groups.items():
+            given = np.asarray(facets)
+            if given.ndim != 2 or given.shape[1:] != (2,) or not np.issubdtype(given.dtype, np.integer):
+                raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are wanted")
+            there, last = n_facets(self.elements, self.element), len(self.elements) - 1
+            beyond = not len(given) or (given < 0).any() or (given[:, 0] > last).any()
+            if beyond or (given[:, 1] >= there[given[:, 0]]).any():
+                raise MeshError(
+                    f"facet group '{name}' is empty or has a facet that does not exist: elements are 0 to {last}, "
+                    f"facets of each 0 to {there.max() - 1}{' or fewer' * (there.min() < there.max())}"
+                )
+            members = np.unique(given.astype(np.int64), axis=0)
+            members.setflags(write=False)
+            frozen[name] = members
+        return MappingProxyType(frozen)
+
     @property
     def kind(self) -> ElementKind:
         """The table entry of the elements; raises MeshError where they are of several kinds."""
         if self.element == MIXED:
-            raise MeshError(f"this is for elements of one kind, the mesh has {self.kinds}: take springs or fem")
+            raise MeshError(
+                f"this is for elements of one kind, and the mesh has {self.kinds} elements: springs and fem take several"
+            )
         return ELEMENT_KINDS[self.element]
 
     @cached_property
@@ -152,18 +180,13 @@ class Mesh:
         """The elements kind by kind."""
         if self.element != MIXED:
             return (Block(np.arange(len(self.elements)), self),)
-        return tuple(
-            Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items()
-        )
+        return tuple(Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items())
 
     def _part(self, kind: str, elements: Ints) -> "Mesh":
         """Some elements of one kind on all the nodes, which need not all be theirs: checked with the whole."""
         part = object.__new__(Mesh)
-        none: Mapping[str, Ints] = MappingProxyType({})
-        own = {"elements": elements, "element": kind, "node_groups": none, "element_groups": none, "notes": ()}
-        part.__dict__.update(self.__dict__ | own)
-        for name in _OF_ELEMENTS:
-            part.__dict__.pop(name, None)
+        groups = dict.fromkeys(("node_groups", "element_groups", "facet_groups"), _NONE)
+        part.__dict__.update(nodes=self.nodes, elements=elements, element=kind, notes=(), **groups)
         return part
 
     def _by_block(self, values: Callable[["Mesh"], Floats]) -> Floats:
@@ -180,10 +203,10 @@ class Mesh:
 
     @property
     def kinds(self) -> str:
-        """The kind of its elements, in words: "hexahedron"; of several each with its count."""
+        """The kind of its elements, to stand before "elements": "wedge"; of several "8 hexahedron and 2 wedge"."""
         if self.element != MIXED:
             return self.element
-        *some, last = (counted(len(numbers), part.element) for numbers, part in self.blocks)
+        *some, last = (f"{len(numbers)} {part.element}" for numbers, part in self.blocks)
         return f"{', '.join(some)} and {last}" if some else last
 
     @property
@@ -272,15 +295,16 @@ class Mesh:
         found = np.asarray(facets[alone])
         return found[~halved(found)] if self.element == MIXED and self.dim == 3 else found
 
+    def facet_nodes(self, facets: Ints) -> Ints:
+        """Return the nodes of facets, given as `facet_groups` holds them; from outside anticlockwise, shape (n, k)."""
+        return facet_nodes(self.elements, self.element, facets)
+
     def facets_of(self, elements: Ints, within: Bools | None = None) -> tuple[Ints, Bools]:
         """Return each facet of `elements` once, and whether but one of them has it; shapes (n, k) and (n,).
 
         With `within`, true for some nodes, only the facets all of whose nodes are among these.
         """
-        own = [(self.element, elements)]
-        if self.element == MIXED:
-            own = [(kind, part) for kind, (_, part) in unmerged(elements).items()]
-        facets = facet_columns(own)
+        facets = facet_columns(elements, self.element)
         if within is not None:
             facets = facets[:, within[facets].all(axis=0)]
         found = distinct_rows(facet_keys(facets))
@@ -359,10 +383,6 @@ class Mesh:
         ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
         graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
-#: What a mesh keeps that follows from its elements, which a part of it has for itself.
-_OF_ELEMENTS = tuple(name for name, value in vars(Mesh).items() if isinstance(value, cached_property))
 
 
 class Block(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Ints
 from truespring.errors import MeshError
+from truespring.mesh.facets import children_of_facet, facet_nodes
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.rows import ascending, distinct_rows
@@ -30,7 +31,8 @@ class _Division(NamedTuple):
 def refined(mesh: Mesh) -> Mesh:
     """Return the mesh with each edge halved: two elements a line, four a face, eight a body; groups are carried over.
 
-    A new node belongs to a group where all nodes that it is the middle of do.
+    A group of elements or of facets has their parts, and its group of nodes those of the parts. To a group of nodes
+    alone a new node belongs where all nodes that it is the middle of do.
     """
     parents, children = _division(mesh.element)
     n_corners = mesh.elements.shape[1]
@@ -53,18 +55,30 @@ def refined(mesh: Mesh) -> Mesh:
     local_numbers = np.concatenate(numbers, axis=1)
     order = [*range(n_corners), *(n_corners + one for one in _by_size(parents))]
     elements = local_numbers[:, np.argsort(order)][:, np.array(children)].reshape(-1, n_corners)
-    return Mesh(
-        np.concatenate(places),
-        elements,
-        mesh.element,
-        {name: np.flatnonzero(np.concatenate(inside)) for name, inside in groups.items()},
-        {name: _children_of(of, len(children)) for name, of in mesh.element_groups.items()},
-        mesh.notes,
-    )
+    element_groups = {name: _children_of(of, len(children)) for name, of in mesh.element_groups.items()}
+    facet_groups = {name: _parts_of(of, mesh.element) for name, of in mesh.facet_groups.items()}
+    node_groups = {name: np.flatnonzero(np.concatenate(inside)) for name, inside in groups.items()}
+    for name in node_groups.keys() & (element_groups.keys() | facet_groups.keys()):
+        members = [mesh.node_groups[name]]
+        if name in element_groups:
+            members.append(elements[element_groups[name]].ravel())
+        if name in facet_groups:
+            members.append(facet_nodes(elements, mesh.element, facet_groups[name]).ravel())
+        node_groups[name] = np.concatenate(members)
+    return Mesh(np.concatenate(places), elements, mesh.element, node_groups, element_groups, facet_groups, mesh.notes)
 
 
 def _children_of(elements: Ints, count: int) -> Ints:
     return np.asarray((count * elements[:, None] + np.arange(count)).ravel())
+
+
+def _parts_of(facets: Ints, element: str) -> Ints:
+    """The facets of the children that make up facets of their parents, each as element and local facet."""
+    kind, (parents, children) = ELEMENT_KINDS[element], _division(element)
+    corners = tuple((corner,) for corner in range(kind.n_nodes))
+    parts = np.array(children_of_facet(kind.facets, corners + parents, children))[facets[:, 1]]  # (n, parts, 2)
+    first = np.stack([len(children) * facets[:, 0], np.zeros(len(facets), dtype=np.int64)], axis=1)
+    return np.asarray((first[:, None] + parts).reshape(-1, 2))
 
 
 def _by_size(parents: tuple[tuple[int, ...], ...]) -> list[int]:

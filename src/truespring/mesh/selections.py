@@ -7,8 +7,10 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.facets import facet_keys
 from truespring.mesh.measures import corner_measures, element_corner_measures
 from truespring.mesh.mesh import Mesh
+from truespring.mesh.rows import distinct_rows
 
 #: Side names: direction and whether it is the upper end.
 SIDES: dict[str, tuple[int, bool]] = {
@@ -178,29 +180,51 @@ def named_point(mesh: Mesh, name: str) -> int:
     return nearest_node(mesh, point.tolist())
 
 
-def shares(mesh: Mesh, nodes: Ints) -> Floats:
-    """Return the share of a uniform total that each of `nodes` takes, shape (n,), sum 1.
+def named_facets(mesh: Mesh, on: Selection) -> Ints | None:
+    """Return the facets that a group of the mesh names, each once, from outside anticlockwise; None where none has.
+
+    Shape (n, 2 to 4). A facet between two elements is there as that of one of them.
+    """
+    if not isinstance(on, str) or on not in mesh.facet_groups:
+        return None
+    facets = mesh.facet_nodes(mesh.facet_groups[on])
+    return np.asarray(facets[np.sort(distinct_rows(facet_keys(facets.T)).first)])
+
+
+def loaded(mesh: Mesh, on: Selection) -> Ints:
+    """Return the numbers of the nodes that a load acts on, ascending: of a group that names facets, theirs."""
+    facets = named_facets(mesh, on)
+    return select(mesh, on) if facets is None else np.unique(facets)
+
+
+def shares(mesh: Mesh, on: Selection) -> tuple[Ints, Floats]:
+    """Return the nodes that a load acts on and the share of a uniform total that each takes, shape (n,), sum 1.
 
     Consistent with linear elements: the cells that carry the load (`covering`) share by their measure;
     nodes that none covers share equally.
     """
-    covered = covering(mesh, nodes)
+    nodes = loaded(mesh, on)
+    covered = covering(mesh, on)
     if covered is None:
-        return np.full(len(nodes), 1 / len(nodes))
+        return nodes, np.full(len(nodes), 1 / len(nodes))
     cells, measures = covered
     weight = np.zeros(mesh.n_nodes)
     np.add.at(weight, cells, measures)
-    return np.asarray(weight[nodes] / weight[nodes].sum())
+    return nodes, np.asarray(weight[nodes] / weight[nodes].sum())
 
 
-def covering(mesh: Mesh, nodes: Ints) -> tuple[Ints, Floats] | None:
-    """Return the cells that carry a load on `nodes`, and each corner's part of their measures [m^k].
+def covering(mesh: Mesh, on: Selection) -> tuple[Ints, Floats] | None:
+    """Return the cells that carry a load on a selection, and each corner's part of their measures [m^k].
 
     Both of shape (n, corners); None where nodes stand alone.
 
-    These are the elements that lie wholly in the selection, else the facets of the boundary that do, else
-    those inside, else the edges: the first of them that reach all nodes.
+    These are the facets that a group names. Of nodes they are the elements that lie wholly in the selection, else the
+    facets of the boundary that do, else those inside, else the edges: the first of them that reach all nodes.
     """
+    named = named_facets(mesh, on)
+    if named is not None:
+        return named, corner_measures(mesh.nodes[named])
+    nodes = select(mesh, on)
     if mesh.element == "line":
         return None
     inside = np.zeros(mesh.n_nodes, dtype=bool)
@@ -224,12 +248,17 @@ def _reach(cells: Ints, nodes: Ints) -> bool:
     return len(np.unique(cells)) == len(nodes)
 
 
-def facets_within(mesh: Mesh, nodes: Ints) -> Ints:
-    """Return the facets of the boundary all of whose nodes are among `nodes`, seen from outside anticlockwise.
+def facets_within(mesh: Mesh, on: Selection) -> Ints:
+    """Return the facets that a load per area acts on, seen from outside anticlockwise, shape (n, 2 to 4).
 
-    Shape (n, 2 to 4); beside quadrilaterals triangles name their last corner twice. Raises MeshError where there is
-    none.
+    These are the facets that a group names, on the boundary or inside. Of nodes they are the facets of the boundary
+    all of whose nodes are selected. Beside quadrilaterals triangles name their last corner twice. Raises MeshError
+    where there is none.
     """
+    named = named_facets(mesh, on)
+    if named is not None:
+        return named
+    nodes = select(mesh, on)
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[nodes] = True
     found = mesh.boundary[inside[mesh.boundary].all(axis=1)] if mesh.element != "line" else mesh.boundary[:0]
@@ -239,3 +268,22 @@ def facets_within(mesh: Mesh, nodes: Ints) -> Ints:
             "select a side, or all nodes of a face"
         )
     return found
+
+
+def outer_facets(mesh: Mesh, on: Selection) -> Ints:
+    """Return `facets_within`; raise MeshError where one of them lies between two elements and so has no outside."""
+    facets = facets_within(mesh, on)
+    within = np.zeros(mesh.n_nodes, dtype=bool)
+    within[facets] = True
+    every, alone = mesh.facets_of(mesh.elements, within)
+    inner = (
+        len(facets)
+        + int((~alone).sum())
+        - len(distinct_rows(facet_keys(np.concatenate([facets, every[~alone]]).T)).starts)
+    )
+    if inner:
+        raise MeshError(
+            f"{inner} of {len(facets)} facets of '{on}' lie inside the body, between two elements, where a pressure "
+            "has no side to press on: select facets of the boundary, or give a traction, which has a direction"
+        )
+    return facets

@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.loading import Force, Gravity, Moment, Pressure, Traction
-from truespring.mesh import Mesh, select
+from truespring.mesh import Mesh, loaded
 from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, given
@@ -73,21 +73,21 @@ def find_acting(problem: Problem) -> Iterator[Acting]:
     for load in problem.loads:
         match load:
             case Force():
-                yield _along(select(mesh, load.on), load.total, "F", "N", LOAD)
+                yield _along(loaded(mesh, load.on), load.total, "F", "N", LOAD)
             case Traction():
-                yield _along(select(mesh, load.on), load.traction, "t", "Pa", LOAD)
+                yield _along(loaded(mesh, load.on), load.traction, "t", "Pa", LOAD)
             case Gravity():
                 yield _along(everywhere, load.acceleration, "g", "m/s^2", LOAD)
             case Pressure():
                 force = -load.following(problem.body, problem.loading.held).gradient(mesh.nodes)
-                nodes = select(mesh, load.on)
+                nodes = loaded(mesh, load.on)
                 total = force.sum(axis=0)
                 if np.linalg.norm(total) < 1e-6 * np.abs(force).sum():  # all around: one place stands for all
                     nodes = nodes[[mesh.nodes[nodes, 0].argmax()]]
                     total = force[nodes[0]]
                 yield Acting(nodes, total, f"p = {_size(load.pressure, 'Pa')}", LOAD)
             case Moment():
-                nodes = select(mesh, load.on)
+                nodes = loaded(mesh, load.on)
                 yield Acting(nodes, _around(mesh, nodes, load.moment), f"M = {_size(load.moment, 'N m')}", LOAD)
     for support, held in zip(problem.supports, problem.held, strict=True):
         if held.motion.any():

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
+from truespring.mesh.facets import facet_nodes, find_facets, folded, mirrored_facets
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED
+from truespring.mesh.merged import kinds_in, mirrored
 from truespring.mesh.mesh import Mesh
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
@@ -29,7 +31,10 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
 }
 
 _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
-_SUPPORTED = "a body is made of triangles, quadrilaterals, tetrahedra or hexahedra"
+_SUPPORTED = "a body is made of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
+_DIVIDE = "divide the others into these, as meshers do by an option and ParaView by its filter Tetrahedralize"
+
+_MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
 
 # A coordinate beyond this was damaged, whatever the unit; its square still is a number.
 _FAR = 1e30
@@ -73,9 +78,13 @@ class Contents:
     Attributes:
         node_numbers, points: shapes (n,) and (n, 3) [the file's unit of length].
         cells: each block in the file's order.
-        node_groups, cell_groups: numbers of nodes and of cells by name.
+        node_groups, cell_groups: numbers of nodes and of cells by name. Cells of one dimension less than the body
+            name the facets that have their corners.
+        facet_groups: facets by name as their elements' own: the number of a cell and that of its facet in the
+            `facets` of ELEMENT_KINDS, shape (n, 2).
         node_lines: where the nodes stand in a text file, shape (n,).
         notes: what should be known of the file, in words.
+        hint: what its program may have left out where there is no body, and how it writes that.
     """
 
     node_numbers: Ints
@@ -83,8 +92,10 @@ class Contents:
     cells: Sequence[Cells]
     node_groups: Mapping[str, Ints] = field(default_factory=dict)
     cell_groups: Mapping[str, Ints] = field(default_factory=dict)
+    facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     node_lines: Ints | None = None
     notes: tuple[str, ...] = ()
+    hint: str = ""
 
     def mesh(self, scale: float) -> Mesh:
         """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none."""
@@ -94,22 +105,34 @@ class Contents:
     def _mesh(self, scale: float) -> Mesh:
         self._check_nodes()
         cells = _by_kind(self.cells)
-        body = _body(cells)
+        body = _body(cells, self.hint)
         for block in cells:
             self._check_cells(block)
-        kind = body[0].kind
-        corners = self._rows(np.concatenate([block.corners for block in body]))
+        kind, table = _table(body)
+        corners = self._rows(table)
         nodes = np.unique(corners)
-        positions = _in_their_dimensions(self.points[nodes] * scale, kind)
+        positions = _in_their_dimensions(self.points[nodes] * scale, body[0], self.hint)
         elements = np.searchsorted(nodes, corners)
-        is_inverted = _is_inverted(positions, elements, kind)
+        is_turned = _is_inverted(positions, elements, kind)
+        facet_groups, facet_notes = self._facet_groups(cells, body, nodes, elements, kind)
+        for name, numbers, _ in kinds_in(elements, kind):
+            here = np.zeros(len(elements), dtype=bool)
+            here[numbers] = is_turned[numbers]
+            for facets in facet_groups.values():
+                of_turned = here[facets[:, 0]]
+                facets[of_turned, 1] = mirrored_facets(name)[facets[of_turned, 1]]
+        elements = mirrored(elements, kind, is_turned)
         element_groups, node_groups = self._groups(cells, body, nodes)
+        for name, facets in facet_groups.items():
+            there = node_groups.get(name, np.zeros(0, dtype=np.int64))
+            node_groups[name] = np.union1d(there, facet_nodes(elements, kind, facets))
         notes = [
             *self.notes,
             *self._second_order(body, nodes),
             *self._unreferenced(body, scale),
             *_coincident(positions, self.node_numbers[nodes]),
-            *([f"all {len(elements)} elements are inverted in the file and were mirrored"] if is_inverted else []),
+            *_turned(is_turned, elements, kind, positions),
+            *facet_notes,
             *(
                 f"group '{name}' has no node of the body and was left out"
                 for name in node_groups
@@ -119,14 +142,38 @@ class Contents:
         try:
             return Mesh(
                 positions,
-                elements[:, MIRRORED[kind]] if is_inverted else elements,
+                elements,
                 kind,
                 node_groups=_not_empty(node_groups),
                 element_groups=_not_empty(element_groups),
+                facet_groups=_not_empty(facet_groups),
                 notes=tuple(notes),
             )
         except MeshError as error:
-            raise MeshError(f"{error}; elements are counted from 0 in the file's order") from None
+            raise MeshError(f"{error}; elements are counted from 0 in the file's order: {_MEND}") from None
+
+    def _facet_groups(
+        self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints, elements: Ints, kind: str
+    ) -> tuple[dict[str, Ints], list[str]]:
+        """Return facets by name, each as element and local facet of `elements`; and notes on those that are none."""
+        numbers = np.concatenate([block.numbers for block in body])
+        found: dict[str, list[Ints]] = {}
+        for name, given in self.facet_groups.items():
+            found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
+        for block in cells:
+            if block.dim == body[0].dim - 1:
+                facets = find_facets(elements, kind, places(nodes, self._rows(block.corners)))
+                for name, group in self.cell_groups.items():
+                    found.setdefault(name, []).append(facets[_found(block.numbers, group)])
+        groups, notes = {}, []
+        for name, parts in found.items():
+            facets = np.concatenate(parts)
+            groups[name] = facets[facets[:, 0] >= 0]
+            n_lost = len(facets) - len(groups[name])
+            if n_lost:
+                left = "no load acts on them" if n_lost < len(facets) else "they are taken for their nodes alone"
+                notes.append(f"{n_lost} of {len(facets)} facets of group '{name}' bound no element of the body: {left}")
+        return groups, notes
 
     def _rows(self, node_numbers: Ints) -> Ints:
         return places(self.node_numbers, node_numbers)
@@ -248,41 +295,82 @@ def _lines(cells: Sequence[Cells]) -> Ints | None:
     return np.concatenate(lines) if len(lines) == len(cells) else None
 
 
-def _body(cells: Sequence[Cells]) -> list[Cells]:
-    """Return the blocks of the highest dimension; raise MeshError where they are no body of one kind of element."""
+def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
+    """Return the blocks of the highest dimension; raise MeshError where they are no body."""
     counts = Counter[str]()
     for block in cells:
         counts[block.kind] += len(block.nodes)
     dim = max((block.dim for block in cells), default=0)
     if dim < 2:
-        raise MeshError(f"{f'there are only {listed(counts)}' if counts else 'there are no elements'}: {_SUPPORTED}")
+        there = f"there are only {listed(counts)}" if counts else "there are no elements"
+        raise MeshError(f"{there}: {_joined(_SUPPORTED, hint)}")
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
     unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
-        raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}")
-    if len(body) > 1:
-        raise MeshError(f"{listed(body)}: {_SUPPORTED}, of one kind only")
+        raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}: {_DIVIDE}")
     return [block for block in cells if block.dim == dim]
 
 
-def _in_their_dimensions(positions: Floats, kind: str) -> Floats:
-    if ELEMENT_KINDS[kind].dim == 3:
+def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
+    """The kind of the body, and its corners by the file's numbers, in the table that a mesh of that kind has."""
+    if len({block.kind for block in body}) == 1:
+        return body[0].kind, np.concatenate([block.corners for block in body])
+    return MIXED, np.concatenate([block.corners[:, ELEMENT_KINDS[block.kind].merged] for block in body])
+
+
+def _joined(*advice: str) -> str:
+    return "; ".join(filter(None, advice))
+
+
+def _in_their_dimensions(positions: Floats, cells: Cells, hint: str) -> Floats:
+    if cells.dim == 3:
         return positions
+    kind = cells.kind
+    spans = np.ptp(positions, axis=0)
+    if spans[2] <= _FLAT * np.linalg.norm(spans):
+        return positions[:, :2]
     z = positions[:, 2]
-    if np.ptp(z) > _FLAT * np.linalg.norm(np.ptp(positions, axis=0)):
+    if spans.min() <= _FLAT * np.linalg.norm(spans):
         raise MeshError(
-            f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
-            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra"
+            f"the {kind}s lie in a plane of constant {'xyz'[spans.argmin()]}: "
+            + _joined("turn the body, of a plane one z is constant", hint)
         )
-    return positions[:, :2]
+    raise MeshError(
+        f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
+        + _joined(
+            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra: fill a closed "
+            "surface with these in a mesher",
+            hint,
+        )
+    )
 
 
-def _is_inverted(positions: Floats, elements: Ints, kind: str) -> bool:
-    """Tell whether no element has a positive corner; where only some have none, the mesh refuses them."""
-    corners = np.array(ELEMENT_KINDS[kind].corners)
-    at = positions[elements]
-    jacobians = np.linalg.det(at[:, corners[:, 1:]] - at[:, corners[:, :1]])
-    return bool((jacobians <= 0).all() and (jacobians < 0).any())
+def _is_inverted(positions: Floats, elements: Ints, kind: str) -> Bools:
+    """Tell which elements have no positive corner; those that have some of either sign, the mesh refuses."""
+    found = np.zeros(len(elements), dtype=bool)
+    for name, numbers, own in kinds_in(elements, kind):
+        corners = np.array(ELEMENT_KINDS[name].corners)
+        at = positions[own]
+        jacobians = np.linalg.det(at[:, corners[:, 1:]] - at[:, corners[:, :1]])
+        found[numbers] = (jacobians <= 0).all(axis=1) & (jacobians < 0).any(axis=1)
+    return found
+
+
+def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> list[str]:
+    """Say how many elements were turned; raise MeshError where that folds them over their neighbours."""
+    if not is_turned.any():
+        return []
+    if is_turned.all():
+        return [f"all {len(elements)} elements are inverted in the file and were mirrored"]
+    over = folded(elements, kind)
+    if over.any():
+        first = int((over & is_turned).argmax())
+        raise MeshError(
+            f"{is_turned.sum()} of {len(elements)} elements are inverted, and {over.sum()} would lie over each other "
+            f"if these were mirrored; the first is element {first}, counted from 0 in the file's order, at "
+            f"{_place(positions[elements[first]].mean(axis=0))} m: the mesh is folded there; {_MEND}"
+        )
+    return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]
 
 
 def _coincident(positions: Floats, numbers: Ints) -> list[str]:

@@ -1,11 +1,11 @@
-"""gmsh .msh files, versions 2 to 2.2 and 4.1, text and binary.
+"""gmsh .msh files, versions 1, 2 to 2.2, 4.0 and 4.1, text and binary.
 
 Source: "File formats" in the reference manual of gmsh, https://gmsh.info/doc/texinfo/gmsh.html
 """
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -43,10 +43,18 @@ _TYPES: dict[int, tuple[str, int]] = {
 _Tag = tuple[int, int]
 # Numbers, points and lines of nodes.
 _Nodes = tuple[Ints, Floats, Ints | None]
+# Of an entity: its number, that of the entity it is a part of, its physical groups.
+_Entity = tuple[int, _Tag | None, list[int]]
 # Cells and, by physical group, their numbers.
 _Elements = tuple[list[Cells], dict[_Tag, list[Ints]]]
+# Major and minor number.
+_Version = tuple[int, int]
 # Of version 2: type, number of tags, rows of a cell's number, tags and nodes, and their lines.
 _Table = tuple[int, int, Ints, Ints | None]
+
+
+# How gmsh writes a file again in the version that is read best.
+_SAVE = "save it again by: gmsh FILE -0 -format msh41 -o NEW.msh"
 
 
 def read_msh(data: bytes) -> Contents:
@@ -60,16 +68,16 @@ def read_msh(data: bytes) -> Contents:
         match source.section:
             case "PhysicalNames":
                 names = _physical_names(source)
-            case "Entities" if version == 4:
-                physicals = _entities(source)
+            case "Entities" if version >= (4, 0):
+                physicals |= _entities(source, version)
             case "PartitionedEntities":
-                source.refuse("a partitioned mesh is not supported: save it without partitions")
-            case "Nodes" if nodes is None:
-                nodes = _nodes_4(source) if version == 4 else source.nodes_2()
-            case "Elements" if elements is None:
-                elements = _elements_4(source, physicals) if version == 4 else _elements_2(source)
-            case "Nodes" | "Elements":
-                source.refuse(f"${source.section} is there twice")
+                physicals |= _partitioned(source, version, physicals)
+            case "Nodes" | "NOD" | "ParametricNodes" if nodes is None:
+                nodes = _nodes_4(source, version) if version >= (4, 0) else source.nodes_2()
+            case "Elements" | "ELM" if elements is None:
+                elements = _elements_4(source, version, physicals) if version >= (4, 0) else _elements_2(source)
+            case "Nodes" | "NOD" | "ParametricNodes" | "Elements" | "ELM":
+                source.refuse(f"${source.section} is there twice: make it one mesh, {_SAVE}")
             case _:
                 source.skip_section()
                 continue
@@ -78,13 +86,22 @@ def read_msh(data: bytes) -> Contents:
         raise MeshError(f"there is no section ${'Elements' if nodes else 'Nodes'}: is the file cut off?")
     groups: dict[str, list[Ints]] = {}
     for (dim, number), members in elements[1].items():
-        groups.setdefault(names.get((dim, number), str(number)), []).extend(members)
+        groups.setdefault(names.get((dim, number), names.get((_ANY, number), str(number))), []).extend(members)
     return Contents(
         node_numbers=nodes[0],
         points=nodes[1],
         cells=elements[0],
         cell_groups={name: np.concatenate(members) for name, members in groups.items()},
         node_lines=nodes[2],
+        notes=tuple(
+            f"physical group '{name}' of dimension {dim} has no element in the file"
+            for (dim, number), name in names.items()
+            if dim != _ANY and (dim, number) not in elements[1]
+        ),
+        hint="gmsh saves only what has a physical group: give the body (a volume, or a plane surface) one, or set "
+        "Mesh.SaveAll = 1"
+        if groups
+        else "mesh the volume too: gmsh -3",
     )
 
 
@@ -112,7 +129,7 @@ class _Sections(ABC):
     def next_section(self) -> bool:
         """Enter the next section; tell whether there is one."""
         line = self.line()
-        if line and (not line.startswith(b"$") or line.startswith(b"$End")):
+        if line and (not line.startswith(b"$") or line.lower().startswith(b"$end")):
             self.refuse(f"a section such as $Nodes is wanted here, not '{word(line)}'")
         self.section = word(line[1:])
         return bool(line)
@@ -120,7 +137,7 @@ class _Sections(ABC):
     def end_section(self) -> None:
         """Leave the section; raise MeshError where it goes on."""
         line = self.line()
-        if line != b"$End" + self.section.encode():
+        if line.lower() != b"$end" + self.section.lower().encode():
             self.refuse(
                 f"$End{self.section} is wanted here, not '{word(line)}': the counts do not match"
                 if line
@@ -137,13 +154,20 @@ class _Sections(ABC):
     def known(self, type_: int) -> tuple[str, int]:
         """Return kind and number of nodes of an element type."""
         if type_ not in _TYPES:
-            self.refuse(f"gmsh's element type {type_} is not supported: of first and second order only")
+            self.refuse(_unsupported(type_))
         return _TYPES[type_]
 
     def check_total(self, there: int, announced: int) -> None:
         """Raise MeshError where the blocks of a section do not add up to its count."""
         if there != announced:
             self.refuse(f"${self.section} announces {announced} entries and has {there}")
+
+
+def _unsupported(type_: int) -> str:
+    return (
+        f"an element of gmsh's type {type_} is not supported: elements of first and second order are, "
+        "mesh with Mesh.ElementOrder = 1 or 2"
+    )
 
 
 class _Text(_Sections):
@@ -165,8 +189,8 @@ class _Text(_Sections):
 
     def skip_section(self) -> None:
         """Go behind the section, which is not read."""
-        end = b"$End" + self.section.encode()
-        while (line := self.line()) != end:
+        end = b"$end" + self.section.lower().encode()
+        while (line := self.line()).lower() != end:
             if not line:
                 self.refuse(f"$End{self.section} is missing: the file is cut off")
 
@@ -184,7 +208,7 @@ class _Text(_Sections):
     def counts(self, n_ints: int, n_sizes: int) -> list[int]:
         """Return what heads a table of version 4: plain integers, then counts and numbers of nodes or elements."""
         counts: list[int] = self.integers(1, n_ints + n_sizes)[0][0].tolist()
-        if min(counts[n_ints:]) < 0:
+        if min(counts[n_ints:], default=0) < 0:
             self.refuse(f"${self.section}: a count is negative")
         return counts
 
@@ -203,18 +227,26 @@ class _Text(_Sections):
         refuse_ragged(rows, lines, n_columns, f"${self.section}")
         return rows, lines
 
-    def entity(self, dim: int) -> tuple[int, list[int]]:
-        """Return the number of an entity of version 4 and those of its physical groups."""
-        rows, lines = self.rows(1)
-        before = 4 if dim == 0 else 7  # its number; its place, or two corners of the box around it
-        values = integers([[*rows[0][:1], *rows[0][before:]]], lines, "$Entities").tolist()
-        if len(values) < 2 or not 0 <= values[1] <= len(values) - 2:
+    def entity(self, dim: int, version: _Version, is_part: bool) -> _Entity:
+        """Return an entity of version 4, whose numbers are one line."""
+        (row,), lines = self.rows(1)
+        n_reals = 3 if dim == 0 and version > (4, 0) else 6  # its place, or two corners of the box around it
+        before = 1  # its number; of a part then its parent's dimension and number, and its partitions
+        if is_part:
+            before += 3 + int(integers([row[3:4]], lines, "$PartitionedEntities").sum())
+        values = integers([[*row[:before], *row[before + n_reals :]]], lines, f"${self.section}").tolist()
+        groups = values[before + 1 :]
+        if len(values) <= before or not 0 <= values[before] <= len(groups):
             self.refuse("an entity lacks some of its numbers")
-        return values[0], values[2 : 2 + values[1]]
+        return values[0], (values[1], values[2]) if is_part else None, groups[: values[before]]
 
     def nodes_2(self) -> _Nodes:
-        """Return the nodes of version 2."""
-        rows, lines = self._table(self.count(), 4)
+        """Return the nodes of version 1 or 2; behind the coordinates may stand an entity and parameters on it."""
+        n_nodes = self.count()
+        rows, lines = self.rows(n_nodes)
+        if self.section != "Nodes":  # entity and parameters follow, in $NOD too
+            rows = [row[:4] for row in rows]
+        refuse_ragged(rows, lines, 4, f"${self.section}")
         numbers = integers([row[:1] for row in rows], lines, "the number of a node")
         points = reals([row[1:] for row in rows], lines, "a coordinate").reshape(-1, 3)
         return numbers, points, np.array(lines, dtype=np.int64)
@@ -222,6 +254,8 @@ class _Text(_Sections):
     def elements_2(self) -> Iterator[_Table]:
         """Yield the cells of version 2, those of one type and number of tags together."""
         rows, lines = self.rows(self.count())
+        if self.section == "ELM":
+            rows = [_of_version_2(row, line) for row, line in zip(rows, lines, strict=True)]
         for row, line in zip(rows, lines, strict=True):
             if len(row) < 3:
                 raise MeshError(f"line {line}: an element lacks some of its numbers")
@@ -236,10 +270,22 @@ class _Text(_Sections):
             wrong = same[width[same] != wanted]
             if wanted < 0 or wrong.size:
                 raise MeshError(
-                    f"line {at[wrong[0]]}: an element of gmsh's type {type_} with {n_tags} tags "
-                    + ("is not supported" if wanted < 0 else f"takes {wanted} numbers, here are {width[wrong[0]]}")
+                    f"line {at[wrong[0]]}: "
+                    + (
+                        f"an element of gmsh's type {type_} with {n_tags} tags takes {wanted} numbers, here are "
+                        f"{width[wrong[0]]}"
+                        if wanted >= 0
+                        else _unsupported(type_)
+                    )
                 )
             yield type_, n_tags, values[start[same, None] + np.array([0, *range(3, wanted)])], at[same]
+
+
+def _of_version_2(row: Sequence[bytes], line: int) -> Sequence[bytes]:
+    """Return the row of an element of version 1 as of version 2: with the number of tags, without that of nodes."""
+    if len(row) < 5 or not row[4].isdigit() or int(row[4]) != len(row) - 5:
+        raise MeshError(f"line {line}: an element has {word(b' '.join(row[4:5])) or 'no'} nodes by its own count")
+    return [*row[:2], b"2", *row[2:4], *row[5:]]
 
 
 class _Binary(_Sections):
@@ -263,12 +309,36 @@ class _Binary(_Sections):
         return f"byte {self._next}: "
 
     def skip_section(self) -> None:
-        """Go behind the section, which is not read."""
-        end = b"$End" + self.section.encode()
-        found = re.compile(rb"^" + re.escape(end) + rb"\s*?$", re.MULTILINE).search(self._data, self._next)
+        """Go behind the section, which is not read: by its length where that is known, else to its end mark."""
+        begin = self._next
+        try:
+            self._pass_over()
+        except MeshError:  # it is not what it is called
+            self._next = begin
+        end = rb"\$End" + re.escape(self.section.encode()) + rb"[ \t\r]*(?:\n|\Z)"  # no line need end before it
+        found = re.compile(end, re.IGNORECASE).search(self._data, self._next)
         if found is None:
             self.refuse(f"$End{self.section} is missing: the file is cut off")
         self._next = found.end()
+
+    def _pass_over(self) -> None:
+        """Go behind the binary data of a section."""
+        match self.section:
+            case "NodeData" | "ElementData" | "ElementNodeData":
+                tags = [[self.line() for _ in range(self.count())] for _ in range(3)]  # texts, reals, integers
+                _, n_components, n_rows = integers([tags[2][:3]], [0], f"${self.section}").tolist()
+                row = np.dtype([("number", self._int), ("values", self._real, n_components)])
+                if self.section != "ElementNodeData":
+                    self.take(row, n_rows)
+                    return
+                for _ in range(n_rows):
+                    _, n_nodes = self.take(self._int, 2).tolist()
+                    self.take(self._real, n_nodes * n_components)
+            case "Periodic":
+                for _ in range(self.sizes(1)[0]):
+                    self.take(self._int, 3)
+                    self.take(self._real, self.sizes(1)[0])
+                    self.sizes(2 * self.sizes(1)[0])
 
     def take(self, dtype: DTypeLike, count: int) -> NDArray[Any]:
         """Return the next `count` values."""
@@ -281,7 +351,12 @@ class _Binary(_Sections):
 
     def counts(self, n_ints: int, n_sizes: int) -> list[int]:
         """Return what heads a table of version 4: plain integers, then counts and numbers of nodes or elements."""
-        return [*self.take(self._int, n_ints).tolist(), *self.take(self._size, n_sizes).tolist()]
+        return [*self.take(self._int, n_ints).tolist(), *self.sizes(n_sizes)]
+
+    def sizes(self, count: int) -> list[int]:
+        """Return the next `count` numbers of nodes, elements or what there is of them."""
+        sizes: list[int] = self.take(self._size, count).tolist()
+        return sizes
 
     def integers(self, n_rows: int, n_columns: int) -> tuple[Ints, Ints | None]:
         """Return a table of numbers of nodes and elements."""
@@ -291,18 +366,29 @@ class _Binary(_Sections):
         """Return a table of coordinates."""
         return self.take(self._real, n_rows * n_columns).reshape(n_rows, n_columns).astype(np.float64), None
 
-    def entity(self, dim: int) -> tuple[int, list[int]]:
-        """Return the number of an entity of version 4 and those of its physical groups."""
-        number = int(self.take(self._int, 1)[0])
-        self.take(self._real, 3 if dim == 0 else 6)
-        physicals: list[int] = self.take(self._int, int(self.take(self._size, 1)[0])).tolist()
+    def entity(self, dim: int, version: _Version, is_part: bool) -> _Entity:
+        """Return an entity of version 4."""
+        number, *parent = self.take(self._int, 3 if is_part else 1).tolist()
+        if is_part:
+            self.take(self._int, self.sizes(1)[0])
+        self.take(self._real, 3 if dim == 0 and version > (4, 0) else 6)
+        physicals: list[int] = self.take(self._int, self.sizes(1)[0]).tolist()
         if dim:
-            self.take(self._int, int(self.take(self._size, 1)[0]))
-        return number, physicals
+            self.take(self._int, self.sizes(1)[0])
+        return number, (parent[0], parent[1]) if is_part else None, physicals
 
     def nodes_2(self) -> _Nodes:
-        """Return the nodes of version 2."""
-        nodes = self.take(np.dtype([("number", self._int), ("point", self._real, 3)]), self.count())
+        """Return the nodes of version 2; behind the coordinates may stand an entity and parameters on it."""
+        row = np.dtype([("number", self._int), ("point", self._real, 3)])
+        if self.section != "ParametricNodes":
+            nodes = self.take(row, self.count())
+        else:
+            found = []
+            for _ in range(self.count()):
+                found.append(self.take(row, 1))
+                dim, _ = self.take(self._int, 2).tolist()
+                self.take(self._real, dim if dim in (1, 2) else 0)
+            nodes = np.concatenate([np.zeros(0, row), *found])
         return nodes["number"].astype(np.int64), nodes["point"].astype(np.float64), None
 
     def elements_2(self) -> Iterator[_Table]:
@@ -323,81 +409,119 @@ class _Binary(_Sections):
 _Source = _Text | _Binary
 
 
-def _open(data: bytes) -> tuple[int, _Source]:
-    """Return the version, 2 or 4, and the source of the sections behind the header."""
+def _open(data: bytes) -> tuple[_Version, _Source]:
+    """Return the version and the source of the sections behind the header."""
     comments, field = rb"(?:\s*\$Comments.*?\$EndComments)?\s*", rb"[ \t]+(\S+)"
     header = re.match(comments + rb"\$MeshFormat\s+(\S+)" + 2 * field + rb"[ \t\r]*\n", data, re.DOTALL)
     if header is None:
-        raise MeshError("this is no .msh file: it begins with $MeshFormat, then version, file type and data size")
-    version, file_type, size = (word(field) for field in header.groups())
-    if version not in ("2", "2.1", "2.2", "4.1"):
-        raise MeshError(f"version {version} of .msh is not read, 2.2 and 4.1 are: save it with -format msh41")
+        if re.match(comments + rb"\$NOD\s", data, re.DOTALL):
+            return (1, 0), _Text(data, 0)
+        raise MeshError(
+            "this is no .msh file: it begins with $MeshFormat, then version, file type and data size, or with $NOD"
+        )
+    named, file_type, size = (word(field) for field in header.groups())
+    numbers = re.fullmatch(r"(\d{1,9})(?:\.(\d{1,9}))?", named)
+    version = (int(numbers[1]), int(numbers[2] or 0)) if numbers else (0, 0)
+    if version[0] != 2 and version not in ((4, 0), (4, 1)):
+        raise MeshError(f"version {named} of .msh is not read; 1, 2 to 2.2, 4 and 4.1 are: {_SAVE}")
+    if version == (4, 0) and file_type == "1":
+        raise MeshError(f"version {named} of .msh is read as text, this file is binary: {_SAVE}")
     if file_type not in ("0", "1") or size not in ("4", "8"):
-        raise MeshError(f"$MeshFormat: file type {file_type} is not 0 or 1, or data size {size} is not 4 or 8")
+        raise MeshError(
+            f"$MeshFormat: file type {file_type} is not 0 or 1, or data size {size} is not 4 or 8: is the file "
+            f"damaged? If gmsh reads it, {_SAVE}"
+        )
     source: _Source
     if file_type == "0":
         source = _Text(data[header.end() :], data.count(b"\n", 0, header.end()))
     else:
         one = data[header.end() : header.end() + 4]
         if one not in (b"\1\0\0\0", b"\0\0\0\1"):
-            raise MeshError("$MeshFormat: the binary 1 that tells the order of bytes is missing")
+            raise MeshError(
+                "$MeshFormat: the binary 1 that tells the order of bytes is missing: was the file sent as text? Send "
+                "it as binary, or save it as text (Mesh.Binary = 0)"
+            )
         source = _Binary(data, header.end() + 4, "<" if one[0] else ">", int(size))
     source.end_section()
-    return int(version[0]), source
+    return version, source
 
 
 # --- the sections ---------------------------------------------------------------------------------
+
+# The dimension of a physical group whose file does not tell it.
+_ANY = -1
 
 
 def _physical_names(source: _Source) -> dict[_Tag, str]:
     names = {}
     for _ in range(source.count()):
         line = source.line()
-        found = re.fullmatch(rb'(\d)\s+(\d{1,18})\s+"(.*)"', line)
+        found = re.fullmatch(rb'(?:(\d)\s+)?(\d{1,18})\s+"(.*)"', line)  # version 2.0 tells no dimension
         if found is None:
             source.refuse(f"a physical group is dimension, number and \"name\", not '{word(line)}'")
-        names[int(found[1]), int(found[2])] = found[3].decode("utf-8", errors="replace")
+        dim = _ANY if found[1] is None else int(found[1])
+        names[dim, int(found[2])] = found[3].decode("utf-8", errors="replace")
     return names
 
 
-def _entities(source: _Source) -> dict[_Tag, list[int]]:
+def _entities(source: _Source, version: _Version) -> dict[_Tag, list[int]]:
     """Return the physical groups of each entity; the sign of their numbers is but an orientation."""
     physicals = {}
     for dim, count in enumerate(source.counts(0, 4)):
         for _ in range(count):
-            number, groups = source.entity(dim)
+            number, _, groups = source.entity(dim, version, is_part=False)
             physicals[dim, number] = [abs(group) for group in groups]
     return physicals
 
 
-def _nodes_4(source: _Source) -> _Nodes:
-    n_blocks, n_nodes, _, _ = source.counts(0, 4)
-    numbers, points, lines = [np.zeros((0, 1), np.int64)], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+def _partitioned(source: _Source, version: _Version, whole: dict[_Tag, list[int]]) -> dict[_Tag, list[int]]:
+    """Return the physical groups of each part of an entity: its own, else those of the entity that it is a part of."""
+    source.counts(0, 1)  # of partitions
+    for _ in range(source.counts(0, 1)[0]):
+        source.counts(2, 0)  # of ghosts: number and partition
+    physicals = {}
+    for dim, count in enumerate(source.counts(0, 4)):
+        for _ in range(count):
+            number, parent, groups = source.entity(dim, version, is_part=True)
+            if parent and parent[0] == dim:  # else it is a border between parts, called as what it divides
+                physicals[dim, number] = [abs(group) for group in groups] or whole.get(parent, [])
+    return physicals
+
+
+def _nodes_4(source: _Source, version: _Version) -> _Nodes:
+    n_blocks, n_nodes, *_ = source.counts(0, 2 if version == (4, 0) else 4)
+    blocks: list[_Nodes] = [(np.zeros(0, np.int64), np.zeros((0, 3)), None)]
     for _ in range(n_blocks):
-        dim, _, parametric, count = source.counts(3, 1)
+        one, other, parametric, count = source.counts(3, 1)
+        dim = other if version == (4, 0) else one
         if dim not in range(4):
             source.refuse(f"$Nodes: an entity of dimension {dim}")
-        numbers.append(source.integers(count, 1)[0])
-        table, at = source.reals(count, 3 + dim if parametric else 3)  # parameters on the entity follow the place
-        points.append(table[:, :3])
-        if at is not None:
-            lines.append(at)
-    source.check_total(sum(map(len, points)), n_nodes)
-    has_lines = len(lines) == len(points)
-    return np.concatenate(numbers)[:, 0], np.concatenate(points), np.concatenate(lines) if has_lines else None
+        n_parameters = dim if parametric else 0  # on the entity, behind the place
+        if version == (4, 0):  # each node with its number before it
+            table, lines = source.reals(count, 4 + n_parameters)
+            numbers, table = table[:, 0].astype(np.int64), table[:, 1:]
+        else:
+            numbers = source.integers(count, 1)[0][:, 0]
+            table, lines = source.reals(count, 3 + n_parameters)
+        blocks.append((numbers, table[:, :3], lines))
+    numbers, points = np.concatenate([block[0] for block in blocks]), np.concatenate([block[1] for block in blocks])
+    source.check_total(len(points), n_nodes)
+    at = [block[2] for block in blocks if block[2] is not None]
+    return numbers, points, np.concatenate(at) if at else None
 
 
-def _elements_4(source: _Source, physicals: dict[_Tag, list[int]]) -> _Elements:
-    n_blocks, n_elements, _, _ = source.counts(0, 4)
+def _elements_4(source: _Source, version: _Version, physicals: dict[_Tag, list[int]]) -> _Elements:
+    n_blocks, n_elements, *_ = source.counts(0, 2 if version == (4, 0) else 4)
     cells: list[Cells] = []
     groups: dict[_Tag, list[Ints]] = {}
     for _ in range(n_blocks):
-        dim, entity, type_, count = source.counts(3, 1)
+        one, other, type_, count = source.counts(3, 1)
+        entity = (other, one) if version == (4, 0) else (one, other)
         kind, n_nodes = source.known(type_)
         table, lines = source.integers(count, 1 + n_nodes)
         cells.append(Cells(kind, table[:, 1:], table[:, 0], lines))
-        for group in physicals.get((dim, entity), []):
-            groups.setdefault((dim, group), []).append(table[:, 0])
+        for group in physicals.get(entity, []):
+            groups.setdefault((entity[0], group), []).append(table[:, 0])
     source.check_total(sum(len(block.nodes) for block in cells), n_elements)
     return cells, groups
 
