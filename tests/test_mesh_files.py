@@ -486,13 +486,7 @@ CUBE = [[x, y, z] for z in (0.0, 1.0) for y, x in ((0.0, 0.0), (0.0, 1.0), (1.0,
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
-        (
-            {"quad": [[0, 1, 2, 3]], "triangle": [[4, 5, 6], [4, 6, 7]]},
-            "2 triangles and 1 quadrilateral: .* one kind only",
-        ),
-        ({"hexahedron": [range(8)], "tetra": [[0, 1, 2, 4]]}, "1 tetrahedron and 1 hexahedron: .* one kind only"),
-        ({"wedge": [[0, 1, 2, 4, 5, 6]], "quad": [[0, 1, 2, 3]]}, "not supported: 1 wedge; a body is made of"),
-        ({"pyramid": [[0, 1, 2, 3, 4]], "tetra": [[0, 1, 2, 4]]}, "not supported: 1 pyramid; a body is made of"),
+        ({"quad": [[0, 1, 2, 3]], "polygon": [[4, 5, 6, 7]]}, "not supported: 1 polygon; a body is made of .* divide"),
         ({"polygon": [[0, 1, 2, 3]]}, "not supported: 1 polygon; a body is made of"),
         ({"line": [[0, 1], [1, 2]], "vertex": [[0]]}, "there are only 1 vertex and 2 lines: a body is made of"),
     ],

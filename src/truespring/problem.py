@@ -118,7 +118,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":
-        """The body kind by kind of its elements: their numbers, and a problem of them alone, without what acts on it."""
+        """The body kind by kind of its elements: their numbers, and a problem of them alone without what acts on it."""
         if self.mesh.element != MIXED:
             return ((np.arange(len(self.mesh.elements)), self),)
         return tuple(

@@ -162,9 +162,7 @@ CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
         ),
         "wedge": _shape("wedge", _powers(_prism(1, True))),
         "wedge15": _shape("wedge", _powers(_prism(2, False)), _EDGES["wedge"]),
-        "wedge18": _shape(
-            "wedge", _powers(_prism(2, True)), (*_EDGES["wedge"], (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
-        ),
+        "wedge18": _shape("wedge", _powers(_prism(2, True)), (*_EDGES["wedge"], *_FACETS["wedge"][2:])),
         "pyramid": _shape("pyramid", np.array(_PYRAMID, dtype=float)),
         "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _EDGES["pyramid"]),
     }

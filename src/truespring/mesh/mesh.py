@@ -171,7 +171,7 @@ class Mesh:
         """The table entry of the elements; raises MeshError where they are of several kinds."""
         if self.element == MIXED:
             raise MeshError(
-                f"this is for elements of one kind, and the mesh has {self.kinds} elements: springs and fem take several"
+                f"this is for elements of one kind, the mesh has {self.kinds} elements: springs and fem take several"
             )
         return ELEMENT_KINDS[self.element]
 

@@ -140,9 +140,9 @@ def _stiff_simplices(problem: Problem) -> tuple[str, ...]:
     if not simplices or len(blocks) == 1:
         return ()
     return (
-        f"the {simplices[0]} beside other kinds of elements are linear, which makes them too stiff in bending and where "
-        "the material is nearly incompressible: keep them few and away from where it matters, or mesh the body in "
-        "them alone, which are quadratic then",
+        f"the {simplices[0]} beside other kinds of elements are linear, too stiff in bending and where the material is "
+        "nearly incompressible: keep them few and away from where it matters, or mesh the body in them alone, which "
+        "are quadratic then",
     )
 
 
