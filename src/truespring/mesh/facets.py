@@ -136,7 +136,7 @@ def halved(facets: Ints) -> Bools:
     Facets of shape (n, 3 or 4), the result (n,).
     """
     inside = np.zeros(len(facets), dtype=bool)
-    if facets.shape[1] < _QUADRILATERAL:
+    if facets.shape[1] < _QUADRILATERAL or not len(facets):
         return inside
     is_triangle = facets[:, 2] == facets[:, 3]
     triangles, whole = np.flatnonzero(is_triangle), np.flatnonzero(~is_triangle)

@@ -66,8 +66,9 @@ class Heml:
         if element not in _SIMPLICES:
             raise ModelError(
                 f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, whose strain is one and told by the "
-                f"lengths of their links; the mesh has {problem.mesh.kinds} elements: take "
-                f"law = 'saint-venant-kirchhoff', which goes with any, kind = 'fem' with this law, or a mesh of {_SIMPLICES[problem.mesh.dim - 2]} elements"
+                f"lengths of their links; the mesh has {problem.mesh.kinds} elements: take law = "
+                "'saint-venant-kirchhoff', which goes with any, kind = 'fem' with this law, or a mesh of "
+                f"{_SIMPLICES[problem.mesh.dim - 2]} elements"
             )
         return HyperelasticLinks(problem, self.law)
 

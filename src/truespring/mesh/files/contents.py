@@ -8,10 +8,19 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.facets import facet_nodes, find_facets, folded, mirrored_facets
+from truespring.mesh.facets import (
+    facet_columns,
+    facet_keys,
+    facet_nodes,
+    find_facets,
+    folded,
+    halved,
+    mirrored_facets,
+)
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED
 from truespring.mesh.merged import kinds_in, mirrored
 from truespring.mesh.mesh import Mesh
+from truespring.mesh.rows import distinct_rows
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
 #: fixed number of corners are here to be refused by name.
@@ -133,6 +142,7 @@ class Contents:
             *_coincident(positions, self.node_numbers[nodes]),
             *_turned(is_turned, elements, kind, positions),
             *facet_notes,
+            *_halved(elements, kind),
             *(
                 f"group '{name}' has no node of the body and was left out"
                 for name in node_groups
@@ -371,6 +381,21 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
             f"{_place(positions[elements[first]].mean(axis=0))} m: the mesh is folded there; {_MEND}"
         )
     return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]
+
+
+def _halved(elements: Ints, kind: str) -> list[str]:
+    """Say where elements are joined at their corners alone."""
+    if kind != MIXED:
+        return []
+    facets = facet_columns(elements, kind)
+    found = distinct_rows(facet_keys(facets))
+    n_whole = int(halved(facets[:, found.first[found.count == 1]].T).sum()) // 3
+    if not n_whole:
+        return []
+    return [
+        f"{n_whole} face{'s' * (n_whole != 1)} of four corners {'lie' if n_whole > 1 else 'lies'} on two triangles of "
+        "other elements: joined at the corners, but not between them; pyramids make a joint without gaps"
+    ]
 
 
 def _coincident(positions: Floats, numbers: Ints) -> list[str]:
