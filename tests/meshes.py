@@ -1,4 +1,4 @@
-"""Small bodies of wedges, of pyramids, and of several kinds of elements."""
+"""Small bodies of several kinds of elements."""
 
 import numpy as np
 
@@ -9,24 +9,9 @@ from truespring.arrays import Floats, Ints
 _FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 
 
-def wedges(size: tuple[float, ...], elements: tuple[int, ...]) -> ts.Mesh:
-    """A box of wedges, two a brick."""
-    bricks = ts.box(size, elements)
-    return ts.Mesh(bricks.nodes, halves(bricks.elements), "wedge")
-
-
 def halves(bricks: Ints) -> Ints:
     """Two wedges a brick, their triangles across z."""
     return np.concatenate([bricks[:, [0, 1, 2, 4, 5, 6]], bricks[:, [0, 2, 3, 4, 6, 7]]])
-
-
-def pyramids(size: tuple[float, ...], elements: tuple[int, ...]) -> ts.Mesh:
-    """A box of pyramids, six a brick."""
-    bricks = ts.box(size, elements)
-    nodes = np.concatenate([bricks.nodes, bricks.centres])
-    tips = bricks.n_nodes + np.arange(len(bricks.elements))
-    cells = [np.column_stack([bricks.elements[:, face], tips]) for face in _FACES]
-    return ts.Mesh(nodes, np.concatenate(cells), "pyramid")
 
 
 def plane_of_two(size: tuple[float, float], elements: tuple[int, int]) -> ts.Mesh:

@@ -206,6 +206,13 @@ def bodies(element: str, seed: int) -> ts.Mesh:
     elif element == "tetrahedron":  # two halves of three each, along the diagonal 0-6
         six = [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]]
         cells = cells[:, six].reshape(-1, 4)
+    elif element == "wedge":
+        cells = cells[:, [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]].reshape(-1, 6)
+    elif element == "pyramid":  # six about the middle of each cell
+        tips = len(grid) + np.repeat(np.arange(len(cells)), 6)
+        faces = [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]]
+        grid = np.concatenate([grid, grid[cells].mean(axis=1)])
+        cells = np.column_stack([cells[:, faces].reshape(-1, 4), tips])
     positions = grid + rng.uniform(-0.1, 0.1, grid.shape)
     new = rng.permutation(len(positions))
     return ts.Mesh(positions[np.argsort(new)], new[cells], element)
