@@ -19,6 +19,7 @@ from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.material import PlaneStrain
 from truespring.mesh import outer_facets
+from truespring.mesh.facets import facet_keys
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import Loading
@@ -43,9 +44,12 @@ _FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
-_SOLIDS = {"tetrahedron": "C3D4", "hexahedron": "C3D8"}
+# CalculiX has no pyramids: they are bricks, four of whose corners are one, which is the very same element.
+_SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D6", "hexahedron": "C3D8"}
+_AS_BRICKS = ("pyramid",)
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
 
 
@@ -190,18 +194,20 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
     quadratic elements. Raises ExportError for what cannot be said.
     """
     check_fem(problem, law)
-    kind, nodes, elements = fem_element(problem), problem.mesh.nodes, problem.mesh.elements
+    nodes, blocks = problem.mesh.nodes, _blocks(problem)
     own = list(_own_loads(problem, force_unit))
     loading = replace(problem.loading, external_force=_spread_by_us(problem), following=())
     if element == "quadratic":
         finer = Fem("linear", element).potential(problem)
         if problem.mesh.element != "tetrahedron" or not isinstance(finer, QuadraticPotential):
-            raise ExportError(f"quadratic elements are written of tetrahedra, not of a mesh of {problem.mesh.element}s")
-        kind, nodes, elements, loading, own = "C3D10", finer.nodes, finer.elements, finer.loading, []
-    lines = [
-        f"*ELEMENT, TYPE={kind}, ELSET=BODY",
-        *(f"{number}, {joined(one)}" for number, one in enumerate((elements + 1).tolist(), 1)),
-    ]
+            raise ExportError(f"quadratic elements are written of tetrahedra alone, the mesh has {problem.mesh.kinds}s")
+        nodes, loading, own = finer.nodes, finer.loading, []
+        blocks = [("C3D10", np.arange(len(finer.elements)), finer.elements)]
+    lines = []
+    for kind, numbers, elements in blocks:
+        lines.append(f"*ELEMENT, TYPE={kind}, ELSET=BODY")
+        rows = np.column_stack([numbers, elements]) + 1
+        lines += map(joined, rows.tolist())
     for number in range(len(problem.materials)):
         lines += _material(problem, number, force_unit)
     return Twin(nodes, lines, loading, own)
@@ -219,10 +225,19 @@ def check_fem(problem: Problem, law: str) -> None:
 
 
 def fem_element(problem: Problem) -> str:
-    """Return the type of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4."""
+    """Return the types of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8, C3D6 or C3D4."""
+    return " and ".join(dict.fromkeys(kind for kind, _, _ in _blocks(problem)))
+
+
+def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
+    """The elements of first order by their types: their numbers and nodes."""
     plane = "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
-    element = problem.mesh.element
-    return _SOLIDS[element] if element in _SOLIDS else plane + _PLANES[element]
+    found = []
+    for numbers, part in problem.mesh.blocks:
+        kind = _SOLIDS[part.element] if part.element in _SOLIDS else plane + _PLANES[part.element]
+        bricks = part.element in _AS_BRICKS
+        found.append((kind, numbers, part.elements[:, part.kind.merged] if bricks else part.elements))
+    return found
 
 
 def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:
@@ -251,11 +266,20 @@ def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
             direction = [*(np.array(load.acceleration) / (size or 1.0)), 0.0][:3]
             yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
         elif isinstance(load, Pressure):
-            pressed = np.sort(outer_facets(mesh, load.on), axis=1)
-            for face, local in enumerate(_FACES[mesh.element], 1):
-                theirs = np.sort(mesh.elements[:, local], axis=1)
-                for number in np.flatnonzero(_rows_in(theirs, pressed)).tolist():
-                    yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+            pressed = _face_keys(outer_facets(mesh, load.on))
+            for numbers, part in mesh.blocks:
+                bricks = part.element in _AS_BRICKS
+                nodes = part.elements[:, part.kind.merged] if bricks else part.elements
+                for face, local in enumerate(_FACES["hexahedron" if bricks else part.element], 1):
+                    theirs = _face_keys(nodes[:, local])
+                    for number in numbers[_rows_in(theirs, pressed)].tolist():
+                        yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+
+
+def _face_keys(faces: Ints) -> Ints:
+    """Rows of numbers that are equal for faces of the same corners, as long as those of a face can be."""
+    padded = np.concatenate([faces, faces[:, -1:]], axis=1) if faces.shape[1] == len("abc") else faces
+    return np.stack(facet_keys(padded.T), axis=1)
 
 
 def _rows_in(rows: Ints, others: Ints) -> Bools:

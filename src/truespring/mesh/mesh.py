@@ -159,7 +159,7 @@ class Mesh:
             if beyond or (given[:, 1] >= there[given[:, 0]]).any():
                 raise MeshError(
                     f"facet group '{name}' is empty or has a facet that does not exist: elements are 0 to {last}, "
-                    f"facets of each 0 to {there.max() - 1}{' or fewer' * (there.min() < there.max())}"
+                    f"facets of each 0 to {there.max() - 1}"
                 )
             members = np.unique(given.astype(np.int64), axis=0)
             members.setflags(write=False)
@@ -247,15 +247,18 @@ class Mesh:
     @property
     def centres(self) -> Floats:
         """The mean of each element's nodes [m], shape (n_elements, dim)."""
-        if self.element == MIXED:
-            found = np.empty((len(self.elements), self.dim))
-            for numbers, part in self.blocks:
-                found[numbers] = part.centres
-            return found
-        total = np.zeros((len(self.elements), self.dim))
-        for corner in self.elements.T:
-            total += self.nodes[corner]
-        return np.asarray(total / self.elements.shape[1])
+        return self.means(self.nodes)
+
+    def means(self, values: Floats) -> Floats:
+        """Return the mean of what each element's nodes have, shape (n_nodes, ...) to (n_elements, ...)."""
+        total = np.zeros((len(self.elements), *values.shape[1:]))
+        for numbers, part in self.blocks:
+            own = np.zeros((len(numbers), *values.shape[1:]))
+            for corner in part.elements.T:
+                own += values[corner]
+            own /= part.elements.shape[1]
+            total[numbers] = own
+        return total
 
     def pair_keys(self, pairs: Links) -> Ints:
         """Return a number for each local pair of nodes of each element, shape (pairs, n_elements).

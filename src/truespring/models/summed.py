@@ -11,6 +11,7 @@ from scipy import sparse
 from truespring.arrays import Floats, Ints, ShortInts
 from truespring.mesh import Mesh
 from truespring.models.fem import FemPotential
+from truespring.models.laws import Law
 from truespring.models.linked import LinkedElements
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
@@ -115,6 +116,16 @@ def summed_links(problem: Problem, make: Callable[[Problem], LinkedElements]) ->
 
 class SummedElements(_Summed[FemPotential]):
     """Finite elements of several kinds: where they meet face to face, their displacements do."""
+
+    @property
+    def law(self) -> Law:
+        """The law of all of them."""
+        return self.parts[0].law
+
+    @property
+    def interpolation(self) -> str:
+        """One of ELEMENTS, of all of them; triangles and tetrahedra have one strain either way."""
+        return self.parts[0].interpolation
 
     @property
     def cells(self) -> dict[str, Ints]:
