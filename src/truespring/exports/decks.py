@@ -44,12 +44,13 @@ _FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
-# CalculiX has no pyramids: they are bricks, four of whose corners are one, which is the very same element.
-_SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D6", "hexahedron": "C3D8"}
-_AS_BRICKS = ("pyramid",)
+_SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D8", "hexahedron": "C3D8"}
+# CalculiX has no pyramids, and integrates its wedges C3D6 at two points. As bricks with corners that are one they are
+# the elements that they are here: pyramids to the digit, wedges to the quadrature of large strain.
+_AS_BRICKS = ("pyramid", "wedge")
+_BRICKS_EXPLAINED = "** Wedges and pyramids are bricks here, some of whose corners are one node."
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
 
 
@@ -205,6 +206,8 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
         blocks = [("C3D10", np.arange(len(finer.elements)), finer.elements)]
     lines = []
     for kind, numbers, elements in blocks:
+        if any(own in _AS_BRICKS for own in problem.mesh.element_kinds) and not lines:
+            lines.append(_BRICKS_EXPLAINED)
         lines.append(f"*ELEMENT, TYPE={kind}, ELSET=BODY")
         rows = np.column_stack([numbers, elements]) + 1
         lines += map(joined, rows.tolist())
@@ -225,7 +228,7 @@ def check_fem(problem: Problem, law: str) -> None:
 
 
 def fem_element(problem: Problem) -> str:
-    """Return the types of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8, C3D6 or C3D4."""
+    """Return the types of the elements of first order: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4."""
     return " and ".join(dict.fromkeys(kind for kind, _, _ in _blocks(problem)))
 
 
