@@ -106,6 +106,36 @@ def test_a_force_and_a_support_take_the_facets_nodes(name: str) -> None:
     assert named == pytest.approx(side) and named.sum(axis=0) == pytest.approx(pull)
 
 
+@pytest.mark.parametrize("name", ["triangles", "quadrilaterals"])
+def test_a_moment_turns_the_facets_named(name: str) -> None:
+    """Of a group with further nodes, the facets alone: the moment has its arms about their middle."""
+    body = MESHES[name]
+    facets = at_ends(body, axis=0)
+    right = facets[(body.nodes[facets][:, :, 0] == 3).all(axis=1)]
+    mesh = contents(body, right, node_groups={"caps": np.arange(3)}).mesh(1.0)
+    named, side = (
+        ts.Problem(
+            mesh, ts.Material(1e3, 0.3), ts.PlaneStress(thickness=1.0), [ts.Fixed(on="left")], [ts.Moment(on, 5.0)]
+        ).loading.force(mesh.nodes)
+        for on in ("caps", "right")
+    )
+    assert named == pytest.approx(side)
+    x, y = (mesh.nodes - mesh.nodes[np.unique(right)].mean(axis=0)).T
+    assert (x * named[:, 1] - y * named[:, 0]).sum() == pytest.approx(5.0)
+
+
+@every_mesh
+def test_a_group_of_elements_and_facets_is_told(name: str) -> None:
+    body = MESHES[name]
+    facets = at_ends(body)
+    both = np.concatenate([np.arange(len(facets)) + 1000, [100]])
+    mesh = contents(body, facets, cell_groups={"caps": both}).mesh(1.0)
+    assert mesh.notes == (
+        "group 'caps' has elements and facets: loads act on its facets, supports hold the nodes of both",
+    )
+    assert mesh.element_groups["caps"].tolist() == [0] and len(mesh.facet_groups["caps"]) == len(facets)
+
+
 @pytest.mark.parametrize("name", ["triangles", "tetrahedra"])
 def test_elements_of_second_order_are_loaded_likewise(name: str) -> None:
     body = MESHES[name]
@@ -152,6 +182,19 @@ def test_both_ways_to_name_facets_say_the_same_of_turned_elements(name: str) -> 
     corners = mesh.nodes[mesh.facet_nodes(mesh.facet_groups["direct"])]
     outside = np.where(corners[:, :1, 1] > 0, 1.0, -1.0)[:, 0]
     assert (normals(corners)[:, 1] * outside > 0).all()
+
+
+@every_mesh
+def test_a_mesh_that_is_folded_is_refused(name: str) -> None:
+    """An element pulled through a neighbour is inverted as well, and turning it would lay one over the other."""
+    body = ts.box((3.0, 3.0, 3.0), (3, 3, 3), MESHES[name].element) if MESHES[name].dim == 3 else None
+    body = body or ts.rectangle((3.0, 3.0), (3, 3), MESHES[name].element)
+    nodes = body.nodes.copy()
+    inner = int(np.linalg.norm(nodes - 1.0, axis=1).argmin())
+    nodes[inner] += 4.0  # out of the elements around it, whose other corners stay
+    file = contents(body, at_ends(body))
+    with pytest.raises(MeshError, match=r"elements are inverted.*: mend the mesh|folded there; mend the mesh"):
+        replace(file, points=np.pad(nodes, ((0, 0), (0, 3 - body.dim)))).mesh(1.0)
 
 
 @pytest.mark.parametrize("kind", MIRRORED)

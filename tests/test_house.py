@@ -115,8 +115,9 @@ ALLOWED = {
     "errors": set(),
     "arrays": set(),
     "memory": set(),
+    "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "errors", "memory", "kernels"}
+OPEN_TO_ALL = {"arrays", "errors", "memory", "opening", "kernels"}
 HEAVY = {
     "matplotlib",
     "pyvista",

@@ -51,7 +51,58 @@ def test_positions_at_rest_may_stand_in_a_file_of_their_own(tmp_path: Path) -> N
 
 def test_a_lost_marker_is_told(tmp_path: Path) -> None:
     record = read_markers(written(tmp_path, MARKERS.replace("-1,0\n", "nan,nan\n")))
-    assert record.notes == ("1 of 2 points have no displacement at time 1",)
+    assert "1 of 2 points have no displacement at time 1" in record.notes
+    assert "columns without a unit were taken in metres: uy" in record.notes
+
+
+ROWS = (("tip", 160.0, 20.0, -31.4, -85.2), ("base", 0.0, 20.0, 0.25, 0.0))
+PLAIN = ("marker", "x [mm]", "y [mm]", "ux [mm]", "uy [mm]")
+
+
+def table(heads: tuple[str, ...], separator: str = ",", decimal: str = ".") -> str:
+    """A table of the markers, without their names where there is one head less."""
+    rows = [[str(value).replace(".", decimal) for value in row[len(row) - len(heads) :]] for row in ROWS]
+    return "\n".join(separator.join(line) for line in (heads, *rows)) + "\n"
+
+
+SPELLINGS = {
+    "plain": table(PLAIN),
+    "tabs": table(PLAIN, "\t"),
+    "tabs and decimal commas": table(PLAIN, "\t", ","),
+    "semicolons and decimal commas": table(PLAIN, ";", ","),
+    "semicolons and points": table(PLAIN, ";"),
+    "told separator": "sep=;\n" + table(PLAIN, ";", ","),
+    "round brackets": table(("marker", "x (mm)", "y (mm)", "ux (mm)", "uy (mm)")),
+    "glued": table(("marker", "x_mm", "y_mm", "ux_mm", "uy_mm")),
+    "glued twice": table(("marker", "x_mm [mm]", "y_mm", "u_x_mm", "u_y [mm]")),
+    "capitals": table(("Marker", "X [mm]", "Y [mm]", "UX [mm]", "UY [mm]")),
+    "VIC-3D": table(('"marker"', '"X [mm]"', ' "Y [mm]"', '"U [mm]"', '"V [mm]"')),
+    "ParaView": table(('"Points:0 (mm)"', '"Points:1 (mm)"', '"displacement:0 (mm)"', '"displacement:1 (mm)"')),
+    "Abaqus": table(("ID", "COORD1 [mm]", "COORD2 [mm]", "U1 [mm]", "U2 [mm]")),
+    "DICe": table(("COORDINATE_X [mm]", "COORDINATE_Y [mm]", "DISPLACEMENT_X [mm]", "DISPLACEMENT_Y [mm]")),
+    "byte order mark": "\ufeff" + table(PLAIN),
+}
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_tables_as_other_programs_write_them(name: str, tmp_path: Path) -> None:
+    record = read_record(written(tmp_path, SPELLINGS[name]))
+    assert record.points == pytest.approx(1e-3 * np.array([[160, 20, 0], [0, 20, 0]]))
+    assert record.levels[0].displacement == pytest.approx(1e-3 * np.array([[-31.4, -85.2, 0], [0.25, 0, 0]]))
+    assert record.names in ((), ("tip", "base")) and not record.notes
+
+
+def test_spreadsheets_write_two_bytes_a_letter(tmp_path: Path) -> None:
+    (tmp_path / "markers.csv").write_bytes(SPELLINGS["tabs and decimal commas"].encode("utf-16"))
+    assert read_record(tmp_path / "markers.csv").points[0] == pytest.approx([0.16, 0.02, 0])
+
+
+def test_columns_that_tell_something_else_are_left_out_and_told(tmp_path: Path) -> None:
+    text = "X [mm],Y [mm],Z [mm],U [mm],V [mm],W [mm],exx,sigma [pixel],x [pixel],u [pixel]\n1,2,3,4,5,6,7,8,9,10\n"
+    record = read_record(written(tmp_path, text))
+    assert record.points.tolist() == [[0.001, 0.002, 0.003]]
+    assert record.levels[0].displacement == pytest.approx(np.array([[0.004, 0.005, 0.006]]))
+    assert record.notes == ("columns that are not read: sigma [pixel], x [pixel], u [pixel], exx",)
 
 
 WRONG = {
@@ -79,6 +130,15 @@ WRONG = {
     "rests elsewhere": (LEVELS.replace("b,1,1,0", "b,1,2,0"), None, "markers.csv:4: this marker rests elsewhere"),
     "names in one file": ("marker,x,y\na,0,0\n", "x,y\n0,0\n", "only one of both files has a column marker"),
     "more rows": ("x,y\n0,0\n1,1\n", "x,y\n0,0\n", "2 markers are here, 1 at rest: give them names"),
+    "two units in one column": (MARKERS.replace("x [mm]", "x_mm [m]"), None, "tells two units, mm and m: leave one"),
+    "units of places alone": (
+        "x [mm],y [mm],ux,uy\n1,2,3,4\n",
+        None,
+        r"column x is in mm, ux has no unit: are these metres, too\? Write ux \[m\], or ux \[mm\]",
+    ),
+    "two decimal signs": (table(PLAIN, ";", ",").replace("0,25", "0.25"), None, "has a comma, '0.25' a point"),
+    "one column twice": (MARKERS.replace("marker,", "X,"), None, "column x is there twice, the second is 'x .mm.'"),
+    "nearly a column": (MARKERS.replace("marker", "load_factr"), None, r"did you mean 'load_factor'.*may be: marker,x"),
     "in space and plane": ("x,y,z\n0,0,0\n", "x,y\n0,0\n", "places have x, y, z, those in .*rest.csv x, y"),
 }
 

@@ -45,6 +45,7 @@ def to_si(value: object, dimension: Dimension) -> float:
     allowed = f"a {dimension} is wanted, as a number in {unit} or a text with a unit such as {example}"
     if isinstance(value, str):
         number = _parse(value, unit, allowed)
+        _ask_for_the_case(value, dimension)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         try:
             number = float(value)
@@ -57,6 +58,17 @@ def to_si(value: object, dimension: Dimension) -> float:
     if number and not _SMALLEST <= abs(number) <= _LARGEST:
         raise TruespringError(f"{value!r} is out of range: {allowed}, of a size from {_SMALLEST:g} to {_LARGEST:g}")
     return number
+
+
+def _ask_for_the_case(text: str, dimension: Dimension) -> None:
+    """Raise TruespringError where "10 mPa" may be meant to be 10 MPa: 1e9 times as much."""
+    written, meant, plain, factor = _WRONG_CASE.get(dimension, ("", "", "", 1.0))
+    number, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]  # _parse has looked
+    if float(number) and unit == written:
+        raise TruespringError(
+            f"'{text}' is {factor * float(number):g} {plain}: is {number} {meant} meant? Upper and lower case matter; "
+            f'if it is not, write "{factor * float(number):g} {plain}"'
+        )
 
 
 # A decimal number, then a unit: names with small powers, multiplied or divided. pint alone would take any
@@ -72,6 +84,13 @@ _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k
 _COMMON = {f"{prefix}{unit}": (factor, unit) for unit in ("m", "Pa", "N") for prefix, factor in _PREFIXES.items()}
 _COMMON |= {unit: (1.0, unit) for unit in ("kg/m^3", "m/s^2")}
 _COMMON["deg"] = (math.pi / 180, "rad")
+
+# Units that are mostly another one in the wrong case, by dimension: what is written, what may be meant, and one
+# that says the former plainly.
+_WRONG_CASE: dict[Dimension, tuple[str, str, str, float]] = {
+    "stress": ("mPa", "MPa", "Pa", 1e-3),
+    "length": ("Mm", "mm", "km", 1e3),
+}
 
 
 def _parse(text: str, unit: str, allowed: str) -> float:

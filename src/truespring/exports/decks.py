@@ -204,7 +204,7 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
             raise ExportError(f"quadratic elements are written of tetrahedra alone, the mesh has {problem.mesh.kinds}s")
         nodes, loading, own = finer.nodes, finer.loading, []
         blocks = [("C3D10", np.arange(len(finer.elements)), finer.elements)]
-    lines = []
+    lines: list[str] = []
     for kind, numbers, elements in blocks:
         if any(own in _AS_BRICKS for own in problem.mesh.element_kinds) and not lines:
             lines.append(_BRICKS_EXPLAINED)

@@ -17,16 +17,21 @@ def corner_mesh(grid: Grid) -> tuple[Mesh, Ints]:
 
     Cells of one kind become elements of first order. Of several kinds, and wedges and pyramids, become triangles or
     tetrahedra, which meet face to face. What has no inside becomes lines: the edges of a surface; of points alone the
-    shortest lines that join them all. Raises MeshError where that is no mesh.
+    shortest lines that join them all. Elements of either orientation are turned one by one. Raises MeshError where that
+    is no mesh.
     """
     element, elements = _elements(grid)
     nodes, local = np.unique(elements, return_inverse=True)
     elements = local.reshape(elements.shape)
     points = grid.points[nodes]
+    notes: tuple[str, ...] = ()
     if element != "line":
         mirrored = _orientation(points, elements, element) < 0
         elements[mirrored] = elements[mirrored][:, MIRRORED[element]]
-    return Mesh(points, elements, element), nodes
+        is_whole = len(elements) == sum(len(cells) for cells in grid.cells.values())
+        if is_whole and mirrored.any() and not mirrored.all():  # all are where an axis is turned
+            notes = (f"{mirrored.sum()} of {len(elements)} elements are inverted and were mirrored",)
+    return Mesh(points, elements, element, notes=notes), nodes
 
 
 def _elements(grid: Grid) -> tuple[str, Ints]:

@@ -1,5 +1,6 @@
 """Elements of several kinds in one table: each as a quadrilateral or hexahedron, some of whose corners are one."""
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -72,6 +73,44 @@ def mirrored(elements: Ints, kind: str, which: Bools) -> Ints:
         here = which[numbers]
         turned = own[here][:, MIRRORED[name]]
         found[numbers[here]] = turned if kind != MIXED else turned[:, ELEMENT_KINDS[name].merged]
+    return found
+
+
+def repeats(elements: Ints) -> Bools:
+    """Tell which elements name a node twice, shape (n_elements,)."""
+    ordered = np.sort(elements, axis=1)
+    return np.asarray((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+
+
+def turned(elements: Ints) -> Ints:
+    """Return a table whose elements are turned so that corners that are one stand as `ElementKind.merged` has them.
+
+    Programs write wedges and pyramids as bricks with corners that are one, whichever these are. What is of no kind
+    stays as it is.
+    """
+    found = elements.copy()
+    left = np.flatnonzero(repeats(elements))
+    kinds = [kind for kind in ELEMENT_KINDS.values() if len(kind.merged) == elements.shape[1]]
+    for turn in _turns(elements.shape[1]):
+        rows = elements[left][:, turn]
+        fits = np.any([_are(rows, kind) for kind in kinds], axis=0)
+        found[left[fits]] = rows[fits]
+        left = left[~fits]
+    return found
+
+
+def _turns(corners: int) -> list[list[int]]:
+    """The rotations of a square or a cube, each as the order that it brings their corners into."""
+    dim = int(corners).bit_length() - 1
+    places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+    places = 2 * places[:corners, :dim] - 1
+    found = []
+    for axes in itertools.permutations(range(dim)):
+        for signs in itertools.product((1, -1), repeat=dim):
+            matrix = np.eye(dim, dtype=np.int64)[list(axes)] * signs
+            if round(float(np.linalg.det(matrix))) == 1:
+                after = (places @ matrix.T).tolist()
+                found.append([places.tolist().index(place) for place in after])
     return found
 
 

@@ -8,7 +8,8 @@ from scipy import ndimage
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.files.images import Labels, read_labels
+from truespring.mesh.files.images import read_labels
+from truespring.mesh.files.labels import Labels
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.shapes import refuse_too_large
 
@@ -16,21 +17,20 @@ from truespring.mesh.shapes import refuse_too_large
 # half of them are.
 _SAMPLES = 3
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
-# Labels beside which a list of all of them is of no help.
-_MANY = 30
 
 
-def read_voxels(file: str | Path, label: int, edge: float | None = None, scale: float = 1e-3) -> Mesh:
+def read_voxels(file: str | Path, label: int | str, edge: float | None = None, scale: float = 1e-3) -> Mesh:
     """Read the body of one label from a label image, a hexahedron a voxel.
 
     Args:
-        file: the image: .vti, .npy, .nii, .nii.gz, .nrrd, .mha or .mhd.
-        label: the body's own.
+        file: the image: .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vti or .npy.
+        label: the body's own, a number, or the name of a segment of a .seg.nrrd file.
         edge: of the cubes wanted [m]; None takes the voxels as they are, cuboids where their spacing is.
         scale: the image's unit of length [m]; most know millimetres only.
 
     Of several parts that no face joins the largest is taken; the notes say what was left out. Places are those of
-    the image: origin, spacing and direction count. Raises MeshError, with the file, where the image cannot be read
+    the image: origin, spacing and direction count; of medical images x points to the patient's left and y to the back
+    (LPS, as in DICOM and ITK). Raises MeshError, with the file, where the image cannot be read
     or has no such label, or nothing is left of it.
     """
     if not (math.isfinite(scale) and scale > 0):
@@ -44,13 +44,8 @@ def read_voxels(file: str | Path, label: int, edge: float | None = None, scale: 
         raise MeshError(f"{file}: {error}") from None
 
 
-def _mesh(labels: Labels, label: int, edge: float | None, scale: float) -> Mesh:
-    inside = labels.values == label
-    n_inside = int(inside.sum())
-    if not n_inside:
-        there = np.unique(labels.values)
-        told = ", ".join(map(str, there[:_MANY].tolist())) + (", ..." if len(there) > _MANY else "")
-        raise MeshError(f"no voxel has the label {label}; there are {told}")
+def _mesh(labels: Labels, label: int | str, edge: float | None, scale: float) -> Mesh:
+    inside = labels.inside(label)
     (box,) = ndimage.find_objects(inside.astype(np.uint8))
     low = np.array([part.start for part in box])
     inside, spacing = inside[box], scale * labels.spacing
@@ -71,7 +66,7 @@ def _mesh(labels: Labels, label: int, edge: float | None, scale: float) -> Mesh:
     thin = [axis for axis, count in zip("xyz", np.ptp(nodes, axis=0), strict=True) if count == 1]
     if thin:
         notes.append(f"one cube thick along its {' and '.join(thin)} axis: it bends as no real body does")
-    return Mesh(places, elements, "hexahedron", notes=tuple(notes))
+    return Mesh(places, elements, "hexahedron", notes=(*labels.notes, *notes))
 
 
 def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
@@ -91,7 +86,7 @@ def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
     return np.asarray(by_cube.sum(axis=(1, 3, 5)) > _SAMPLES**3 / 2)
 
 
-def _largest_part(filled: Bools, label: int) -> tuple[Bools, list[str]]:
+def _largest_part(filled: Bools, label: int | str) -> tuple[Bools, list[str]]:
     """The largest part whose cubes share faces, without the empty layers around it, and a note on what is left out."""
     parts, n_parts = ndimage.label(filled)
     if n_parts == 1:

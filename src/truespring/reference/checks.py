@@ -8,20 +8,15 @@ import numpy as np
 from truespring.arrays import Ints
 from truespring.errors import ReferenceFileError
 from truespring.mesh.files.contents import places
+from truespring.opening import open_file
 from truespring.reference.record import Level, Record
 
 
 def refuse_unreadable(file: Path) -> None:
-    """Raise ReferenceFileError for a file that is not there, is a folder or is empty."""
-    if file.is_dir():
-        raise ReferenceFileError(f"{file} is a folder: give the result file itself")
-    try:
-        size = file.stat().st_size
-    except FileNotFoundError:
-        raise ReferenceFileError(f"{file} does not exist: check the path") from None
-    except (OSError, ValueError) as error:  # a path may hold what no file system takes
-        raise ReferenceFileError(f"{file} cannot be read ({error}): check the path and its permissions") from None
-    if not size:
+    """Raise ReferenceFileError for what is not there, is no regular file or is empty."""
+    with open_file(file, ReferenceFileError) as stream:
+        is_empty = not stream.read(1)
+    if is_empty:
         raise ReferenceFileError(f"{file} is empty: did the other program stop with an error?")
 
 

@@ -14,6 +14,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.inp import read_inp
+from truespring.opening import read_file
 from truespring.reference.checks import checked, refuse_repeated, refuse_unreadable, rows_of, without_modes
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.scan import CHUNK, Scan, scanning
@@ -25,6 +26,11 @@ _HEAD = re.compile(
 _MODE = re.compile(rb"\s*E I G E N V A L U E\s+N U M B E R\s+\d+\s*")
 _DISPLACEMENT, _FORCE, _ENERGY = "displacements", "total force", "total internal energy"
 _ID_WIDTH, _REAL_WIDTH = 10, 14
+
+
+def is_dat(head: bytes) -> bool:
+    """Whether one of the first lines of a file heads a table of CalculiX."""
+    return any(_HEAD.fullmatch(line) for line in head.splitlines())
 
 
 def read_dat(file: Path, reading: Reading | None = None, mesh: Path | None = None) -> Record:
@@ -63,9 +69,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
     refuse_unreadable(deck)
     try:
-        contents = read_inp(deck.read_bytes())
-    except OSError as error:
-        raise ReferenceFileError(f"{deck} cannot be read: {error.strerror}") from None
+        contents = read_inp(read_file(deck, ReferenceFileError))
     except MeshError as error:
         raise ReferenceFileError(f"{deck}: {error}") from None
     refuse_repeated(contents.node_numbers, "*NODE", deck)

@@ -40,8 +40,16 @@ _REAL = {_SINGLE: "<f4", _DOUBLE: "<f8"}
 _REAL_WIDTH = 12
 _INT = np.dtype("<i4")
 
+# How a file may begin.
+_BEGINNINGS = (b"    1C", b"    1U", b"    2C")
+
 # Kinds of analysis whose displacements are mode shapes.
 _MODES = ("2", "4")
+
+
+def is_frd(head: bytes) -> bool:
+    """Whether a file begins as CalculiX's .frd files do."""
+    return head.startswith(_BEGINNINGS)
 
 
 def read_frd(file: Path, reading: Reading | None = None) -> Record:
@@ -79,7 +87,7 @@ class _Result:
         """Return what the file holds."""
         scan = self._scan
         line = scan.line()
-        if not line.startswith((b"    1C", b"    1U", b"    2C")):
+        if not line.startswith(_BEGINNINGS):
             scan.refuse(f"this is no .frd file of CalculiX: it begins with {scan.shown(line)}, not with '1C'")
         while line and not self._is_whole:
             self._take(line)

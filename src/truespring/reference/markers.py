@@ -1,5 +1,6 @@
 """Measured markers: tables of where each was at rest and how far it has moved."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ReferenceFileError
 from truespring.reference.checks import checked, refuse_unreadable
+from truespring.reference.components import DISPLACEMENTS, PLACES, components
 from truespring.reference.record import Level, Reading, Record
 from truespring.table import Table
 from truespring.units import Dimension
@@ -16,13 +18,35 @@ _LENGTHS = ("x", "y", "z", "ux", "uy", "uz")
 _KNOWN: dict[str, Dimension | None] = {"marker": None, "load_factor": None}
 _KNOWN.update(dict.fromkeys(_LENGTHS, "length"))
 
+_FORM = "marker,x [mm],y [mm],ux [mm],uy [mm]"
+# What else a column of names, and of load factors, may be called.
+_SYNONYMS = {
+    "name": "marker",
+    "id": "marker",
+    "marker_id": "marker",
+    "marker id": "marker",
+    "load factor": "load_factor",
+}
+
+
+def _synonyms(names: Sequence[str]) -> dict[str, str]:
+    """Return what the names of other programs mean: U, V, W of VIC-3D, "Points:0" and "displacement:0" of ParaView."""
+    places = components(names, PLACES)
+    moves = components(names, DISPLACEMENTS) or components(names, (), "uvw")
+    return {
+        **{name: _SYNONYMS[name.lower()] for name in names if name.lower() in _SYNONYMS},
+        **{name: axis for axis, name in places.items()},
+        **{name: f"u{axis}" for axis, name in moves.items()},
+    }
+
 
 def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | None = None) -> Record:
     """Read the positions of markers from CSV files with a line of column names.
 
     Columns are x, y and in space z; ux, uy, uz, the displacement; and, where there are any, `marker`, a name, and
     `load_factor`: rows with one value of it are a level. Numbers are metres, or in the unit behind a column's name:
-    "x [mm]".
+    "x [mm]", "x (mm)", "x_mm". Tables of VIC-3D (X, Y, Z, U, V, W) and ParaView ("Points:0", "displacement:0") are
+    read, too; columns that tell something else are left out, and that is noted.
 
     Args:
         file: where the markers were at rest, and their displacement; with `undeformed`, where they have gone.
@@ -33,16 +57,21 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
     level has other markers than the first, or there is no displacement.
     """
     table = _table(file)
+    notes = _notes(table, file)
     axes = [axis for axis in _AXES if axis in table.columns]
     moved = [axis for axis in _AXES if f"u{axis}" in table.columns]
     if undeformed is None and not moved:
+        if table.unknown:
+            table.refuse_unknown()
         raise ReferenceFileError(
             f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or give a second "
-            "file with the markers at rest (--undeformed)"
+            f"file with the markers at rest (--undeformed); the first line may be: {_FORM}"
         )
     if undeformed is not None and moved:
         raise ReferenceFileError(f"{file} has the displacement in column u{moved[0]}: leave undeformed out")
     if moved and moved != axes:
+        if table.unknown:
+            table.refuse_unknown()
         raise ReferenceFileError(f"{file}:1: places have {', '.join(axes)}, displacements u{', u'.join(moved)}")
     groups = _levels(table)
     rest = table if undeformed is None else _table(undeformed)
@@ -64,12 +93,34 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
         levels.append(Level(load_factor, _in_space(table, axes, "u")[rows]))
     if reading:
         reading(1.0)
-    return checked(Record(file, "csv", points, {}, tuple(levels), names))
+    return checked(Record(file, "csv", points, {}, tuple(levels), names, notes))
 
 
 def _table(file: Path) -> Table:
     refuse_unreadable(file)
-    return Table(file, _KNOWN, ("x", "y"), ReferenceFileError)
+    return Table(file, _KNOWN, ("x", "y"), ReferenceFileError, _synonyms, _FORM)
+
+
+def _notes(table: Table, file: Path) -> tuple[str, ...]:
+    """Return what should be known of the columns; raise where places have units and displacements have none."""
+    without = [name for name in _LENGTHS if name in table.columns and not table.units[name]]
+    having = [name for name in _LENGTHS if name in table.columns and table.units[name]]
+    notes = []
+    if table.unknown:
+        notes.append(f"columns that are not read: {', '.join(head.strip() for head in table.unknown)}")
+    if without and having:
+        if {name[0] for name in without}.isdisjoint(name[0] for name in having) and _are_halves(without, having):
+            raise ReferenceFileError(
+                f"{file}:1: column {having[0]} is in {table.units[having[0]]}, {without[0]} has no unit: are these "
+                f"metres, too? Write {without[0]} [m], or {without[0]} [{table.units[having[0]]}]"
+            )
+        notes.append(f"columns without a unit were taken in metres: {', '.join(without)}")
+    return tuple(notes)
+
+
+def _are_halves(without: Sequence[str], having: Sequence[str]) -> bool:
+    """Whether the places are told in one way, the displacements in the other."""
+    return len({name[0] == "u" for name in without}) == len({name[0] == "u" for name in having}) == 1
 
 
 def _in_space(table: Table, axes: list[str], quantity: str = "") -> Floats:

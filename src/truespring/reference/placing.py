@@ -132,7 +132,7 @@ def placed(record: Record, placing: Placing, label: str) -> Path:
         kind=record.kind,
         states=tuple(states),
         status=Status.NOT_CONVERGED if record.stopped else Status.READ,
-        warnings=(*record.notes, *left_out, *notes, unproven(label)),
+        warnings=(*record.notes, *left_out, *mesh.notes, *notes, unproven(label)),
         grid=grid,
     )
 

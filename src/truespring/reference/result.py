@@ -1,36 +1,70 @@
-"""Any result file, by its suffix: as its file tells it, and as a path."""
+"""Any result file, by its content and its suffix: as its file tells it, and as a path."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 from truespring.equilibrium import Path as Equilibria
 from truespring.errors import ReferenceFileError, nearest
+from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
+from truespring.mesh.files.vtk_file import VTK_FORMATS
+from truespring.opening import open_file
 from truespring.reference.checks import refuse_unreadable
-from truespring.reference.dat import read_dat
-from truespring.reference.frd import read_frd
+from truespring.reference.dat import is_dat, read_dat
+from truespring.reference.frd import is_frd, read_frd
+from truespring.reference.joining import joined
 from truespring.reference.markers import read_markers
 from truespring.reference.placing import Placing, placed
 from truespring.reference.record import Reading, Record
-from truespring.reference.rst import read_rst
-from truespring.reference.stl_record import read_stl_pair
+from truespring.reference.rst import is_rst, read_rst
+from truespring.reference.stl_record import is_stl, read_stl_pair
 from truespring.reference.vtk import read_vtk_result
 
-_VTK = frozenset({"field"})
 
-#: By suffix in small letters: the reader, and which of the options `field`, `undeformed` and `mesh` it takes.
-READERS: MappingProxyType[str, tuple[Callable[..., Record], frozenset[str]]] = MappingProxyType(
+class Format(NamedTuple):
+    """How files of a format begin, what reads them, and which of the options `field`, `undeformed`, `mesh` it takes."""
+
+    recognises: Recognises
+    read: Callable[..., Record]
+    options: frozenset[str] = frozenset()
+    is_marked: bool = True  # whether every file of the format is recognised
+
+
+_FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
+
+#: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
+READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".frd": (read_frd, frozenset()),
-        ".dat": (read_dat, frozenset({"mesh"})),
-        ".vtu": (read_vtk_result, _VTK),
-        ".vtk": (read_vtk_result, _VTK),
-        ".pvd": (read_vtk_result, _VTK),
-        ".rst": (read_rst, frozenset()),
-        ".csv": (read_markers, frozenset({"undeformed"})),
-        ".stl": (read_stl_pair, frozenset({"undeformed"})),
+        ".frd": Format(is_frd, read_frd),
+        ".dat": Format(is_dat, read_dat, frozenset({"mesh"})),
+        **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
+        ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
+        ".rst": Format(is_rst, read_rst),
+        ".csv": Format(lambda head: False, read_markers, _REST, is_marked=False),  # any table
+        ".stl": Format(is_stl, read_stl_pair, _REST, is_marked=False),  # binary files have no mark
     }
 )
+
+
+def format_of(file: Path) -> str | None:
+    """Return the key in READERS of a file's format: by its content, else its suffix; None where neither tells."""
+    return format_by_head(file.suffix, _head(file), {suffix: form.recognises for suffix, form in READERS.items()})
+
+
+def _head(file: Path) -> bytes:
+    """What a file begins with, nothing where it cannot be read: whoever reads it tells why."""
+    try:
+        with open_file(file, ReferenceFileError) as stream:
+            return stream.read(HEAD)
+    except (ReferenceFileError, OSError):
+        return b""
+
+
+def _is_recognised(file: Path, key: str) -> bool:
+    head = _head(file)
+    return not head or READERS[key].recognises(head)
 
 
 def read_result(
@@ -50,8 +84,8 @@ def read_result(
     """Read a result that another program wrote as a path that can be compared with others.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers, or a .stl file with the body at rest.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
         axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
         shift: what is added to its places then [m].
@@ -76,11 +110,11 @@ def read_record(
     mesh: str | Path | None = None,
     reading: Reading | None = None,
 ) -> Record:
-    """Read a result that another program wrote; its suffix tells the format.
+    """Read a result that another program wrote; its content tells the format, else its suffix.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a .vtu, .vtk or .pvd file, a .rst file of Ansys, a .csv table of
-            markers or a .stl file.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
+            table of markers or a .stl file.
         field: of VTK files, the name of the displacement.
         undeformed: of tables of markers and STL files, the file with the state at rest.
         mesh: of .dat files, the deck with nodes and elements.
@@ -89,23 +123,31 @@ def read_record(
     Raises ReferenceFileError where the file cannot be read, or an option is not for its format.
     """
     file = Path(file)
-    suffix = file.suffix.lower()
     if file.is_dir():
         raise ReferenceFileError(f"{file} is a folder: give the result file itself")
-    if suffix not in READERS:
+    key = format_of(file)
+    if key is None:
         raise ReferenceFileError(
-            f"{file}: a result ends in {', '.join(READERS)}, not in '{file.suffix}'{nearest(suffix, READERS)}"
+            f"{file}: a result ends in {', '.join(READERS)}, not in '{file.suffix}'"
+            f"{nearest(file.suffix.lower(), READERS)}, and what it begins with is none of their forms: "
+            "convert it to VTK"
         )
-    reader, takes = READERS[suffix]
     options = {
         "field": field,
         "undeformed": None if undeformed is None else Path(undeformed),
         "mesh": None if mesh is None else Path(mesh),
     }
     given = {name: value for name, value in options.items() if value is not None}
-    for name in given.keys() - takes:
-        others = ", ".join(other for other, (_, names) in READERS.items() if name in names)
-        raise ReferenceFileError(f"{file}: {name} is not for {suffix} files, but for {others}")
-    if not (suffix == ".dat" and file.is_file()):  # of an empty one its reader knows why
+    for name in given.keys() - READERS[key].options:
+        others = ", ".join(other for other, form in READERS.items() if name in form.options)
+        raise ReferenceFileError(f"{file}: {name} is not for {key} files, but for {others}")
+    if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
         refuse_unreadable(file)
-    return reader(file, reading, **given)
+    try:
+        record = READERS[key].read(file, reading, **given)
+    except ReferenceFileError as error:
+        if not READERS[key].is_marked or _is_recognised(file, key):
+            raise
+        raise ReferenceFileError(f"{error}; it does not begin as {listed_keys(READERS, key)} do, either") from None
+    record = joined(record)
+    return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

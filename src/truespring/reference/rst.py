@@ -17,6 +17,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ReferenceFileError
 from truespring.mesh.files.contents import places
+from truespring.opening import open_file
 from truespring.reference.checks import checked, refuse_unreadable, without_modes
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import sized
@@ -37,6 +38,12 @@ _POINTERS = slice(10, 16)  # to result sets, times, steps, elements, nodes, geom
 _HIGH = (40, 41, 42, 44, 45, 46)  # their upper words
 _MODES = (1, 2)  # buckling and modal analysis
 _AGAIN = "copy it again from where Ansys wrote it"
+
+
+def is_rst(head: bytes) -> bool:
+    """Whether a file begins as Ansys' results do."""
+    words = (np.frombuffer(head[:12], f"{order}i4") for order in "<>" if len(head) >= 12)
+    return any(word[0] == 100 and word[2] == _RESULTS for word in words)
 
 
 def read_rst(file: Path, reading: Reading | None = None) -> Record:
@@ -62,11 +69,8 @@ def read_rst(file: Path, reading: Reading | None = None) -> Record:
 
 def _header(file: Path) -> tuple[int, bool]:
     """Return the number of result sets, and whether they are modes; raise where the file does not fit its header."""
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(4 * _WORDS)
-    except OSError as error:
-        raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
+    with open_file(file, ReferenceFileError) as stream:
+        data = stream.read(4 * _WORDS)
     order = ">" if data[:4] == (100).to_bytes(4, "big") else "<"
     words = np.frombuffer(data[: len(data) // 4 * 4], f"{order}i4").astype(np.int64)
     if len(words) < 3 or words[0] != 100 or words[2] != _RESULTS:

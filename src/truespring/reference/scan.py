@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truespring.errors import ReferenceFileError
+from truespring.opening import open_file
 from truespring.reference.record import Reading
 
 # Lines that are held at a time: what bounds the memory that reading takes beside what is kept.
@@ -152,7 +153,7 @@ def _exponent(text: str) -> tuple[str, str]:
 def scanning(file: Path, reading: Reading | None) -> Iterator[Scan]:
     """Open a file that `refuse_unreadable` has let pass."""
     try:
-        with file.open("rb") as stream:
+        with open_file(file, ReferenceFileError) as stream:
             yield Scan(file, stream, reading)
     except OSError as error:
         raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None

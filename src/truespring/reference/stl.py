@@ -11,7 +11,9 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.equilibrium import Path, State, Status
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
+from truespring.mesh.joining import merged as merged_within
 from truespring.mesh.selections import AXES
+from truespring.opening import read_file
 from truespring.problem import Problem
 from truespring.reference.placing import Placing, told_state, unproven
 
@@ -130,14 +132,7 @@ def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
 
 
 def _bytes(file: pathlib.Path) -> bytes:
-    if file.is_dir():
-        raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
-    try:
-        data = file.read_bytes()
-    except FileNotFoundError:
-        raise ReferenceFileError(f"{file} does not exist: check the path") from None
-    except (OSError, ValueError) as error:  # a path may hold what no file system takes
-        raise ReferenceFileError(f"{file} cannot be read ({error}): check the path and its permissions") from None
+    data = read_file(file, ReferenceFileError)
     if not data.strip():
         raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")
     return data
@@ -275,18 +270,7 @@ def _matched(
 
 def merged(places: Floats) -> tuple[Ints, Ints]:
     """Number the distinct places, nearly equal ones once; return a row of each, and the number of each row."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import KDTree
-
-    distinct, row, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
-    near = KDTree(distinct).query_pairs(
-        _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))), output_type="ndarray"
-    )
-    joined = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(distinct), len(distinct)))
-    number = connected_components(joined, directed=False)[1]
-    _, first = np.unique(number, return_index=True)
-    return np.asarray(row[first]), np.asarray(number[inverse.ravel()], dtype=np.int64)
+    return merged_within(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
 
 
 def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: pathlib.Path) -> Surface:

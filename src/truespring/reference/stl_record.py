@@ -1,5 +1,6 @@
 """Two STL files of one body, at rest and deformed, as a record: its surface and where each of its points went."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,11 @@ from truespring.reference.stl import merged, read_facets
 
 # A share of the body's diameter: facets that meet at rest still meet when deformed.
 _APART = 1e-5
+
+
+def is_stl(head: bytes) -> bool:
+    """Whether a file begins as STL's texts do; binary ones have no mark."""
+    return bool(re.match(rb"\s*solid\b[^\n]*\n\s*facet\s+normal\b", head, re.IGNORECASE))
 
 
 def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path | None = None) -> Record:

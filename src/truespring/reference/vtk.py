@@ -1,29 +1,42 @@
-"""Results as VTK's unstructured grids: .vtu, legacy .vtk, and .pvd, a series of .vtu files."""
+"""Results in VTK's files: grids and faces of any of its formats, in pieces or not, and .pvd, a series of them."""
 
-from collections.abc import Callable, Mapping
+import itertools
+import math
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, ReferenceFileError, nearest
-from truespring.mesh.files.vtk import Grid, contents, read_legacy_grid
-from truespring.mesh.files.vtu import read_grid
+from truespring.mesh.files.heads import HEAD, format_by_head, is_vtk_xml
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk_grid
+from truespring.mesh.files.vtk_grid import Grid, contents
+from truespring.mesh.files.vtk_pieces import one_grid
+from truespring.mesh.files.vtu import root_of
+from truespring.opening import file_beside, open_file, read_file
 from truespring.reference.checks import checked, refuse_unreadable
+from truespring.reference.components import DISPLACEMENTS, components
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import named, refuse_unknown
 
-# What other programs call the displacement, in small letters.
-_NAMES = ("displacement", "displacements", "u", "disp")
+# Three numbers by these names are a displacement, as Elmer writes it.
+_ALONE = "uvw"
 
-_GRIDS: Mapping[str, Callable[[bytes], Grid]] = {".vtu": read_grid, ".vtk": read_legacy_grid}
+_KINDS = {**VTK_FORMATS, ".pvd": is_vtk_xml("Collection")}
+
+
+class _Part(NamedTuple):
+    """A file of a series: its time, and what part of the body it holds."""
+
+    time: float
+    part: str
+    file: Path
 
 
 def read_vtk_result(file: Path, reading: Reading | None = None, field: str | None = None) -> Record:
-    """Read the displacement in a .vtu or .vtk file, one level of time 1, or in the series of a .pvd file.
+    """Read the displacement in a file of VTK's, one level of time 1, or in the series of a .pvd file.
 
     Points must stand where they were at rest. `strain_energy` of the cells of a file that truespring wrote for
     elements (J a cell) is summed to the level's energy; what other programs call so may be a density, and what
@@ -33,67 +46,87 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
         file: the result.
         reading: is called with the share that is read, after each file of a series.
         field: name of the displacement among the points' arrays; by default the only one that is called
-            displacement, displacements, u or disp in any spelling.
+            displacement, displacements, u, disp or deformation in any spelling, or numbers by its name and that of an
+            axis ("displacement 1", "disp:0", "u_x"), or u, v and w.
 
-    Returns a record of kind "vtu", "vtk" or "pvd". Raises ReferenceFileError where a file is damaged, the displacement
-    is not found, or the files of a series do not share points and cells.
+    Returns a record whose kind is the file's suffix. Raises ReferenceFileError where a file is damaged, the
+    displacement is not found, or the files of a series do not share points and cells.
     """
-    kind = file.suffix.lower().lstrip(".")
     refuse_unreadable(file)
-    series = _series(file) if kind == "pvd" else [(1.0, file)]
+    kind = _kind(file)
+    parts, notes = _series(file) if kind == "pvd" else ([_Part(1.0, "", file)], [])
     first: Record | None = None
     levels: list[Level] = []
-    for number, (time, one) in enumerate(series, 1):
-        grid = _grid(one)
-        record = Record(one, kind, grid.points, _cells(grid, one), (Level(time, *_values(grid, field, one)),))
+    n_read = 0
+    for time, members in itertools.groupby(parts, lambda part: part.time):
+        files = [part.file for part in members]
+        grid = one_grid([_grid(one) for one in files])
+        displacement, told = _displacement(grid, field, files[0])
+        cells = _cells(grid, files[0])
+        record = Record(files[0], kind, grid.points, cells, (Level(time, displacement, _energy(grid)),))
         first = first or record
         _refuse_other_mesh(record, first)
         levels += record.levels
+        notes += [note for note in (*grid.notes, *told) if note not in notes]
+        n_read += len(files)
         if reading:
-            reading(number / len(series))
+            reading(n_read / len(parts))
     assert first is not None  # _series holds one at least
-    return checked(Record(file, kind, first.points, first.cells, tuple(levels)))
+    return checked(Record(file, kind, first.points, first.cells, tuple(levels), notes=tuple(notes)))
 
 
-def _series(file: Path) -> list[tuple[float, Path]]:
-    """Return times and files of a .pvd file."""
+def _kind(file: Path) -> str:
+    """The format of a file without the point: by its content, else its suffix."""
+    with open_file(file, ReferenceFileError) as stream:
+        head = stream.read(HEAD)
+    return (format_by_head(file.suffix, head, _KINDS) or ".vtu").lstrip(".")
+
+
+def _series(file: Path) -> tuple[list[_Part], list[str]]:
+    """Return the files of a .pvd file in the order of their times, and what should be known of it."""
     try:
-        root = ElementTree.fromstring(file.read_bytes())
-    except OSError as error:
-        raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        root = root_of(read_file(file, ReferenceFileError))
+    except MeshError as error:
         raise ReferenceFileError(f"{file} is no .pvd file, or not a whole one: {error}") from None
     entries = root.findall("Collection/DataSet")
-    if root.tag != "VTKFile" or not entries:
+    if not entries:
         raise ReferenceFileError(f"{file} names no file: a VTKFile of type Collection with DataSets is wanted")
-    series: list[tuple[float, Path]] = []
+    parts: list[_Part] = []
+    known: set[tuple[float, str]] = set()
     for number, entry in enumerate(entries, 1):
-        text, name = entry.get("timestep", str(number)), entry.get("file", "")
-        try:
-            time = float(text)
-        except ValueError:
+        told = f"{file}: DataSet {number}"
+        time = _time(entry.get("timestep", str(number)), told)
+        name = entry.get("file", "")
+        if Path(name).suffix.lower() not in VTK_FORMATS:
+            raise ReferenceFileError(f"{told} names '{name[:80]}'; files that end in {', '.join(VTK_FORMATS)} are read")
+        one = file_beside(file.parent, name, ReferenceFileError, f"{told} ")
+        part = entry.get("part", "0")
+        if (time, part) in known:
             raise ReferenceFileError(
-                f'{file}: DataSet {number} has timestep="{text[:40]}", which is no number'
-            ) from None
-        one = file.parent / name
-        if one.suffix.lower() != ".vtu":
-            raise ReferenceFileError(f"{file}: DataSet {number} names '{name[:80]}'; .vtu files are read")
-        if not one.is_file():
-            raise ReferenceFileError(
-                f"{file}: DataSet {number} names '{name[:80]}', which is not there: keep it beside"
+                f"{file}: time {time:g} is there twice: merge the parts of the body into one grid, or give each "
+                "a part of its own (part=)"
             )
-        if time in (known for known, _ in series):
-            raise ReferenceFileError(f"{file}: time {time:g} is there twice: merge the parts of the body into one grid")
-        series.append((time, one))
-    return series
+        known.add((time, part))
+        parts.append(_Part(time, part, one))
+    ordered = sorted(parts, key=lambda part: part.time)  # parts of one time keep their order
+    is_other = [part.time for part in ordered] != [part.time for part in parts]
+    return ordered, [f"the times of {file.name} do not ascend: they were put in order"] if is_other else []
+
+
+def _time(text: str, told: str) -> float:
+    try:
+        time = float(text)
+    except ValueError:
+        time = math.nan
+    if not math.isfinite(time):
+        raise ReferenceFileError(f'{told} has timestep="{text[:40]}", which is no finite number')
+    return time
 
 
 def _grid(file: Path) -> Grid:
     refuse_unreadable(file)
     try:
-        return _GRIDS[file.suffix.lower()](file.read_bytes())
-    except OSError as error:
-        raise ReferenceFileError(f"{file} cannot be read: {error.strerror}") from None
+        return read_vtk_grid(read_file(file, ReferenceFileError), file.parent)
     except MeshError as error:
         raise ReferenceFileError(f"{file}: {error}") from None
 
@@ -113,21 +146,35 @@ def _cells(grid: Grid, file: Path) -> dict[str, Ints]:
     return cells
 
 
-def _values(grid: Grid, field: str | None, file: Path) -> tuple[Floats, float | None]:
-    """Return the displacement, shape (n_points, 3), and the energy, None where the file does not tell it."""
+def _displacement(grid: Grid, field: str | None, file: Path) -> tuple[Floats, list[str]]:
+    """Return the displacement, shape (n_points, 3), and a word on it where it is told by its parts."""
     vectors = {
         name: values for name, values in grid.point_arrays.items() if values.ndim == 2 and values.shape[1] in (2, 3)
     }
     there = f"vectors of the points are {', '.join(vectors)}" if vectors else "its points have no vectors"
+    parts = _parts(grid, field)
+    if parts and field not in vectors and (field or not any(name.lower() in DISPLACEMENTS for name in vectors)):
+        displacement = np.zeros((len(grid.points), 3))
+        for axis, name in parts.items():
+            displacement[:, "xyz".index(axis)] = grid.point_arrays[name]
+        return displacement, [f"the displacement was read from {', '.join(parts.values())}"]
     if field is not None and field not in vectors:
         raise ReferenceFileError(f"{file}: there is no vector '{field}'{nearest(field, vectors)}; {there}")
-    known = [name for name in vectors if name.lower() in _NAMES] if field is None else [field]
+    known = [name for name in vectors if name.lower() in DISPLACEMENTS] if field is None else [field]
     if len(known) != 1:
         which = f"{' and '.join(known)} may all be the displacement" if known else "none is called displacement"
         raise ReferenceFileError(f"{file}: {there}, {which}: name the right one by field (--field)")
     displacement = np.zeros((len(grid.points), 3))
     displacement[:, : vectors[known[0]].shape[1]] = vectors[known[0]]
-    return displacement, _energy(grid)
+    return displacement, []
+
+
+def _parts(grid: Grid, field: str | None) -> dict[str, str]:
+    """Return the names of the displacement's parts by axis, of the vector that is asked for; nothing without them."""
+    numbers = [name for name, values in grid.point_arrays.items() if values.ndim == 1 and values.dtype.kind == "f"]
+    if field is not None:
+        return components(numbers, (field.lower(),))
+    return components(numbers, DISPLACEMENTS) or components(numbers, (), _ALONE)
 
 
 def _energy(grid: Grid) -> float | None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from truespring.errors import StudyError, TruespringError
-from truespring.reference import READERS, Placing
+from truespring.reference import READERS, Placing, format_of
 from truespring.units import to_si
 
 
@@ -71,7 +71,7 @@ def options_of(text: str, given: Given, texts: Sequence[str]) -> FileOptions:
             known = _value(name, rest, value)
             takers = [one for one in texts if _takes(one, name)]
             if not takers:
-                suffixes = ", ".join(suffix for suffix in READERS if _takes(f"any{suffix}", name))
+                suffixes = ", ".join(suffix for suffix in READERS if _is_for(suffix, name))
                 raise StudyError(f"{_option(name)} {value}: nothing that is compared takes it; {suffixes} files do")
             if text in takers if file is None else text == file or _names(text, file):
                 found[name] = known
@@ -101,10 +101,12 @@ def _names(text: str, file: str) -> bool:
 
 def _takes(text: str, name: str) -> bool:
     """Whether a source can take an option: of files some by their format, others all."""
-    suffix = Path(text).suffix.lower()
-    if name in _BY_FORMAT:
-        return suffix in READERS and name in READERS[suffix][1]
-    return suffix in READERS
+    key = format_of(Path(text))
+    return key is not None and _is_for(key, name)
+
+
+def _is_for(key: str, name: str) -> bool:
+    return name not in _BY_FORMAT or name in READERS[key].options
 
 
 def _option(name: str) -> str:

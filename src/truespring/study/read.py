@@ -1,5 +1,6 @@
 """From a study file to the objects of the Python API, and from its faults to one readable message."""
 
+import io
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -42,6 +43,7 @@ from truespring.models import (
     moduli,
     refuse_mechanism,
 )
+from truespring.opening import read_file
 from truespring.problem import Load, Problem, Region
 from truespring.reference import CalculiX, Program, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton
@@ -117,9 +119,7 @@ def read_text(file: str | FilePath) -> StudyText:
     """Read a study file; raise StudyError where it cannot be read or is no TOML."""
     place = FilePath(file)
     try:
-        source = place.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise StudyError(f"{place}: cannot be read: {error.strerror}") from None
+        source = io.StringIO(read_file(place, StudyError).decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError:
         raise StudyError(f"{place}: is not a text file in UTF-8; a study is TOML") from None
     try:
@@ -272,7 +272,7 @@ class _Builder:
                 with self.at("mesh", "unit"):
                     scale = _unit(table.unit)
                 with self.at("mesh", "file"):
-                    mesh = read_mesh(self.file.parent / table.file, scale)
+                    mesh = read_mesh(self.file.parent / table.file, scale, table.join)
                     refuse_too_large(mesh.n_nodes, mesh.dim)
                     return self.halved(mesh)
 

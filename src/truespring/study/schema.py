@@ -169,17 +169,21 @@ class BoxTable(Table):
 
 
 class FileTable(Table):
-    """A mesh from a file; mesh files know no units, so `unit` tells their length unit."""
+    """A mesh from a file; mesh files know no units, so `unit` tells their length unit.
+
+    `join` makes nodes at one place one; by default where no two elements share a node.
+    """
 
     file: str
     unit: str = "m"
+    join: bool | None = None
 
 
 class VoxelsTable(Table):
     """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
 
     voxels: str
-    label: int
+    label: int | str
     edge: Length | None = None
     unit: str = "mm"
 

@@ -1,6 +1,7 @@
 """What `truespring compare` is given: studies, folders that truespring wrote, and other programs' result files."""
 
 import csv
+import io
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -14,8 +15,9 @@ import numpy as np
 from truespring.equilibrium import Path, Status, solve
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
+from truespring.opening import read_file
 from truespring.problem import Problem
-from truespring.reference import Placing, Program, placed, read_record, read_shell, read_stl
+from truespring.reference import Placing, Program, format_of, placed, read_record, read_shell, read_stl
 from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
 
@@ -59,7 +61,7 @@ class Source:
     @property
     def is_stl(self) -> bool:
         """Whether it is an STL file, which is read beside the other body."""
-        return self.file.suffix.lower() == ".stl"
+        return format_of(self.file) == ".stl"
 
 
 def find_sources(texts: Sequence[str], given: Given) -> list[Source]:
@@ -181,7 +183,7 @@ def _folder(text: str, file: FilePath) -> FilePath:
 
 def _json(file: FilePath) -> dict[str, Any]:
     try:
-        read = json.loads(file.read_text(encoding="utf-8"))
+        read = json.loads(read_file(file, ReferenceFileError))
         models = read["models"]
         if not isinstance(models, dict) or not models:
             raise ValueError("it names no models")
@@ -190,7 +192,7 @@ def _json(file: FilePath) -> dict[str, Any]:
                 if key not in model:
                     raise ValueError(f"models.{name}.{key} is missing")
             Status(model["status"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise ReferenceFileError(f"{file} is no summary of truespring, or damaged: {error}") from None
     return dict(read)
 
@@ -198,11 +200,11 @@ def _json(file: FilePath) -> dict[str, Any]:
 def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[Any, ...]:
     """The states of a path with the forces that curves.csv tells at their levels."""
     try:
-        with curves.open(newline="", encoding="utf-8") as stream:
-            rows = [row for row in csv.DictReader(stream) if row.get("model") == name]
+        text = read_file(curves, ReferenceFileError).decode("utf-8")
+        rows = [row for row in csv.DictReader(io.StringIO(text, newline="")) if row.get("model") == name]
         axes = "xyz"[: path.problem.mesh.dim]
         forces = {float(row["load_factor"]): [float(row[f"f{axis}"] or math.nan) for axis in axes] for row in rows}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ReferenceFileError, ValueError, KeyError, TypeError):
         return path.states  # displacements can be compared without
     known = np.array(list(forces))
     states = []

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from truespring.errors import StudyError, TruespringError
+from truespring.opening import open_file
 from truespring.study import StudyText, value_at
 from truespring.study.changes import changed
 
@@ -117,9 +118,9 @@ def _digest_of(file: Path) -> str:
     try:
         if not file.is_file():
             return ""
-        with file.open("rb") as stream:
+        with open_file(file, TruespringError) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
-    except (OSError, ValueError):  # a text that no file can be called
+    except (OSError, ValueError, TruespringError):  # a text that no file can be called
         return ""
 
 

@@ -1,6 +1,7 @@
 """What is varied: `material.young=4 kPa,8 kPa`, `mesh.elements=[8,2],[16,4]`, `material.poisson=0:0.45:10`."""
 
 import csv
+import io
 import itertools
 import re
 import tomllib
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from truespring.errors import StudyError, TruespringError
+from truespring.opening import read_file
 from truespring.study import StudyText
 
 #: How values are written, for messages.
@@ -197,11 +199,10 @@ def read_points(file: str | Path) -> list[dict[str, Any]]:
     Raises TruespringError with file, row and what is wrong.
     """
     place = Path(file)
+    data = read_file(place, TruespringError)
     try:
-        with place.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [(number, row) for number, row in enumerate(csv.reader(stream), 1) if any(map(str.strip, row))]
-    except OSError as error:
-        raise TruespringError(f"{place}: cannot be read: {error.strerror}") from None
+        stream = io.StringIO(data.decode("utf-8-sig"), newline="")
+        rows = [(number, row) for number, row in enumerate(csv.reader(stream), 1) if any(map(str.strip, row))]
     except (UnicodeDecodeError, csv.Error) as error:
         raise TruespringError(f"{place}: is no CSV file in UTF-8: {error}") from None
     if len(rows) < 2:

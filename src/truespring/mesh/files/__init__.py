@@ -2,41 +2,72 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
+from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.vtk import read_vtk
-from truespring.mesh.files.vtu import read_vtu
+from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
+from truespring.opening import read_file
 
-_READERS: dict[str, Callable[[bytes], Contents]] = {
-    ".msh": read_msh,
-    ".inp": read_inp,
-    ".vtu": read_vtu,
-    ".vtk": read_vtk,
-}
+Reader = Callable[[bytes, Path], Contents]
 
 
-def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
-    """Read a mesh file; its suffix tells the format.
+def _alone(read: Callable[[bytes], Contents]) -> Reader:
+    """Return a reader of files that name no others."""
+    return lambda data, folder: read(data)
 
-    .msh: gmsh 2 to 2.2 and 4.1, text and binary. Physical groups become groups; one without a name is
+
+class Format(NamedTuple):
+    """How files of a format begin, what reads them, and how one that cannot be read may be mended.
+
+    A reader takes the bytes of a file and the folder that it lies in.
+    """
+
+    recognises: Recognises
+    read: Reader
+    again: str = ""
+
+
+_GMSH = "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
+_PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
+
+#: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
+FORMATS: MappingProxyType[str, Format] = MappingProxyType(
+    {
+        ".msh": Format(is_msh, _alone(read_msh), _GMSH),
+        ".inp": Format(is_inp, _alone(read_inp)),
+        **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
+    }
+)
+
+
+def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) -> Mesh:
+    """Read a mesh file; its content tells the format, else its suffix.
+
+    .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
     called by its number. .inp: Abaqus and CalculiX, one part. NSET and ELSET become groups, in their
-    first spelling. .vtu and .vtk (DATASET UNSTRUCTURED_GRID): an integer array of the cells with at most
+    first spelling. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
+    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
     64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
     an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
 
     The elements of the highest dimension are the body, in the file's order; cells of a lower one only
-    carry groups. A group of elements is one of their nodes, too; where several have one name, the nodes
-    are united. Cells of second order become their corners, elements that all are inverted are mirrored,
-    nodes without an element are left out: the mesh's notes say so. A plane body loses its z.
+    carry groups: those of one dimension less are facets of the elements that they bound. A group of
+    elements or facets is one of their nodes, too; where several have one name, the nodes are united.
+    Cells of second order become their corners, inverted elements are mirrored, nodes without an element
+    are left out: the mesh's notes say so. A plane body loses its z.
 
     Args:
         file: the mesh file.
         scale: the file's unit of length [m].
+        join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
     where the file cannot be read, is damaged or cut off, or holds no body of one kind of element.
@@ -44,27 +75,29 @@ def read_mesh(file: str | Path, scale: float = 1.0) -> Mesh:
     mostly with a note on nodes that no element has.
     """
     file = Path(file)
-    reader = _READERS.get(file.suffix.lower())
-    if reader is None:
-        raise MeshError(f"{file}: a mesh file ends in {', '.join(_READERS)}, not in '{file.suffix}'")
     if not (math.isfinite(scale) and scale > 0):
         raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
     data = _bytes(file)
+    key = format_by_head(file.suffix, data, {suffix: form.recognises for suffix, form in FORMATS.items()})
+    if key is None:
+        raise MeshError(
+            f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
+            "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
+        )
+    form = FORMATS[key]
     try:
-        return reader(data).mesh(scale)
+        contents = form.read(data, file.parent)
+    except MeshError as error:
+        others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
+        raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
+    try:
+        return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)
     except MeshError as error:
         raise MeshError(f"{file}: {error}") from None
 
 
 def _bytes(file: Path) -> bytes:
-    if file.is_dir():
-        raise MeshError(f"{file} is a folder: give the mesh file itself")
-    try:
-        data = file.read_bytes().removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
-    except FileNotFoundError:
-        raise MeshError(f"{file} does not exist: check the path") from None
-    except OSError as error:
-        raise MeshError(f"{file} cannot be read: {error.strerror}") from None
+    data = read_file(file, MeshError).removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
     if not data.strip():
         raise MeshError(f"{file} is empty")
     return data

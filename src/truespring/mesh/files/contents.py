@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from truespring.mesh.facets import (
     halved,
     mirrored_facets,
 )
+from truespring.mesh.joining import merged
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED
-from truespring.mesh.merged import kinds_in, mirrored
+from truespring.mesh.merged import kinds_in, mirrored, repeats, turned
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
 
@@ -43,13 +44,14 @@ _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "he
 _SUPPORTED = "a body is made of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
 _DIVIDE = "divide the others into these, as meshers do by an option and ParaView by its filter Tetrahedralize"
 
+_AGAIN = "write the file anew with the program that made it, or mend it there"
 _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
 
 # A coordinate beyond this was damaged, whatever the unit; its square still is a number.
 _FAR = 1e30
 
 # Shares of the body's diameter.
-_SAME_PLACE = 1e-9  # nodes this near are at one place
+_SAME_PLACE = 1e-7  # nodes this near are at one place: as near as float32 tells
 _FLAT = 1e-6  # a body this thin lies in a plane: files carry six digits or more
 
 
@@ -106,17 +108,24 @@ class Contents:
     notes: tuple[str, ...] = ()
     hint: str = ""
 
-    def mesh(self, scale: float) -> Mesh:
-        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none."""
-        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
-            return self._mesh(scale)
+    def mesh(self, scale: float, join: bool | None = None) -> Mesh:
+        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none.
 
-    def _mesh(self, scale: float) -> Mesh:
+        `join` makes nodes at one place one; by default where no two elements share a node.
+        """
+        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
+            return self._mesh(scale, join)
+
+    def _mesh(self, scale: float, join: bool | None) -> Mesh:
         self._check_nodes()
         cells = _by_kind(self.cells)
         body = _body(cells, self.hint)
         for block in cells:
             self._check_cells(block)
+        if join is not False:
+            whole = self._joined(body, always=bool(join))
+            if whole is not self:
+                return whole._mesh(scale, join=False)
         kind, table = _table(body)
         corners = self._rows(table)
         nodes = np.unique(corners)
@@ -137,7 +146,13 @@ class Contents:
             node_groups[name] = np.union1d(there, facet_nodes(elements, kind, facets))
         notes = [
             *self.notes,
+            *(
+                f"group '{name}' has elements and facets: loads act on its facets, supports hold the nodes of both"
+                for name, facets in facet_groups.items()
+                if facets.size and element_groups.get(name, facets[:0]).size
+            ),
             *self._second_order(body, nodes),
+            *_made_of_bricks(body),
             *self._unreferenced(body, scale),
             *_coincident(positions, self.node_numbers[nodes]),
             *_turned(is_turned, elements, kind, positions),
@@ -171,7 +186,7 @@ class Contents:
         for name, given in self.facet_groups.items():
             found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
         for block in cells:
-            if block.dim == body[0].dim - 1:
+            if block.dim == body[0].dim - 1 and self.cell_groups:
                 facets = find_facets(elements, kind, places(nodes, self._rows(block.corners)))
                 for name, group in self.cell_groups.items():
                     found.setdefault(name, []).append(facets[_found(block.numbers, group)])
@@ -185,19 +200,43 @@ class Contents:
                 notes.append(f"{n_lost} of {len(facets)} facets of group '{name}' bound no element of the body: {left}")
         return groups, notes
 
+    def _joined(self, body: Sequence[Cells], always: bool) -> "Contents":
+        """Return the contents with nodes at one place as one, if always or where no two elements share a node."""
+        used = self._rows(np.concatenate([block.nodes.ravel() for block in body]))
+        if not always and len(np.unique(used)) < len(used):
+            return self
+        near = _SAME_PLACE * float(np.linalg.norm(np.ptp(self.points[used], axis=0)))
+        first, place = merged(self.points, near)
+        n_before, n_after = len(np.unique(used)), len(np.unique(place[used]))
+        if n_after == n_before:
+            return self
+        number = self.node_numbers[first][place]  # of each node, the one that it becomes
+        why = "were joined" if always else "were joined, for no two elements share a node"
+        return replace(
+            self,
+            node_numbers=self.node_numbers[first],
+            points=self.points[first],
+            cells=[replace(block, nodes=number[self._rows(block.nodes)]) for block in self.cells],
+            node_groups={
+                name: np.unique(number[_found(self.node_numbers, group)]) for name, group in self.node_groups.items()
+            },
+            node_lines=None if self.node_lines is None else self.node_lines[first],
+            notes=(*self.notes, f"{n_before} nodes that stand at {n_after} places {why}"),
+        )
+
     def _rows(self, node_numbers: Ints) -> Ints:
         return places(self.node_numbers, node_numbers)
 
     def _check_nodes(self) -> None:
         twice = _repeated(self.node_numbers)
         if twice is not None:
-            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice")
+            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice: {_AGAIN}")
         lost = ~np.asarray((np.abs(self.points) < _FAR).all(axis=1))
         if lost.any():
             row = int(lost.argmax())
             raise MeshError(
                 f"{_at(self.node_lines, row)}{lost.sum()} of {len(lost)} nodes have a coordinate that is not finite "
-                f"or beyond {_FAR:g}, the first is node {self.node_numbers[row]}"
+                f"or beyond {_FAR:g}, the first is node {self.node_numbers[row]}: {_AGAIN}"
             )
 
     def _check_cells(self, cells: Cells) -> None:
@@ -207,7 +246,7 @@ class Contents:
             node = next(node for node in cells.nodes[row] if self._rows(np.array([node]))[0] < 0)
             raise MeshError(
                 f"{_at(cells.lines, row)}element {cells.numbers[row]} ({cells.kind}) names node {node}, "
-                "which is not in the file"
+                f"which is not in the file: {_AGAIN}"
             )
 
     def _groups(
@@ -296,7 +335,7 @@ def _by_kind(cells: Sequence[Cells]) -> list[Cells]:
     numbers = np.concatenate([block.numbers for block in joined] or [np.zeros(0, dtype=np.int64)])
     twice = _repeated(numbers)
     if twice is not None:
-        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice")
+        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice: {_AGAIN}")
     return joined
 
 
@@ -313,7 +352,7 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
     dim = max((block.dim for block in cells), default=0)
     if dim < 2:
         there = f"there are only {listed(counts)}" if counts else "there are no elements"
-        raise MeshError(f"{there}: {_joined(_SUPPORTED, hint)}")
+        raise MeshError(f"{there}: {_joined(hint, _SUPPORTED)}")
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
     unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
@@ -322,10 +361,19 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
 
 
 def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
-    """The kind of the body, and its corners by the file's numbers, in the table that a mesh of that kind has."""
-    if len({block.kind for block in body}) == 1:
-        return body[0].kind, np.concatenate([block.corners for block in body])
-    return MIXED, np.concatenate([block.corners[:, ELEMENT_KINDS[block.kind].merged] for block in body])
+    """The kind of the body, and its corners by the file's numbers, in the table that a mesh of that kind has.
+
+    Bricks and quadrilaterals with corners that are one are what these make of them: wedges, pyramids, simplices.
+    """
+    kind = body[0].kind
+    alone = len({block.kind for block in body}) == 1
+    if alone and (
+        kind not in ("hexahedron", "quadrilateral") or not any(repeats(block.corners).any() for block in body)
+    ):
+        return kind, np.concatenate([block.corners for block in body])
+    table = turned(np.concatenate([block.corners[:, ELEMENT_KINDS[block.kind].merged] for block in body]))
+    kinds = kinds_in(table, MIXED)
+    return (kinds[0][0], kinds[0][2]) if len(kinds) == 1 else (MIXED, table)
 
 
 def _joined(*advice: str) -> str:
@@ -343,14 +391,14 @@ def _in_their_dimensions(positions: Floats, cells: Cells, hint: str) -> Floats:
     if spans.min() <= _FLAT * np.linalg.norm(spans):
         raise MeshError(
             f"the {kind}s lie in a plane of constant {'xyz'[spans.argmin()]}: "
-            + _joined("turn the body, of a plane one z is constant", hint)
+            + _joined(hint, "of a plane body z is constant: turn it")
         )
     raise MeshError(
         f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
         + _joined(
-            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra: fill a closed "
-            "surface with these in a mesher",
             hint,
+            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra, with which a "
+            "mesher fills a closed surface",
         )
     )
 
@@ -383,6 +431,15 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
     return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]
 
 
+def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
+    """Say how many elements have corners that are one."""
+    bricks = [block for block in body if block.kind in ("hexahedron", "quadrilateral")]
+    count = sum(int(repeats(block.corners).sum()) for block in bricks)
+    if not count:
+        return []
+    return [f"{count} {bricks[0].kind} cell{'s' * (count != 1)} with corners that are one node became what they are"]
+
+
 def _halved(elements: Ints, kind: str) -> list[str]:
     """Say where elements are joined at their corners alone."""
     if kind != MIXED:
@@ -410,7 +467,8 @@ def _coincident(positions: Floats, numbers: Ints) -> list[str]:
     other = next(node for node in nearest[first] if node != first)
     return [
         f"{len(twins)} of {len(positions)} nodes share their place with another one, the first are nodes "
-        f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there"
+        f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there; "
+        "join = true joins them"
     ]
 
 

@@ -53,10 +53,6 @@ _Version = tuple[int, int]
 _Table = tuple[int, int, Ints, Ints | None]
 
 
-# How gmsh writes a file again in the version that is read best.
-_SAVE = "save it again by: gmsh FILE -0 -format msh41 -o NEW.msh"
-
-
 def read_msh(data: bytes) -> Contents:
     """Read a .msh file; raise MeshError where it is damaged or of another version."""
     version, source = _open(data)
@@ -77,7 +73,7 @@ def read_msh(data: bytes) -> Contents:
             case "Elements" | "ELM" if elements is None:
                 elements = _elements_4(source, version, physicals) if version >= (4, 0) else _elements_2(source)
             case "Nodes" | "NOD" | "ParametricNodes" | "Elements" | "ELM":
-                source.refuse(f"${source.section} is there twice: make it one mesh, {_SAVE}")
+                source.refuse(f"${source.section} is there twice: the nodes and elements of one mesh are wanted")
             case _:
                 source.skip_section()
                 continue
@@ -423,13 +419,12 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
     numbers = re.fullmatch(r"(\d{1,9})(?:\.(\d{1,9}))?", named)
     version = (int(numbers[1]), int(numbers[2] or 0)) if numbers else (0, 0)
     if version[0] != 2 and version not in ((4, 0), (4, 1)):
-        raise MeshError(f"version {named} of .msh is not read; 1, 2 to 2.2, 4 and 4.1 are: {_SAVE}")
+        raise MeshError(f"version {named} of .msh is not read; 1, 2 to 2.2, 4 and 4.1 are")
     if version == (4, 0) and file_type == "1":
-        raise MeshError(f"version {named} of .msh is read as text, this file is binary: {_SAVE}")
+        raise MeshError(f"version {named} of .msh is read as text, this file is binary")
     if file_type not in ("0", "1") or size not in ("4", "8"):
         raise MeshError(
-            f"$MeshFormat: file type {file_type} is not 0 or 1, or data size {size} is not 4 or 8: is the file "
-            f"damaged? If gmsh reads it, {_SAVE}"
+            f"$MeshFormat: file type {file_type} is not 0 or 1, or data size {size} is not 4 or 8: is the file damaged?"
         )
     source: _Source
     if file_type == "0":

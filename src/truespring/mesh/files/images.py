@@ -1,106 +1,88 @@
-"""Label images: segmented organs as .vti, .npy, and by SimpleITK .nii, .nii.gz, .nrrd, .mha, .mhd."""
+"""Label images, segmented organs, by their suffix: .nii, .nii.gz, .nrrd, .mha, .mhd, .vti and .npy."""
 
+import io
+import math
+import tokenize
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import MeshError
-from truespring.mesh.files.vtu import open_vtk
-
-#: What SimpleITK reads, directions included, which other readers drop.
-_BY_SIMPLEITK = (".nii", ".nii.gz", ".nrrd", ".mha", ".mhd")
-
+from truespring.mesh.files.labels import Labels, checked
+from truespring.mesh.files.metaimage import read_metaimage
+from truespring.mesh.files.nifti import read_nifti
+from truespring.mesh.files.nrrd import read_nrrd
+from truespring.mesh.files.raw_image import SAVE_ANEW, n_voxels
+from truespring.mesh.files.vtu import dims_of, open_vtk
+from truespring.opening import read_file
 
 # Before the name of an image that comes with PyVista: "pyvista:frog_tissues".
 _PYVISTA = "pyvista:"
 
 
-class Labels(NamedTuple):
-    """A label image: integers of shape (nx, ny, nz), each that of a cuboid about its place.
-
-    Attributes:
-        values: the labels.
-        spacing: of the places along each axis, in the file's unit, shape (3,).
-        origin: the place of the first one, shape (3,).
-        direction: the axes of the image in space, as columns, shape (3, 3).
-    """
-
-    values: np.ndarray[Any, Any]
-    spacing: Floats
-    origin: Floats
-    direction: Floats
-
-
 def read_labels(file: str | Path) -> Labels:
     """Read a label image; raise MeshError, with the file, where it is damaged or holds no labels."""
     if str(file).startswith(_PYVISTA):
-        return _checked(_of_pyvista(str(file).removeprefix(_PYVISTA)))
+        return checked(_of_pyvista(str(file).removeprefix(_PYVISTA)))
     file = Path(file)
-    suffix = "".join(file.suffixes[-2:]).lower() if file.name.lower().endswith(".nii.gz") else file.suffix.lower()
-    readers: dict[str, Callable[[Path], Labels]] = {".npy": _npy, ".vti": _vti}
-    readers |= dict.fromkeys(_BY_SIMPLEITK, _by_simpleitk)
-    if suffix not in readers:
-        raise MeshError(f"{file}: a label image ends in {', '.join(readers)}, not in '{file.suffix}'")
-    if not file.is_file():
-        raise MeshError(f"{file} {'is a folder: give the image itself' if file.is_dir() else 'does not exist'}")
+    reader = next((one for suffix, one in _READERS.items() if file.name.lower().endswith(suffix)), None)
+    if reader is None:
+        raise MeshError(f"{file}: a label image ends in {', '.join(_READERS)}, not in '{file.suffix}'")
     try:
-        found = readers[suffix](file)
-        return _checked(found)
+        return checked(reader(file))
     except MeshError as error:
-        raise MeshError(f"{file}: {error}") from None
-
-
-def _checked(labels: Labels) -> Labels:
-    values = labels.values
-    if values.ndim != 3 or not values.size:
-        raise MeshError(f"the image has shape {values.shape}: three axes are wanted, none of them empty")
-    if values.dtype.kind == "f":
-        whole = np.isfinite(values).all() and (values == np.rint(values)).all()
-        if not whole:
-            raise MeshError("the image holds fractions, not labels: it was blurred or interpolated; segment it first")
-        values = values.astype(np.int64)
-    elif values.dtype.kind not in "iub":
-        raise MeshError(f"the image holds {values.dtype}: integers are wanted, one label a voxel")
-    if not (np.isfinite(labels.spacing).all() and (labels.spacing > 0).all()):
-        raise MeshError(f"spacing = {labels.spacing.tolist()}: each must be positive")
-    if not np.allclose(labels.direction.T @ labels.direction, np.eye(3), atol=1e-4):
-        raise MeshError("the axes of the image do not stand upright on each other: a sheared image has no cubes")
-    return labels._replace(values=values)
+        told = str(error)
+        raise MeshError(told if told.startswith(str(file)) else f"{file}: {told}") from None
 
 
 def _npy(file: Path) -> Labels:
+    data = read_file(file, MeshError)
+    stream = io.BytesIO(data)
+    wrong = f"this is no .npy file, or its header is damaged; {SAVE_ANEW} or numpy.save"
     try:
-        values = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise MeshError(f"this is no .npy file, or not a whole one: {error}") from None
-    return Labels(np.asarray(values), np.ones(3), np.zeros(3), np.eye(3))
+        version = np.lib.format.read_magic(stream)
+        if version not in ((1, 0), (2, 0)):
+            raise MeshError(f".npy of version {version[0]}.{version[1]} holds no labels: save an array of integers")
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, is_fortran, dtype = read(stream)
+    except (ValueError, TypeError, SyntaxError, tokenize.TokenError, EOFError, OverflowError, RecursionError) as error:
+        raise MeshError(f"{wrong} ({str(error).splitlines()[0][:80] if str(error) else 'no header'})") from None
+    if dtype.hasobject or dtype.kind not in "iubf":
+        raise MeshError(f"the array holds {dtype}: integers are wanted, one label a voxel")
+    wanted, there = n_voxels(shape) * dtype.itemsize, len(data) - stream.tell()
+    if wanted != there:
+        raise MeshError(f"its header tells {wanted} bytes of voxels, {there} are there: is it cut off? {SAVE_ANEW}")
+    values = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if is_fortran else "C")
+    return Labels(values, np.ones(3), np.zeros(3), np.eye(3))
 
 
 def _vti(file: Path) -> Labels:
     """VTK's image: labels of the points, or of the cells between them."""
-    root, reader = open_vtk(file.read_bytes(), "ImageData")
+    root, reader = open_vtk(read_file(file, MeshError), "ImageData")
     image = root.find("ImageData")
     assert image is not None  # open_vtk has looked
     pieces = image.findall("Piece")
     if len(pieces) != 1:
         raise MeshError(f"there are {len(pieces)} pieces: one is wanted")
-    extent = _numbers(image, "WholeExtent", 6)
+    n_points = np.array(dims_of(image, "WholeExtent"))
+    if dims_of(pieces[0]) != n_points.tolist():
+        raise MeshError("its piece is not the whole image: save it in one piece")
+    low = _numbers(image, "WholeExtent", 6)[::2]
     spacing, origin = _numbers(image, "Spacing", 3, "1 1 1"), _numbers(image, "Origin", 3, "0 0 0")
     direction = _numbers(image, "Direction", 9, "1 0 0 0 1 0 0 0 1").reshape(3, 3)
-    low, n_points = extent[::2], (extent[1::2] - extent[::2] + 1).astype(int)
-    for section, counts, shift in (("CellData", n_points - 1, 0.5), ("PointData", n_points, 0.0)):
-        arrays = reader.arrays(pieces[0], section, int(counts.prod()))
-        scalars = {name: values for name, values in arrays.items() if values.ndim == 1 and values.dtype.kind in "iu"}
+    for section, counts, shift in (("CellData", np.maximum(n_points - 1, 1), 0.5), ("PointData", n_points, 0.0)):
+        arrays = reader.arrays(pieces[0], section, math.prod(counts.tolist()))
+        one = {name: values for name, values in arrays.items() if values.ndim == 1}
+        scalars = {name: values for name, values in one.items() if values.dtype.kind in "iu"} or one
         if scalars:
             if len(scalars) > 1:
-                raise MeshError(f"there are several arrays of integers ({', '.join(scalars)}): leave the labels alone")
+                raise MeshError(f"there are several arrays ({', '.join(scalars)}): leave that of the labels alone")
             values = next(iter(scalars.values())).reshape(counts, order="F")
             return Labels(values, spacing, origin + direction @ ((low + shift) * spacing), direction)
-    raise MeshError("there is no array of integers among the points or cells")
+    raise MeshError("there is no array of labels among the points or cells")
 
 
 def _of_pyvista(name: str) -> Labels:
@@ -128,23 +110,11 @@ def _numbers(element: ElementTree.Element, name: str, count: int, default: str =
     return found
 
 
-def _by_simpleitk(file: Path) -> Labels:
-    try:
-        import SimpleITK
-    except ImportError:
-        raise MeshError("such images are read by SimpleITK: pip install 'truespring[images]'") from None
-    itk: Any = SimpleITK  # typed in part only
-    itk.ProcessObject.SetGlobalWarningDisplay(False)
-    try:
-        image = itk.ReadImage(str(file))
-    except RuntimeError as error:
-        told = [line.strip() for line in str(error).splitlines() if line.strip()]
-        raise MeshError(f"this image cannot be read, it may be damaged: {told[-1] if told else error}") from None
-    values = itk.GetArrayFromImage(image)
-    if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
-        raise MeshError(
-            f"the image has {image.GetDimension()} axes and {image.GetNumberOfComponentsPerPixel()} values a voxel: "
-            "three axes and one label are wanted"
-        )
-    direction = np.array(image.GetDirection()).reshape(3, 3)
-    return Labels(values.transpose(), np.array(image.GetSpacing()), np.array(image.GetOrigin()), direction)
+# By the end of the name, in small letters.
+_READERS: dict[str, Callable[[Path], Labels]] = {
+    **dict.fromkeys((".nii", ".nii.gz"), read_nifti),
+    **dict.fromkeys((".nrrd", ".nhdr"), read_nrrd),
+    **dict.fromkeys((".mha", ".mhd"), read_metaimage),
+    ".vti": _vti,
+    ".npy": _npy,
+}

@@ -1,164 +1,22 @@
-"""Legacy VTK files, .vtk, text and binary, with a DATASET UNSTRUCTURED_GRID; and what they share with .vtu files.
+"""Legacy VTK files, .vtk, text and binary.
 
 Source: "VTK File Formats", https://docs.vtk.org/en/latest/vtk_file_formats/; of version 5.1, whose cells are
 offsets and connectivity, vtkDataReader and vtkDataWriter.
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, NoReturn
+from collections.abc import Callable, Iterator
+from typing import Any, NoReturn
 from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Ints
 from truespring.errors import MeshError
-from truespring.mesh.files.contents import CELL_KINDS, Cells, Contents
 from truespring.mesh.files.text import word
-
-Arrays = Mapping[str, NDArray[Any]]
-
-# VTK's number of a cell type: its kind and the number of its nodes, None where that varies.
-_TYPES: dict[int, tuple[str, int | None]] = {
-    1: ("vertex", 1),
-    2: ("vertex", None),
-    3: ("line", 2),
-    4: ("line", None),
-    5: ("triangle", 3),
-    6: ("triangle strip", None),
-    7: ("polygon", None),
-    8: ("quadrilateral", 4),  # pixel
-    9: ("quadrilateral", 4),
-    10: ("tetrahedron", 4),
-    11: ("hexahedron", 8),  # voxel
-    12: ("hexahedron", 8),
-    13: ("wedge", 6),
-    14: ("pyramid", 5),
-    15: ("prism", 10),
-    16: ("prism", 12),
-    21: ("line", 3),
-    22: ("triangle", 6),
-    23: ("quadrilateral", 8),
-    24: ("tetrahedron", 10),
-    25: ("hexahedron", 20),
-    26: ("wedge", 15),
-    27: ("pyramid", 13),
-    28: ("quadrilateral", 9),
-    29: ("hexahedron", 27),
-    30: ("quadrilateral", 6),
-    31: ("wedge", 12),
-    32: ("wedge", 18),
-    33: ("hexahedron", 24),
-    34: ("triangle", 7),
-    35: ("line", 4),
-    42: ("polyhedron", None),
-    # Lagrange and Bezier cells of any order.
-    **{
-        first + place: (kind, None)
-        for first in (68, 75)
-        for place, kind in enumerate(
-            ("line", "triangle", "quadrilateral", "tetrahedron", "hexahedron", "wedge", "pyramid")
-        )
-    },
-}
-# Pixels and voxels number their nodes along x, then y, then z.
-_PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
-
-# More values than these are a quantity, not a choice of regions.
-_MOST_VALUES = 64
-
-# Arrays of numbers and marks that VTK and ParaView keep for themselves.
-_NO_GROUPS = {
-    *("vtkoriginalpointids", "vtkoriginalcellids", "vtkghosttype", "vtkghostlevels", "vtkvalidpointmask"),
-    *("globalnodeid", "globalnodeids", "globalelementid", "globalelementids", "globalpointids", "globalcellids"),
-    *("pedigreenodeid", "pedigreeelementid", "pointids", "cellids", "offset"),
-}
-
-
-class Grid(NamedTuple):
-    """An unstructured grid, whose points and cells are numbered from 0.
-
-    Attributes:
-        points: shape (n_points, 3).
-        offsets: where each cell begins in `connectivity`, and the end of the last one, shape (n_cells + 1,).
-        connectivity: the points of all cells.
-        types: VTK's numbers of the cell types, shape (n_cells,).
-        point_arrays, cell_arrays: by name, a row for each point or cell.
-    """
-
-    points: Floats
-    offsets: Ints
-    connectivity: Ints
-    types: Ints
-    point_arrays: Arrays
-    cell_arrays: Arrays
-
-
-def contents(grid: Grid) -> Contents:
-    """Return the contents of a grid; raise MeshError where its cells are not whole."""
-    points, offsets, connectivity, types, point_arrays, cell_arrays = grid
-    if len(offsets) != len(types) + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
-        raise MeshError(f"{len(offsets)} offsets do not belong to {len(types)} cells, or do not ascend from 0")
-    if offsets[-1] != len(connectivity):
-        raise MeshError(f"the cells have {offsets[-1]} nodes by their offsets, {len(connectivity)} are listed")
-    cells = [_cells(block, offsets, connectivity, int(types[block[0]])) for block in _blocks(types, np.diff(offsets))]
-    return Contents(
-        node_numbers=np.arange(len(points)),
-        points=points,
-        cells=cells,
-        node_groups={
-            name: np.flatnonzero(values)
-            for name, values in _choices(point_arrays)
-            if values.min() == 0 and values.max() == 1
-        },
-        cell_groups=_cell_groups(cells, cell_arrays),
-    )
-
-
-def _blocks(types: Ints, sizes: Ints) -> list[Ints]:
-    """Return the numbers of the cells that have one type and one number of nodes."""
-    _, kind = np.unique(np.stack([types, sizes], axis=1), axis=0, return_inverse=True)
-    order = np.argsort(kind.ravel(), kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(kind.ravel()[order])) + 1) if len(order) else []
-
-
-def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cells:
-    first = numbers[0]
-    if type_ not in _TYPES:
-        raise MeshError(f"cell {first}: VTK's cell type {type_} is not supported")
-    kind, wanted = _TYPES[type_]
-    n_nodes = int(offsets[first + 1] - offsets[first])
-    if n_nodes != wanted and (wanted is not None or n_nodes < CELL_KINDS[kind][1]):
-        raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
-    nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
-    order = {8: _PIXEL, 11: _VOXEL}.get(type_)
-    return Cells(kind, nodes if order is None else nodes[:, order], numbers)
-
-
-def _choices(arrays: Arrays) -> list[tuple[str, NDArray[Any]]]:
-    """Return the arrays that may name groups: of whole numbers, one a row, and not VTK's own."""
-    return [
-        (name, values.ravel())
-        for name, values in arrays.items()
-        if values.dtype.kind in "iub" and values.size and values.size == len(values) and name.lower() not in _NO_GROUPS
-    ]
-
-
-def _cell_groups(cells: Sequence[Cells], arrays: Arrays) -> dict[str, Ints]:
-    dims = np.zeros(sum(len(block.numbers) for block in cells), dtype=np.int64)
-    for block in cells:
-        dims[block.numbers] = block.dim
-    groups = {}
-    for name, values in _choices(arrays):
-        distinct = np.unique(values)
-        for value in distinct if len(distinct) <= _MOST_VALUES else []:
-            members = np.flatnonzero(values == value)
-            groups[f"{name}-{int(value)}"] = members[dims[members] == dims[members].max()]
-    return groups
-
-
-# --- the legacy format ----------------------------------------------------------------------------
+from truespring.mesh.files.vtk_grid import Arrays, Grid
+from truespring.mesh.files.vtk_shapes import Lists, faces, lattice, lattice_points
 
 # The type of an array and numpy's name of it.
 _BIT = "b1"
@@ -170,13 +28,12 @@ _CODES = {
 }
 
 
-def read_vtk(data: bytes) -> Contents:
-    """Read a legacy .vtk file; raise MeshError where it is damaged or no unstructured grid."""
-    return contents(read_legacy_grid(data))
+_FACES = {"VERTICES": "verts", "LINES": "lines", "POLYGONS": "polys", "TRIANGLE_STRIPS": "strips"}
+_COORDINATES = ("X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES")
 
 
 def read_legacy_grid(data: bytes) -> Grid:
-    """Read a legacy .vtk file with its arrays; raise MeshError where it is damaged or no unstructured grid."""
+    """Read a legacy .vtk file with its arrays; raise MeshError where it is damaged or holds no grid."""
     head = re.match(
         rb"# vtk DataFile Version\s+(\d+)\.\d+[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)[ \t\r]*\n",
         data,
@@ -184,24 +41,30 @@ def read_legacy_grid(data: bytes) -> Grid:
     )
     if head is None:
         raise MeshError("this is no .vtk file: it begins with # vtk DataFile Version, title, ASCII or BINARY, DATASET")
-    if head[3].upper() != b"UNSTRUCTURED_GRID":
-        raise MeshError(f"DATASET {word(head[3])} is not read, UNSTRUCTURED_GRID is")
+    data_set = head[3].decode().upper()
+    if data_set not in _MADE:
+        raise MeshError(
+            f"DATASET {word(head[3])} is not read; {', '.join(_MADE)} are: in ParaView, Append Datasets and save it "
+            "as .vtu"
+        )
     is_text = head[2].upper() == b"ASCII"
     if is_text and not data[-1:].isspace():
         raise MeshError("the last line has no line end: is the file cut off? If it is whole, add one")
     cursor = _Cursor(data, head.end(), is_text)
-    grid: dict[str, NDArray[Any]] = {}
+    grid: dict[str, Any] = {}
     arrays: dict[str, dict[str, NDArray[Any]]] = {"POINT_DATA": {}, "CELL_DATA": {}, "": {}}
-    active, n_rows = "", 0  # whose arrays follow, and how many rows they have
+    active: str = ""
+    n_rows = 0  # whose arrays follow, and how many rows they have
     while fields := cursor.fields():
         match [fields[0].upper(), *fields[1:]]:
             case ["POINTS", count, kind]:
                 grid["points"] = cursor.array(kind, cursor.count(count), 3)
-            case ["CELLS", n_cells, size] if int(head[1]) < 5:
-                grid["offsets"], grid["connectivity"] = cursor.cells(cursor.count(n_cells), cursor.count(size))
-            case ["CELLS", n_offsets, size]:
-                grid["offsets"] = cursor.headed_array("OFFSETS", cursor.count(n_offsets))
-                grid["connectivity"] = cursor.headed_array("CONNECTIVITY", cursor.count(size))
+            case ["CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" as cells, count, size]:
+                grid[_FACES.get(cells, "cells")] = cursor.lists(cells, count, size, is_old=int(head[1]) < 5)
+            case ["DIMENSIONS", *dims] if len(dims) == 3:
+                grid["dims"] = [cursor.count(text) for text in dims]
+            case ["X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES" as axis, count, kind]:
+                grid[axis] = cursor.array(kind, cursor.count(count))
             case ["CELL_TYPES", count]:
                 grid["types"] = cursor.array("int", cursor.count(count))
             case ["POINT_DATA" | "CELL_DATA" as active, count]:
@@ -230,14 +93,37 @@ def read_legacy_grid(data: bytes) -> Grid:
                 cursor.skip_metadata()
             case _:
                 cursor.refuse(f"'{' '.join(fields)[:40]}' is no keyword that is read here, or lacks its counts")
-    for name in ("points", "offsets", "connectivity", "types"):
+    if data_set == "RECTILINEAR_GRID" and all(name in grid for name in _COORDINATES):
+        grid["points"] = lattice_points([grid[name] for name in _COORDINATES])
+    for name in _MADE[data_set]:
         if name not in grid:
-            raise MeshError(f"there are no {name} of {'points' if name == 'points' else 'cells'}: is the file cut off?")
-    for what, there in (("POINT_DATA", len(grid["points"])), ("CELL_DATA", len(grid["types"]))):
-        for name, values in arrays[what].items():
+            raise MeshError(f"there are no {name}: is the file cut off?")
+    made = _made(data_set, grid, arrays["POINT_DATA"], arrays["CELL_DATA"])
+    for what, there in (("POINT_DATA", len(made.points)), ("CELL_DATA", len(made.types))):
+        for name, values in (made.point_arrays if what == "POINT_DATA" else made.cell_arrays).items():
             if len(values) != there:
                 raise MeshError(f"array '{name}' of {what} has {len(values)} rows, wanted are {there}")
-    return Grid(**grid, point_arrays=arrays["POINT_DATA"], cell_arrays=arrays["CELL_DATA"])
+    return made
+
+
+# What each kind of data set has at least.
+_MADE = {
+    "UNSTRUCTURED_GRID": ("points", "cells", "types"),
+    "STRUCTURED_GRID": ("points", "dims"),
+    "RECTILINEAR_GRID": ("points", "dims"),
+    "POLYDATA": ("points",),
+}
+
+
+def _made(data_set: str, grid: dict[str, Any], point_arrays: Arrays, cell_arrays: Arrays) -> Grid:
+    """Return the grid of what a file holds, of any kind of data set."""
+    points = grid["points"].astype(np.float64)
+    if data_set in ("STRUCTURED_GRID", "RECTILINEAR_GRID"):
+        return lattice(grid["dims"], points, point_arrays, cell_arrays)
+    if data_set == "UNSTRUCTURED_GRID":
+        offsets, connectivity = grid["cells"]
+        return Grid(points, offsets, connectivity, grid["types"].astype(np.int64), point_arrays, cell_arrays)
+    return faces(points, {name: grid[name] for name in _FACES.values() if name in grid}, point_arrays, cell_arrays)
 
 
 class _Cursor:
@@ -312,24 +198,30 @@ class _Cursor:
             return np.unpackbits(np.frombuffer(raw, np.uint8), count=count).astype(bool)
         return np.frombuffer(raw, dtype).astype(dtype.newbyteorder("="))
 
-    def headed_array(self, name: str, count: int) -> Ints:
+    def _headed_array(self, name: str, count: int) -> Ints:
         """Return an array that its own line heads: its name and type."""
         fields = self.fields()
         if len(fields) != 2 or fields[0].upper() != name or _CODES.get(fields[1].lower(), "f").startswith("f"):
             self.refuse(f"{name} and a type of integers are wanted here, not '{' '.join(fields)[:40]}'")
         return self.array(fields[1], count).astype(np.int64)
 
-    def cells(self, n_cells: int, size: int) -> tuple[Ints, Ints]:
-        """Return offsets and connectivity of cells before version 5: each a number of nodes and these."""
+    def lists(self, what: str, count: str, size: str, is_old: bool) -> Lists:
+        """Return cells: before version 5 each a number of points and these, later offsets and connectivity."""
+        if is_old:
+            return self._old_lists(what, self.count(count), self.count(size))
+        offsets = self._headed_array("OFFSETS", self.count(count))
+        return Lists(offsets, self._headed_array("CONNECTIVITY", self.count(size)))
+
+    def _old_lists(self, what: str, n_cells: int, size: int) -> Lists:
         flat = self.array("int", size).tolist()
         heads, place = [], 0
         while place < len(flat) and flat[place] >= 0:
             heads.append(place)
             place += 1 + flat[place]
         if len(heads) != n_cells or place != len(flat):
-            self.refuse(f"CELLS announces {n_cells} cells in {size} numbers, these hold {len(heads)}")
+            self.refuse(f"{what} announces {n_cells} cells in {size} numbers, these hold {len(heads)}")
         values = np.array(flat, dtype=np.int64)
-        return np.concatenate([[0], np.cumsum(values[heads])]), np.delete(values, heads)
+        return Lists(np.concatenate([[0], np.cumsum(values[heads])]).astype(np.int64), np.delete(values, heads))
 
     def field(self, count: int) -> Iterator[tuple[str, NDArray[Any]]]:
         """Yield the name and values of each array of a FIELD."""

@@ -1,4 +1,4 @@
-"""VTK's XML files of unstructured grids, .vtu: text, base64 and raw, plain or compressed by zlib or LZMA.
+"""VTK's XML files, .vtu, .vtp, .vts and .vtr: text, base64 and raw, plain or compressed by zlib or LZMA.
 
 Source: "VTK XML Formats", https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html
 """
@@ -6,9 +6,8 @@ Source: "VTK XML Formats", https://docs.vtk.org/en/latest/vtk_file_formats/vtkxm
 import base64
 import binascii
 import itertools
-import lzma
+import math
 import re
-import zlib
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 from xml.etree import ElementTree
@@ -16,10 +15,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from truespring.arrays import Ints
+from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.files.contents import Contents
-from truespring.mesh.files.vtk import Grid, contents
+from truespring.mesh.files.inflate import inflated, refuse_too_large
+from truespring.mesh.files.vtk_grid import Grid
+from truespring.mesh.files.vtk_shapes import Lists, faces, lattice, lattice_points
 
 _CODES = {
     **{"Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8"},
@@ -27,42 +27,53 @@ _CODES = {
     **{"Float32": "f4", "Float64": "f8"},
 }
 _T = TypeVar("_T")
+_SECTIONS = ("Verts", "Lines", "Polys", "Strips")
 _ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _HEADERS = {"UInt32": "u4", "UInt64": "u8"}
-_DECOMPRESS: dict[str, Callable[[bytes | memoryview], bytes]] = {
-    "vtkZLibDataCompressor": zlib.decompress,
-    "vtkLZMADataCompressor": lzma.decompress,
-}
+_METHODS = {"vtkZLibDataCompressor": "zlib", "vtkLZMADataCompressor": "lzma"}
 
 
-def read_vtu(data: bytes) -> Contents:
-    """Read a .vtu file; raise MeshError where it is damaged, in several pieces or compressed in another way."""
-    return contents(read_grid(data))
+def read_grids(data: bytes, kind: str | None = None) -> list[Grid]:
+    """Return the pieces of a file, of whatever kind of GRIDS it is, or of the one that is wanted.
+
+    Raises MeshError where it is damaged, another, or compressed in another way.
+    """
+    root = root_of(data)
+    told = root.get("type", "")
+    root, reader = open_vtk(data, kind or told)
+    return [reader.grid(piece, told) for piece in root.iterfind(f"{told}/Piece")]
 
 
-def read_grid(data: bytes) -> Grid:
-    """Read a .vtu file with its arrays; raise MeshError as `read_vtu`."""
-    root, reader = open_vtk(data, "UnstructuredGrid")
-    grid = root.find("UnstructuredGrid")
-    assert grid is not None  # open_vtk has looked
-    pieces = [piece for piece in grid.iter("Piece") if piece.get("NumberOfPoints") != "0"]
-    if len(pieces) != 1:
-        raise MeshError(f"there are {len(pieces)} pieces: merge them into one grid")
-    return reader.grid(pieces[0])
+def root_of(data: bytes) -> ElementTree.Element:
+    """Return the XML of a VTK file without what is appended, which may be raw; raise MeshError where it is none."""
+    tag, end = _appended(data)
+    text = data[: tag.end()] + data[end:] if tag else data
+    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
+        raise MeshError("this is no file of VTK's XML: it declares entities")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
+    if root.tag != "VTKFile":
+        raise MeshError(f"this is no file of VTK's XML: a VTKFile is wanted, not {root.tag[:40]}")
+    return root
 
 
-def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
-    """Return the XML of a VTK file of a kind, and what reads its arrays; raise MeshError where it is none."""
+def _appended(data: bytes) -> tuple[re.Match[bytes] | None, int]:
+    """Return the tag before what is appended, None where there is none, and where that ends."""
     tag = re.search(rb"<AppendedData[^>]*>", data)
     end = data.rfind(b"</AppendedData>")
     if tag and end < tag.end():
         raise MeshError("<AppendedData> has no end: the file is cut off")
-    try:  # what is appended may be raw, which is no XML
-        root = ElementTree.fromstring(data[: tag.end()] + data[end:] if tag else data)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
-    if root.tag != "VTKFile" or root.find(kind) is None:
-        raise MeshError(f"a VTKFile of type {kind} is wanted, not {root.tag[:40]} of type {root.get('type')}")
+    return tag, end
+
+
+def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
+    """Return the XML of a VTK file of a kind, and what reads its arrays; raise MeshError where it is none."""
+    root = root_of(data)
+    if root.find(kind) is None:
+        raise MeshError(f"a VTKFile of type {kind} is wanted, not of type {root.get('type', 'none')[:40]}")
+    tag, end = _appended(data)
     if tag is None:
         return root, Reader(root, memoryview(b""))
     begin = tag.end() + 1  # it begins with an underscore, maybe behind blanks
@@ -77,48 +88,105 @@ class Reader:
     def __init__(self, root: ElementTree.Element, appended: memoryview) -> None:
         self._order = _choice(root, "byte_order", _ORDERS, "LittleEndian")
         self._header = np.dtype(self._order + _choice(root, "header_type", _HEADERS, "UInt32"))
-        self._decompress = _choice(root, "compressor", _DECOMPRESS) if "compressor" in root.attrib else None
+        self._method = _choice(root, "compressor", _METHODS) if "compressor" in root.attrib else None
         section = root.find("AppendedData")
         self._is_raw = section is not None and section.get("encoding") == "raw"
         self._appended = appended
+        self._n_bytes = 0  # of what was inflated so far
 
-    def grid(self, piece: ElementTree.Element) -> Grid:
-        """Return what a piece holds."""
+    def grid(self, piece: ElementTree.Element, kind: str) -> Grid:
+        """Return what a piece of a kind of GRIDS holds."""
+        return GRIDS[kind](self, piece)
+
+    def unstructured(self, piece: ElementTree.Element) -> Grid:
+        """Return a piece of an UnstructuredGrid."""
         n_points, n_cells = (_count(piece, name) for name in ("NumberOfPoints", "NumberOfCells"))
-        points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 0)))
-        if points.shape != (n_points, 3):
-            raise MeshError(f"<Points> holds an array of shape {points.shape}, wanted is ({n_points}, 3)")
-        cells = self.arrays(piece, "Cells", None)
-        connectivity, ends, types = (_integers(cells, name) for name in ("connectivity", "offsets", "types"))
-        if len(ends) != n_cells:
-            raise MeshError(f"{n_cells} cells are announced, there are {len(ends)} offsets")
+        offsets, connectivity = self._lists(piece, "Cells", n_cells)
         return Grid(
-            points.astype(np.float64),
-            np.concatenate([[0], ends]),
+            self._points(piece, n_points),
+            offsets,
             connectivity,
-            types,
+            self._integers(piece, "Cells", "types", n_cells) if n_cells else np.zeros(0, dtype=np.int64),
             self.arrays(piece, "PointData", n_points),
             self.arrays(piece, "CellData", n_cells),
         )
 
-    def arrays(self, piece: ElementTree.Element, section: str, n_rows: int | None) -> dict[str, NDArray[Any]]:
+    def poly(self, piece: ElementTree.Element) -> Grid:
+        """Return a piece of PolyData."""
+        n_points = _count(piece, "NumberOfPoints")
+        counts = {section.lower(): _count(piece, f"NumberOf{section}", "0") for section in _SECTIONS}
+        lists = {name: self._lists(piece, name.capitalize(), count) for name, count in counts.items() if count}
+        cells = self.arrays(piece, "CellData", sum(counts.values()))
+        return faces(self._points(piece, n_points), lists, self.arrays(piece, "PointData", n_points), cells)
+
+    def structured(self, piece: ElementTree.Element) -> Grid:
+        """Return a piece of a StructuredGrid."""
+        dims = dims_of(piece)
+        return self._lattice(piece, dims, self._points(piece, math.prod(dims)))
+
+    def rectilinear(self, piece: ElementTree.Element) -> Grid:
+        """Return a piece of a RectilinearGrid."""
+        dims = dims_of(piece)
+        elements = piece.findall("Coordinates/DataArray")
+        if len(elements) != 3:
+            raise MeshError(f"<Coordinates> has {len(elements)} arrays: three are wanted")
+        axes = [self._array(one, "Coordinates", count) for one, count in zip(elements, dims, strict=True)]
+        return self._lattice(piece, dims, lattice_points([axis.ravel().astype(np.float64) for axis in axes]))
+
+    def _lattice(self, piece: ElementTree.Element, dims: list[int], points: Floats) -> Grid:
+        n_cells = math.prod(max(count - 1, 1) for count in dims)
+        cells = self.arrays(piece, "CellData", n_cells)
+        return lattice(dims, points, self.arrays(piece, "PointData", math.prod(dims)), cells)
+
+    def _points(self, piece: ElementTree.Element, n_points: int) -> Floats:
+        points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 3)))
+        if points.shape != (n_points, 3):
+            raise MeshError(f"<Points> holds an array of shape {points.shape}, wanted is ({n_points}, 3)")
+        return points.astype(np.float64)
+
+    def _lists(self, piece: ElementTree.Element, section: str, n_cells: int) -> Lists:
+        """Return offsets and connectivity of a section."""
+        if not n_cells:
+            return Lists(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        ends = self._integers(piece, section, "offsets", n_cells)
+        if len(ends) != n_cells:
+            raise MeshError(f"{n_cells} cells are announced, there are {len(ends)} offsets")
+        return Lists(np.concatenate([[0], ends]), self._integers(piece, section, "connectivity", int(ends[-1])))
+
+    def _integers(self, piece: ElementTree.Element, section: str, name: str, n_values: int) -> Ints:
+        for element in piece.iterfind(f"{section}/DataArray"):
+            if element.get("Name") == name and _CODES.get(element.get("type", ""), "f")[0] in "iu":
+                values = self._array(element, section, n_values)
+                if values.ndim == 1:
+                    return values.astype(np.int64)
+        raise MeshError(f"<{section}> has no array '{name}' of integers")
+
+    def arrays(self, piece: ElementTree.Element, section: str, n_rows: int) -> dict[str, NDArray[Any]]:
         """Return the arrays of a section by name, shape (n_rows,) or (n_rows, components); texts are passed over."""
         arrays = {}
-        for element in piece.findall(f"{section}/DataArray"):
-            name, code = element.get("Name", section), _CODES.get(element.get("type", ""))
-            if code is None:
+        for element in piece.iterfind(f"{section}/DataArray"):
+            name = element.get("Name", section)
+            if element.get("type", "") not in _CODES:
                 continue
-            try:
-                values = self._values(element, code)
-                n_components = int(element.get("NumberOfComponents") or 1)
-                arrays[name] = values if n_components == 1 else values.reshape(-1, n_components)
-            except (ValueError, OverflowError, binascii.Error, zlib.error, lzma.LZMAError) as error:
-                raise MeshError(f"array '{name}' of <{section}> is damaged: {error}") from None
-            if n_rows is not None and len(arrays[name]) != n_rows:
+            arrays[name] = self._array(element, section, n_rows)
+            if len(arrays[name]) != n_rows:
                 raise MeshError(f"array '{name}' of <{section}> has {len(arrays[name])} rows, wanted are {n_rows}")
         return arrays
 
-    def _values(self, element: ElementTree.Element, code: str) -> NDArray[Any]:
+    def _array(self, element: ElementTree.Element, section: str, n_rows: int) -> NDArray[Any]:
+        """Return an array, whose rows its reader counts; compressed ones must have as many as are wanted."""
+        try:
+            code = _CODES.get(element.get("type", ""))
+            if code is None:
+                raise ValueError(f"its type is '{element.get('type', '')[:20]}'")
+            n_components = int(element.get("NumberOfComponents") or 1)
+            values = self._values(element, code, n_rows * n_components)
+            return values if n_components == 1 else values.reshape(-1, n_components)
+        except (ValueError, OverflowError, binascii.Error) as error:
+            name = element.get("Name", section)
+            raise MeshError(f"array '{name}' of <{section}> is damaged: {error}") from None
+
+    def _values(self, element: ElementTree.Element, code: str, n_values: int) -> NDArray[Any]:
         """Return the values of an array; raise ValueError or what decoding raises."""
         text = (element.text or "").split()
         match element.get("format", "ascii"):
@@ -127,28 +195,40 @@ class Reader:
             case "ascii":
                 return np.array([int(word) for word in text], dtype=np.int64)
             case "binary":
-                data = self._bytes(memoryview("".join(text).encode()), is_raw=False)
+                data = self._bytes(memoryview("".join(text).encode()), False, n_values * np.dtype(code).itemsize)
             case "appended":
-                data = self._bytes(self._appended[int(element.get("offset", "")) :], self._is_raw)
+                begin = int(element.get("offset", ""))
+                if not 0 <= begin <= len(self._appended):
+                    raise ValueError(f"offset {begin} lies outside of what is appended")
+                data = self._bytes(self._appended[begin:], self._is_raw, n_values * np.dtype(code).itemsize)
             case other:
                 raise ValueError(f"format {other[:40]} is not read")
         return np.frombuffer(data, np.dtype(self._order + code))
 
-    def _bytes(self, coded: memoryview, is_raw: bool) -> bytes | memoryview:
-        """Return the data that `coded` begins with: behind a header, base64 or raw, in compressed blocks or not."""
+    def _bytes(self, coded: memoryview, is_raw: bool, wanted: int) -> bytes | memoryview:
+        """Return the data that `coded` begins with: behind a header, base64 or raw, in compressed blocks or not.
+
+        Compressed data must have the bytes that are wanted, by their header, before they are inflated.
+        """
         size = self._header.itemsize
         (count,) = self._sizes(coded, 1, is_raw)
-        if self._decompress is None:
+        if self._method is None:
             head_alone, rest = _split(coded, size, is_raw)
             if is_raw or coded[: _length(size)].tobytes().endswith(b"="):
                 return _split(rest, count, is_raw)[0]
             return _split(coded, size + count, is_raw)[0][len(head_alone) :]  # header and data are coded as one
         if count == 0:
             return b""
-        compressed = self._sizes(coded, 3 + count, is_raw)[3:]  # before: how many, and how large when they are not
+        _, block, last, *compressed = self._sizes(coded, 3 + count, is_raw)
+        sizes = [block] * (count - 1) + [last or block]  # of the blocks when they are inflated
+        if sum(sizes) != wanted:
+            raise ValueError(f"its header tells {sum(sizes)} bytes, wanted are {wanted}")
+        self._n_bytes += wanted
+        refuse_too_large(self._n_bytes)
         data = _split(_split(coded, (3 + count) * size, is_raw)[1], sum(compressed), is_raw)[0]
         ends = np.cumsum([0, *compressed]).tolist()
-        return b"".join(self._decompress(data[begin:end]) for begin, end in itertools.pairwise(ends))
+        parts = zip(itertools.pairwise(ends), sizes, strict=True)
+        return b"".join(inflated(data[begin:end], size, self._method) for (begin, end), size in parts)
 
     def _sizes(self, coded: memoryview, count: int, is_raw: bool) -> list[int]:
         """Return the first words of a header."""
@@ -170,14 +250,29 @@ def _length(size: int) -> int:
     return 4 * -(-size // 3)
 
 
-def _integers(cells: Mapping[str, NDArray[Any]], name: str) -> Ints:
-    if name not in cells or cells[name].dtype.kind not in "iu" or cells[name].ndim != 1:
-        raise MeshError(f"<Cells> has no array '{name}' of integers")
-    return cells[name].astype(np.int64)
+#: By the type of the file: what reads a piece.
+GRIDS: dict[str, Callable[[Reader, ElementTree.Element], Grid]] = {
+    "UnstructuredGrid": Reader.unstructured,
+    "PolyData": Reader.poly,
+    "StructuredGrid": Reader.structured,
+    "RectilinearGrid": Reader.rectilinear,
+}
 
 
-def _count(piece: ElementTree.Element, name: str) -> int:
+def dims_of(piece: ElementTree.Element, name: str = "Extent") -> list[int]:
+    """Return the numbers of points along the axes of a piece of a lattice."""
     text = piece.get(name, "")
+    if not re.fullmatch(r"\s*(-?[0-9]{1,9}\s+){5}-?[0-9]{1,9}\s*", text):
+        raise MeshError(f'{piece.tag} has {name}="{text[:40]}": six whole numbers are wanted')
+    ends = [int(word) for word in text.split()]
+    dims = [high - low + 1 for low, high in zip(ends[::2], ends[1::2], strict=True)]
+    if min(dims) < 1:
+        raise MeshError(f'{piece.tag} has {name}="{text[:40]}": an axis has no point')
+    return dims
+
+
+def _count(piece: ElementTree.Element, name: str, default: str = "") -> int:
+    text = piece.get(name, default)
     if not re.fullmatch(r"\s*[0-9]{1,18}\s*", text):
         raise MeshError(f'a Piece has {name}="{text[:40]}"')
     return int(text)

@@ -1,0 +1,122 @@
+"""Label images, whatever their format: numbers of voxels in their places, and the names of segments."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats
+from truespring.errors import MeshError, nearest
+
+# Labels beside which a list of all of them is of no help.
+_MANY = 30
+
+# Axes whose directions have a cosine beyond the first are taken as upright on each other, and that is told: headers
+# round. Beyond the second the image is sheared.
+_UPRIGHT, _SHEARED = 1e-5, 1e-2
+
+
+class Segment(NamedTuple):
+    """A segment that an image names: its label in one of the image's layers."""
+
+    name: str
+    layer: int
+    value: int
+
+
+class Labels(NamedTuple):
+    """A label image: whole numbers, each that of a cuboid about its place.
+
+    Attributes:
+        values: the labels, shape (nx, ny, nz), of several layers (nx, ny, nz, n_layers).
+        spacing: of the places along each axis, in the file's unit, shape (3,).
+        origin: the place of the first one, shape (3,).
+        direction: the axes of the image in space, as columns, shape (3, 3).
+        segments: those that the image names.
+        notes: what should be known of the image, in words.
+    """
+
+    values: np.ndarray[Any, Any]
+    spacing: Floats
+    origin: Floats
+    direction: Floats
+    segments: tuple[Segment, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def inside(self, label: int | str) -> Bools:
+        """Return which voxels have a label or are of a segment, shape (nx, ny, nz).
+
+        Raises MeshError with what is there where none is, or the label stands in several layers.
+        """
+        layer, value = self._named(label) if isinstance(label, str) else self._numbered(label)
+        found = np.asarray((self.values if self.values.ndim == 3 else self.values[..., layer]) == value)
+        if not found.any():
+            raise MeshError(f"no voxel has the label {label!r}; there are {self._told()}")
+        return found
+
+    def _named(self, name: str) -> tuple[int, int]:
+        exact = [one for one in self.segments if one.name == name]
+        same = exact or [one for one in self.segments if one.name.casefold() == name.casefold()]
+        if len({(one.layer, one.value) for one in same}) > 1:
+            raise MeshError(f"{len(same)} segments are called '{name}': take its label; there are {self._told()}")
+        if not same:
+            known = [one.name for one in self.segments]
+            why = nearest(name, known) if known else ", for the image has no names"
+            raise MeshError(f"there is no segment '{name}'{why}; there are {self._told()}")
+        return same[0].layer, same[0].value
+
+    def _numbered(self, value: int) -> tuple[int, int]:
+        if self.values.ndim == 3 or self.values.shape[3] == 1:
+            return 0, value
+        layers = [layer for layer in range(self.values.shape[3]) if (self.values[..., layer] == value).any()]
+        if len(layers) > 1:
+            raise MeshError(
+                f"the label {value} stands in {len(layers)} of {self.values.shape[3]} layers: name the segment, as "
+                f'label = "{self.segments[0].name if self.segments else "liver"}"; there are {self._told()}'
+            )
+        return (layers or [0])[0], value
+
+    def _told(self) -> str:
+        if self.segments:
+            told = [f"{one.value} ('{one.name[:40]}')" for one in self.segments]
+        else:
+            told = [str(value) for value in np.unique(self.values).tolist()]
+        return ", ".join(told[:_MANY]) + (", ..." if len(told) > _MANY else "")
+
+
+def checked(labels: Labels) -> Labels:
+    """Return labels that are whole numbers, on axes that stand upright on each other; raise MeshError."""
+    values = labels.values
+    if values.ndim == 4 and labels.segments and max(one.layer for one in labels.segments) >= values.shape[3]:
+        raise MeshError(f"a segment stands in a layer that is not there: there are {values.shape[3]}")
+    if values.ndim not in (3, 4) or not values.size:
+        raise MeshError(f"the image has shape {values.shape}: three axes are wanted, none of them empty")
+    if values.dtype.kind == "f":
+        whole = np.isfinite(values).all() and (values == np.rint(values)).all() and (np.abs(values) < 2**53).all()
+        if not whole:
+            raise MeshError("the image holds fractions, not labels: it was blurred or interpolated; segment it first")
+        values = values.astype(np.int64)
+    elif values.dtype.kind not in "iub":
+        raise MeshError(f"the image holds {values.dtype}: integers are wanted, one label a voxel")
+    if not (np.isfinite(labels.spacing).all() and (labels.spacing > 0).all()):
+        raise MeshError(f"spacing = {labels.spacing.tolist()}: each must be positive")
+    if not np.isfinite(labels.origin).all():
+        raise MeshError(f"origin = {labels.origin.tolist()}: a finite place is wanted")
+    return _upright(labels._replace(values=values))
+
+
+def _upright(labels: Labels) -> Labels:
+    """Return labels with the orthonormal axes nearest to theirs: the polar factor of the directions."""
+    cosines = labels.direction.T @ labels.direction - np.eye(3)
+    off = float(np.abs(cosines).max()) if np.isfinite(cosines).all() else np.inf
+    if off > _SHEARED:
+        raise MeshError(
+            f"the axes of the image do not stand upright on each other: the cosine between two is {off:.2g}, up to "
+            f"{_SHEARED:g} is taken; a sheared image has no cubes: resample it onto upright axes (3D Slicer: Resample "
+            "Scalar/Vector/DWI Volume, by nearest neighbour)"
+        )
+    left, _, right = np.linalg.svd(labels.direction)
+    told = (
+        f"the axes of the image are off from upright, the cosine between two is {off:.2g}: the nearest upright ones "
+        "were taken"
+    )
+    return labels._replace(direction=left @ right, notes=(*labels.notes, *([told] if off > _UPRIGHT else [])))

@@ -1,0 +1,159 @@
+"""VTK's grids, whatever file they come from, and the cells and groups of a mesh that follow from them.
+
+Source: "VTK File Formats", https://docs.vtk.org/en/latest/vtk_file_formats/
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.arrays import Floats, Ints
+from truespring.errors import MeshError
+from truespring.mesh.files.contents import CELL_KINDS, Cells, Contents
+
+Arrays = Mapping[str, NDArray[Any]]
+
+# VTK's number of a cell type: its kind and the number of its nodes, None where that varies.
+_TYPES: dict[int, tuple[str, int | None]] = {
+    1: ("vertex", 1),
+    2: ("vertex", None),
+    3: ("line", 2),
+    4: ("line", None),
+    5: ("triangle", 3),
+    6: ("triangle strip", None),
+    7: ("polygon", None),
+    8: ("quadrilateral", 4),  # pixel
+    9: ("quadrilateral", 4),
+    10: ("tetrahedron", 4),
+    11: ("hexahedron", 8),  # voxel
+    12: ("hexahedron", 8),
+    13: ("wedge", 6),
+    14: ("pyramid", 5),
+    15: ("prism", 10),
+    16: ("prism", 12),
+    21: ("line", 3),
+    22: ("triangle", 6),
+    23: ("quadrilateral", 8),
+    24: ("tetrahedron", 10),
+    25: ("hexahedron", 20),
+    26: ("wedge", 15),
+    27: ("pyramid", 13),
+    28: ("quadrilateral", 9),
+    29: ("hexahedron", 27),
+    30: ("quadrilateral", 6),
+    31: ("wedge", 12),
+    32: ("wedge", 18),
+    33: ("hexahedron", 24),
+    34: ("triangle", 7),
+    35: ("line", 4),
+    42: ("polyhedron", None),
+    # Lagrange and Bezier cells of any order.
+    **{
+        first + place: (kind, None)
+        for first in (68, 75)
+        for place, kind in enumerate(
+            ("line", "triangle", "quadrilateral", "tetrahedron", "hexahedron", "wedge", "pyramid")
+        )
+    },
+}
+# Pixels and voxels number their nodes along x, then y, then z.
+_PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
+# The first triangle of VTK's linear wedge goes round as seen from outside, ours as seen from inside.
+_WEDGE = (0, 2, 1, 3, 5, 4)
+
+# More values than these are a quantity, not a choice of regions.
+_MOST_VALUES = 64
+
+# Arrays of numbers and marks that VTK and ParaView keep for themselves.
+_NO_GROUPS = {
+    *("vtkoriginalpointids", "vtkoriginalcellids", "vtkghosttype", "vtkghostlevels", "vtkvalidpointmask"),
+    *("globalnodeid", "globalnodeids", "globalelementid", "globalelementids", "globalpointids", "globalcellids"),
+    *("pedigreenodeid", "pedigreeelementid", "pointids", "cellids", "offset"),
+}
+
+
+class Grid(NamedTuple):
+    """An unstructured grid, whose points and cells are numbered from 0.
+
+    Attributes:
+        points: shape (n_points, 3).
+        offsets: where each cell begins in `connectivity`, and the end of the last one, shape (n_cells + 1,).
+        connectivity: the points of all cells.
+        types: VTK's numbers of the cell types, shape (n_cells,).
+        point_arrays, cell_arrays: by name, a row for each point or cell.
+        notes: what should be known of the file, in words.
+    """
+
+    points: Floats
+    offsets: Ints
+    connectivity: Ints
+    types: Ints
+    point_arrays: Arrays
+    cell_arrays: Arrays
+    notes: tuple[str, ...] = ()
+
+
+def contents(grid: Grid) -> Contents:
+    """Return the contents of a grid; raise MeshError where its cells are not whole."""
+    points, offsets, connectivity, types, point_arrays, cell_arrays, notes = grid
+    if len(offsets) != len(types) + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
+        raise MeshError(f"{len(offsets)} offsets do not belong to {len(types)} cells, or do not ascend from 0")
+    if offsets[-1] != len(connectivity):
+        raise MeshError(f"the cells have {offsets[-1]} nodes by their offsets, {len(connectivity)} are listed")
+    cells = [_cells(block, offsets, connectivity, int(types[block[0]])) for block in _blocks(types, np.diff(offsets))]
+    return Contents(
+        node_numbers=np.arange(len(points)),
+        points=points,
+        cells=cells,
+        node_groups={
+            name: np.flatnonzero(values)
+            for name, values in _choices(point_arrays)
+            if values.min() == 0 and values.max() == 1
+        },
+        cell_groups=_cell_groups(cells, cell_arrays),
+        notes=notes,
+    )
+
+
+def _blocks(types: Ints, sizes: Ints) -> list[Ints]:
+    """Return the numbers of the cells that have one type and one number of nodes."""
+    _, kind = np.unique(np.stack([types, sizes], axis=1), axis=0, return_inverse=True)
+    order = np.argsort(kind.ravel(), kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(kind.ravel()[order])) + 1) if len(order) else []
+
+
+def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cells:
+    first = numbers[0]
+    if type_ not in _TYPES:
+        raise MeshError(f"cell {first}: VTK's cell type {type_} is not supported")
+    kind, wanted = _TYPES[type_]
+    n_nodes = int(offsets[first + 1] - offsets[first])
+    if n_nodes != wanted and (wanted is not None or n_nodes < CELL_KINDS[kind][1]):
+        raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
+    nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
+    order = {8: _PIXEL, 11: _VOXEL, 13: _WEDGE}.get(type_)
+    return Cells(kind, nodes if order is None else nodes[:, order], numbers)
+
+
+def _choices(arrays: Arrays) -> list[tuple[str, NDArray[Any]]]:
+    """Return the arrays that may name groups: of whole numbers, one a row, and not VTK's own."""
+    return [
+        (name, values.ravel())
+        for name, values in arrays.items()
+        if values.dtype.kind in "iub" and values.size and values.size == len(values) and name.lower() not in _NO_GROUPS
+    ]
+
+
+def _cell_groups(cells: Sequence[Cells], arrays: Arrays) -> dict[str, Ints]:
+    dims = np.zeros(sum(len(block.numbers) for block in cells), dtype=np.int64)
+    for block in cells:
+        dims[block.numbers] = block.dim
+    groups = {}
+    for name, values in _choices(arrays):
+        distinct = np.unique(values)
+        for value in distinct if len(distinct) <= _MOST_VALUES else []:
+            members = np.flatnonzero(values == value)
+            groups[f"{name}-{int(value)}"] = members[dims[members] == dims[members].max()]
+    return groups

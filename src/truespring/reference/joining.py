@@ -1,0 +1,55 @@
+"""Results whose cells have points of their own, joined where they stand at one place and move alike."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from truespring.mesh.joining import merged
+from truespring.reference.record import Record
+
+# Shares of the body's diameter and of the largest displacement: a vertex as several cells compute it in float32.
+_SAME_PLACE, _ALIKE = 1e-7, 1e-5
+
+
+def joined(record: Record) -> Record:
+    """Return a record whose points at one place are one, where these move alike at every level; and a note.
+
+    deal.II and discontinuous elements are written with points of their own for each cell. Where some that stand at
+    one place move apart, as the faces of a crack or of two bodies, all stay as they are.
+    """
+    used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for nodes in record.cells.values())]))
+    if not len(used) or not np.isfinite(record.points[used]).all():
+        return record
+    points = record.points[used]
+    first, number = merged(points, _SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    n_twins = len(used) - len(first)
+    if not n_twins:
+        return record
+    apart = 0.0
+    for level in record.levels:
+        moved = level.displacement[used]
+        largest = float(np.nanmax(np.abs(moved), initial=0.0)) or 1.0
+        gap = np.abs(moved - moved[first][number])
+        apart = max(apart, float(np.nanmax(gap, initial=0.0)) / largest)
+    if apart > _ALIKE:
+        note = (
+            f"{n_twins} of {len(used)} points share their place with another one and move apart, by up to "
+            f"{apart:.2g} of the largest displacement: they were not joined, and faces between them count as surface"
+        )
+        return replace(record, notes=(*record.notes, note))
+    kept = np.ones(len(record.points), dtype=bool)
+    kept[used] = False
+    kept[used[first]] = True
+    new = np.cumsum(kept) - 1
+    new[used] = new[used[first]][number]
+    return replace(
+        record,
+        points=record.points[kept],
+        cells={kind: new[nodes] for kind, nodes in record.cells.items()},
+        levels=tuple(replace(level, displacement=level.displacement[kept]) for level in record.levels),
+        names=tuple(name for name, stays in zip(record.names, kept, strict=False) if stays),
+        notes=(
+            *record.notes,
+            f"{n_twins} of {len(used)} points share their place with another one and move with it: they were joined",
+        ),
+    )

@@ -1,0 +1,131 @@
+"""A file is read as what its content is, whatever it is called."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from truespring.errors import MeshError, ReferenceFileError
+from truespring.mesh.files import FORMATS, read_mesh
+from truespring.mesh.files.heads import HEAD
+from truespring.reference import READERS, format_of, read_record
+
+DATA = Path(__file__).parent / "data"
+MESHES = {
+    ".msh": ["block_41.msh", "block_41_binary.msh", "block_22.msh"],
+    ".inp": ["beam.inp", "block.inp"],
+    ".vtu": ["block.vtu", "quads_raw.vtu"],
+    ".vtk": ["block.vtk", "block_51_binary.vtk"],
+}
+
+
+def test_every_format_of_meshes_is_recognised_by_itself_alone() -> None:
+    for suffix in FORMATS:
+        for name in MESHES.get(suffix, []):
+            data = (DATA / name).read_bytes()
+            fitting = [key for key, form in FORMATS.items() if form.recognises(data)]
+            assert fitting == [suffix] == [key for key, form in FORMATS.items() if form.recognises(data[:HEAD])]
+    assert {".msh", ".inp", ".vtu", ".vtk"} <= FORMATS.keys()
+
+
+@pytest.mark.parametrize("suffix", [*MESHES, ".txt", "", ".VTK"])
+@pytest.mark.parametrize("key", MESHES)
+def test_a_mesh_is_read_by_its_content(tmp_path: Path, key: str, suffix: str) -> None:
+    name = MESHES[key][0]
+    shutil.copyfile(DATA / name, tmp_path / f"mesh{suffix}")
+    found, wanted = read_mesh(tmp_path / f"mesh{suffix}"), read_mesh(DATA / name)
+    assert (found.nodes == wanted.nodes).all() and (found.elements == wanted.elements).all()
+    told = [note for note in found.notes if note.startswith(f"read as a {key} file")]
+    assert len(told) == (suffix.lower() != key) and [*told, *wanted.notes] == list(found.notes)
+
+
+def test_a_damaged_mesh_is_refused_as_what_its_content_is(tmp_path: Path) -> None:
+    data = (DATA / "block_41.msh").read_bytes()
+    (tmp_path / "mesh.vtk").write_bytes(data[: len(data) // 2])
+    with pytest.raises(MeshError, match=r"mesh\.vtk: line \d+: \$"):
+        read_mesh(tmp_path / "mesh.vtk")
+    (tmp_path / "mesh.vtk").write_bytes(b"nothing of the kind\n")
+    neither = r"mesh\.vtk: this is no \.vtk file.*; it does not begin as \.msh, \.inp, .* files do, either; if ParaView"
+    with pytest.raises(MeshError, match=neither):
+        read_mesh(tmp_path / "mesh.vtk")
+    (tmp_path / "mesh.obj").write_bytes(b"v 0 0 0\n")
+    both = (
+        r"a mesh file ends in \.msh, .*, not in '\.obj', and what this one begins with is none of their forms: convert"
+    )
+    with pytest.raises(MeshError, match=both):
+        read_mesh(tmp_path / "mesh.obj")
+
+
+def test_comments_may_stand_before_what_tells_the_format(tmp_path: Path) -> None:
+    for key, comment in ((".msh", "$Comments\n*NODE\n$EndComments\n"), (".inp", "** $MeshFormat\n\n** x\n" * 9000)):
+        text = comment + (DATA / MESHES[key][0]).read_text()
+        (tmp_path / "mesh.vtk").write_text(text)
+        assert read_mesh(tmp_path / "mesh.vtk").notes[0].startswith(f"read as a {key} file")
+    xml = '<?xml version="1.0"?>\n<!-- by\nsomeone -->\n' + (DATA / "quads_ascii.vtu").read_text()
+    assert FORMATS[".vtu"].recognises(xml.encode())
+    assert not FORMATS[".vtu"].recognises(b"<!-- -->" * 1000 + b"<html>")
+
+
+HEADS = {
+    ".frd": b"    1C                                                                         1\n",
+    ".dat": b"\n                        S T E P       1\n\n\n"
+    + b" displacements (vx,vy,vz) for set NALL and time  0.1E+01\n\n",
+    ".vtu": b'<?xml version="1.0"?>\n<VTKFile byte_order="LittleEndian"\n type="UnstructuredGrid" version="0.1">\n',
+    ".vtk": b"# vtk DataFile Version 3.0\n",
+    ".pvd": b'<VTKFile type="Collection" version="0.1">\n',
+    ".rst": np.array([100, 1, 12, 9], "<i4").tobytes(),
+    ".stl": b"solid body\n  facet normal 0 0 1\n",
+}
+
+
+for suffix, kind in ((".vtp", "PolyData"), (".vts", "StructuredGrid"), (".vtr", "RectilinearGrid")):
+    HEADS[suffix] = f'<VTKFile type="{kind}">\n'.encode()
+for suffix in (".vtu", ".vtp", ".vts", ".vtr"):
+    HEADS[f".p{suffix[1:]}"] = HEADS[suffix].replace(b'type="', b'type="P')
+
+
+@pytest.mark.parametrize("key", HEADS)
+def test_every_format_of_results_is_recognised_by_itself_alone(tmp_path: Path, key: str) -> None:
+    assert [known for known, form in READERS.items() if form.recognises(HEADS[key])] == [key]
+    for suffix in (*READERS, ".out"):
+        (tmp_path / f"result{suffix}").write_bytes(HEADS[key])
+        assert format_of(tmp_path / f"result{suffix}") == key
+    assert format_of(tmp_path / f"none{key.upper()}") == key and format_of(tmp_path / "none.out") is None
+
+
+@pytest.mark.parametrize("key", [key for key, form in READERS.items() if form.is_marked])
+def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -> None:
+    (tmp_path / f"result{key}").write_bytes(b"nothing of the kind\n")
+    (tmp_path / "result.inp").write_text("*NODE\n1,0,0\n2,1,0\n3,1,1\n*ELEMENT,TYPE=CPS3\n1,1,2,3\n")
+    others = [other for other in READERS if other != key]
+    with pytest.raises(ReferenceFileError, match=rf"it does not begin as {re.escape(others[0])}, .* do, either"):
+        read_record(tmp_path / f"result{key}")
+
+
+def test_a_table_is_told_by_its_suffix() -> None:
+    assert READERS.keys() - HEADS.keys() == {".csv"}
+
+
+@pytest.mark.parametrize("key", [".vtu", ".vtk", ".pvd"])
+def test_a_result_is_read_by_its_content(tmp_path: Path, key: str) -> None:
+    """SOFA's Bunny.vtk holds VTK's XML."""
+    meshio = pytest.importorskip("meshio")
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    grid = meshio.Mesh(points, [("tetra", np.array([[0, 1, 2, 3]]))], point_data={"displacement": 0.1 * points})
+    grid.write(tmp_path / "whole.vtu")
+    grid.write(tmp_path / "whole.vtk", file_format="vtk42")
+    (tmp_path / "whole.pvd").write_text(
+        '<VTKFile type="Collection"><Collection><DataSet timestep="1" file="whole.vtu"/></Collection></VTKFile>'
+    )
+    for suffix in (".vtk", ".vtu", ".frd", ".out"):
+        shutil.copyfile(tmp_path / f"whole{key}", tmp_path / f"result{suffix}")
+        record = read_record(tmp_path / f"result{suffix}")
+        assert record.kind == key[1:] and record.levels[0].displacement == pytest.approx(0.1 * points)
+        assert [note[: len("read as a ....")] for note in record.notes] == [f"read as a {key}"] * (suffix != key)
+    with pytest.raises(ReferenceFileError, match=re.escape("undeformed is not for " + key)):
+        read_record(tmp_path / "result.out", undeformed=tmp_path / "whole.vtu")
+    path = ts.read_result(tmp_path / "result.out")
+    assert path.states[-1].displacement == pytest.approx(0.1 * points)
