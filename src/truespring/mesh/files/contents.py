@@ -185,6 +185,13 @@ class Contents:
         found: dict[str, list[Ints]] = {}
         for name, given in self.facet_groups.items():
             found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
+            for block in body:  # of bricks that are something else facets are found by their corners
+                at = places(block.numbers, given[:, 0])
+                other = np.flatnonzero((at >= 0) & _collapsed(block)[at])
+                if other.size:
+                    local = np.array(ELEMENT_KINDS[block.kind].facets)[given[other, 1]]
+                    facets = np.take_along_axis(block.corners[at[other]], local, axis=1)
+                    found[name][0][other] = find_facets(elements, kind, places(nodes, self._rows(facets)))
         for block in cells:
             if block.dim == body[0].dim - 1 and self.cell_groups:
                 facets = find_facets(elements, kind, places(nodes, self._rows(block.corners)))
@@ -367,9 +374,7 @@ def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
     """
     kind = body[0].kind
     alone = len({block.kind for block in body}) == 1
-    if alone and (
-        kind not in ("hexahedron", "quadrilateral") or not any(repeats(block.corners).any() for block in body)
-    ):
+    if alone and not any(_collapsed(block).any() for block in body):
         return kind, np.concatenate([block.corners for block in body])
     table = turned(np.concatenate([block.corners[:, ELEMENT_KINDS[block.kind].merged] for block in body]))
     kinds = kinds_in(table, MIXED)
@@ -433,11 +438,18 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
 
 def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
     """Say how many elements have corners that are one."""
-    bricks = [block for block in body if block.kind in ("hexahedron", "quadrilateral")]
-    count = sum(int(repeats(block.corners).sum()) for block in bricks)
+    count = sum(int(_collapsed(block).sum()) for block in body)
     if not count:
         return []
-    return [f"{count} {bricks[0].kind} cell{'s' * (count != 1)} with corners that are one node became what they are"]
+    kind = ("quadrilateral", "hexahedron")[body[0].dim - 2]
+    return [f"{count} {kind} cell{'s' * (count != 1)} with corners that are one node became what they are"]
+
+
+def _collapsed(block: Cells) -> Bools:
+    """Tell which cells are quadrilaterals or hexahedra with corners that are one."""
+    if block.kind not in ("quadrilateral", "hexahedron"):
+        return np.zeros(len(block.nodes), dtype=bool)
+    return repeats(block.corners)
 
 
 def _halved(elements: Ints, kind: str) -> list[str]:
