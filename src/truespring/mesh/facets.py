@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Bools, Ints
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, Groups
 from truespring.mesh.merged import kinds_in
 from truespring.mesh.rows import ascending, distinct_rows
 
@@ -161,20 +161,20 @@ def mirrored_facets(kind: str) -> Ints:
 
 @cache
 def children_of_facet(
-    facets: tuple[tuple[int, ...], ...], parents: tuple[tuple[int, ...], ...], children: tuple[tuple[int, ...], ...]
+    facets: Groups, parents: Groups, children: tuple[tuple[tuple[int, ...], Groups], ...]
 ) -> tuple[tuple[tuple[int, int], ...], ...]:
     """Return, for each facet of an element that is divided, its parts: child and the child's local facet.
 
     Args:
-        facets: of the element and of its children.
+        facets: of the element.
         parents: of each local node, the corners of the element that it is the middle of.
-        children: local nodes of each child.
+        children: local nodes of each child, and its own facets.
     """
     return tuple(
         tuple(
             (child, local)
-            for child, nodes in enumerate(children)
-            for local, part in enumerate(facets)
+            for child, (nodes, own) in enumerate(children)
+            for local, part in enumerate(own)
             if all(set(parents[nodes[node]]) <= set(facet) for node in part)
         )
         for facet in facets
