@@ -53,8 +53,8 @@ def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
     if not known.all():
         first = int(known.argmin())
         raise MeshError(
-            f"{int((~known).sum())} elements have corners that are one as in no kind of element, the first is element "
-            f"{first}, of nodes {', '.join(map(str, elements[first].tolist()))}"
+            f"{int((~known).sum())} of {len(known)} elements are degenerate: corners that are one as in no kind of "
+            f"element; the first is element {first}, of nodes {', '.join(map(str, elements[first].tolist()))}"
         )
     return found
 
