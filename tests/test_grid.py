@@ -227,11 +227,8 @@ def test_cells_of_several_kinds_stay() -> None:
 def test_cells_beside_bricks_with_corners_that_are_one_become_tetrahedra_that_meet_face_to_face() -> None:
     grid = mixed_cube()
     wedges = grid.cells["wedge"]
-    cells = {
-        **grid.cells,
-        "hexahedron": np.concatenate([grid.cells["hexahedron"], wedges[:, [0, 1, 2, 2, 3, 4, 5, 5]]]),
-    }
-    del cells["wedge"]
+    bricks = np.concatenate([grid.cells["hexahedron"], wedges[:, [0, 1, 2, 2, 3, 4, 5, 5]]])
+    cells = {"hexahedron": bricks, "pyramid": grid.cells["pyramid"]}
     mesh, nodes = corner_mesh(Grid(grid.points, cells))
     assert mesh.element == "tetrahedron" and (grid.points[nodes] == mesh.nodes).all()
     assert mesh.measures.min() > 0 and mesh.measures.sum() == pytest.approx(1.0)
