@@ -8,6 +8,7 @@ import pytest
 
 import truespring as ts
 from tests.calculix import displacement, needs_ccx
+from tests.meshes import plane_of_two, solid_of_four
 from truespring.arrays import Floats
 from truespring.exports.calculix import LAWS, fem_deck, spring_deck
 from truespring.study import read_study
@@ -212,6 +213,50 @@ def test_distorted_bodies_in_space(element: str, law: str, tmp_path: Path) -> No
     problem = replace(plain, mesh=ts.Mesh(moved, mesh.elements, mesh.element))
     theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
     assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < PRINTED
+
+
+@laws
+def test_pyramids_are_bricks_with_corners_that_are_one(law: str, tmp_path: Path) -> None:
+    """C3D8 with four corners at the tip, distorted: the same element to the digits that are printed."""
+    plain = prism("bending", "pyramid", (4, 2, 2))
+    mesh = plain.mesh
+    inner = ((mesh.nodes > 0) & (mesh.nodes < mesh.upper)).all(axis=1)
+    moved = mesh.nodes.copy()
+    moved[inner] += np.random.default_rng(4).uniform(-0.15, 0.15, (inner.sum(), 3)) * 0.01
+    problem = replace(plain, mesh=ts.Mesh(moved, mesh.elements, mesh.element))
+    ours = solved(problem, ts.Fem(law, "linear"))
+    assert np.linalg.norm(ours, axis=1).max() > 0.4 * BOX[0]
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
+    assert rms_gap(theirs, ours) < PRINTED
+
+
+@laws
+@pytest.mark.parametrize("element", ["wedge", "four kinds"])
+def test_wedges_and_several_kinds(element: str, law: str, tmp_path: Path) -> None:
+    """As bricks with corners that are one wedges are integrated at other points: alike but for large strain."""
+    mesh = solid_of_four(0.02) if element == "four kinds" else ts.box(BOX, (8, 2, 2), element)
+    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), None, [ts.Fixed("left")], [ts.Force("right", (0.8, 0.0, 0.0))])
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
+    assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < (PRINTED if law == "linear" else 1e-5)
+
+
+@laws
+@pytest.mark.parametrize("element", ["wedge", "pyramid", "four kinds"])
+def test_pressure_on_triangles_and_quadrilaterals(element: str, law: str, tmp_path: Path) -> None:
+    mesh = solid_of_four(0.02) if element == "four kinds" else ts.box(BOX, (4, 1, 1), element)
+    planes = [(axis, float(value)) for axis in "xz" for value in (0.0, mesh.upper["xyz".index(axis)])]
+    supports = [ts.Fixed("left"), *(ts.Fixed(ts.Plane(axis, value), fix=[axis]) for axis, value in planes)]
+    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), None, supports, [ts.Pressure("top", 300.0)])
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
+    assert rms_gap(theirs, solved(problem, ts.Fem(law, "linear"))) < (PRINTED if law == "linear" else 1e-5)
+
+
+@laws
+@loads
+def test_triangles_beside_quadrilaterals(load: str, law: str, tmp_path: Path) -> None:
+    problem = replace(cantilever(load, section=LONG, poisson=0.3), mesh=plane_of_two((LENGTH, HEIGHT), (15, 4)))
+    theirs = displacement(fem_deck(problem, LEVELS, law), tmp_path)
+    assert rms_gap(theirs[:, :2], solved(problem, ts.Fem(law, "linear"))) < PRINTED
 
 
 @laws

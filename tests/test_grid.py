@@ -215,9 +215,21 @@ def mixed_cube() -> Grid:
     )
 
 
-def test_mixed_cells_become_tetrahedra_that_meet_face_to_face() -> None:
+def test_cells_of_several_kinds_stay() -> None:
     grid = mixed_cube()
     mesh, nodes = corner_mesh(grid)
+    assert mesh.element_kinds == ("pyramid", "wedge", "hexahedron") and (grid.points[nodes] == mesh.nodes).all()
+    assert mesh.measures.min() > 0 and mesh.measures.sum() == pytest.approx(1.0)
+    assert len(mesh.boundary) == 6 * 9 + 6  # each of six wedges' triangles beside that of its twin
+    assert corner_measures(mesh.nodes[mesh.boundary]).sum() == pytest.approx(6.0)
+
+
+def test_cells_beside_bricks_with_corners_that_are_one_become_tetrahedra_that_meet_face_to_face() -> None:
+    grid = mixed_cube()
+    wedges = grid.cells["wedge"]
+    bricks = np.concatenate([grid.cells["hexahedron"], wedges[:, [0, 1, 2, 2, 3, 4, 5, 5]]])
+    cells = {"hexahedron": bricks, "pyramid": grid.cells["pyramid"]}
+    mesh, nodes = corner_mesh(Grid(grid.points, cells))
     assert mesh.element == "tetrahedron" and (grid.points[nodes] == mesh.nodes).all()
     assert mesh.measures.min() > 0 and mesh.measures.sum() == pytest.approx(1.0)
     # Were faces divided differently on both sides, they would count as boundary.

@@ -268,6 +268,8 @@ def random_element(element: str, seed: int) -> ts.Problem:
         "triangle": np.array([[0.0, 0], [1, 0], [0, 1]]),
         "quadrilateral": ts.rectangle((1.0, 1.0), (1, 1)).nodes[[0, 1, 3, 2]],
         "tetrahedron": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        "pyramid": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.7]]),
+        "wedge": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]),
         "hexahedron": ts.box((1.0, 1.0, 1.0), (1, 1, 1)).nodes[[0, 1, 3, 2, 4, 5, 7, 6]],
     }[element]
     stretched = regular * generator.uniform(0.6, 1.6, kind.dim)
@@ -288,8 +290,11 @@ def test_a_rule_declares_its_elements(rule: str) -> None:
         "triangle": one_element([[0.0, 0], [1, 0], [0, 1]], "triangle", 0.3),
         "quadrilateral": brick(1.0, 1.0, poisson=0.3),
         "tetrahedron": tetrahedron(1.0, 0.3),
+        "pyramid": random_element("pyramid", 1),
+        "wedge": random_element("wedge", 1),
         "hexahedron": brick(1.0, 1.0, 1.0, poisson=0.3),
     }
+    assert regular.keys() == ELEMENT_KINDS.keys() - {"line"}
     for element, problem in regular.items():
         if element in entry.elements:
             stiffness = ts.Springs(rule).element_stiffness(problem)

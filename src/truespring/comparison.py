@@ -432,8 +432,11 @@ def _facets(path: Path, level: float) -> Floats | None:
 
 
 def _triangles(facets: Ints) -> Ints:
-    """Quadrilaterals as two triangles, all else as it is."""
-    return facets if facets.shape[1] < 4 else np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
+    """Quadrilaterals as two triangles, all else as it is; of triangles among them the second half is none."""
+    if facets.shape[1] < 4:
+        return facets
+    second = facets[:, [0, 2, 3]]
+    return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])
 
 
 def _surface_distance(model: Path, reference: Path) -> SurfaceDistance | None:

@@ -174,7 +174,7 @@ class Path:
         if isinstance(self.potential, Refined):
             elements = self.potential.elements
             return Grid(self.potential.nodes, {f"{mesh.kind.vtk}{elements.shape[1]}": elements})
-        return Grid(mesh.nodes, {} if mesh.element == "line" else {mesh.kind.vtk: mesh.elements})
+        return Grid(mesh.nodes, {} if mesh.element == "line" else mesh.cells)
 
     @property
     def is_cloud(self) -> bool:

@@ -5,7 +5,7 @@ spring, an element or a mesh.
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -95,12 +95,12 @@ class Visible(Potential, Protocol):
     """A potential that can be drawn: its cells and what lives on them."""
 
     @property
-    def cells(self) -> tuple[str, Ints]:
-        """VTK name of the cells and their node numbers, shape (n_cells, k)."""
+    def cells(self) -> Mapping[str, Ints]:
+        """Node numbers of the cells by VTK's name of their kind, shape (n_cells, k)."""
         ...
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Values on the cells by name, each of shape (n_cells, ...), SI units."""
+        """Values on the cells by name, each of shape (n_cells, ...), kind after kind, SI units."""
         ...
 
 

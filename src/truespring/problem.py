@@ -25,7 +25,7 @@ from truespring.loading import (
 )
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
-from truespring.mesh import Mesh, Selection, select_elements
+from truespring.mesh import MIXED, Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
 from truespring.potential import Loading, Potential
 
@@ -68,12 +68,12 @@ class Problem:
         object.__setattr__(self, "regions", _several(self.regions, Region, "regions"))
         object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports"))
         object.__setattr__(self, "loads", _several(self.loads, Load, "loads"))
-        if self.material is not None and self.mesh.kind.dim == 2 and self.section is None:
+        if self.material is not None and self.mesh.element_dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
-        if self.mesh.kind.dim == 3 and self.section is None:
+        if self.mesh.element_dim == 3 and self.section is None:
             object.__setattr__(self, "section", Solid())
-        if isinstance(self.section, Solid) != (self.mesh.kind.dim == 3) and self.section is not None:
-            raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.element} elements")
+        if isinstance(self.section, Solid) != (self.mesh.element_dim == 3) and self.section is not None:
+            raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.kinds} elements")
         if self.regions and self.material is None:
             raise ProblemError("regions of another material need a material for the rest")
         _ = self.material_numbers  # a region that selects nothing is refused here
@@ -115,6 +115,26 @@ class Problem:
         if not self.regions:
             return (self,)
         return tuple(replace(self, material=material, regions=()) for material in self.materials)
+
+    @cached_property
+    def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":
+        """The body kind by kind of its elements: their numbers, and a problem of them alone without what acts on it."""
+        if self.mesh.element != MIXED:
+            return ((np.arange(len(self.mesh.elements)), self),)
+        return tuple(
+            (
+                numbers,
+                replace(
+                    self,
+                    mesh=part,
+                    supports=(),
+                    loads=(),
+                    regions=_regions_of(self, self.material_numbers[numbers]),
+                    stated=False,
+                ),
+            )
+            for numbers, part in self.mesh.blocks
+        )
 
     def of_elements(self, value: Callable[[Material], float]) -> Floats:
         """Return a value of each element's own material, shape (n_elements,)."""
@@ -223,12 +243,17 @@ def sample(problem: Problem, elements: Ints) -> Problem:
         mesh=Mesh(mesh.nodes[corners.ravel()], nodes.reshape(corners.shape), mesh.element),
         supports=[Fixed(on=nodes, displacement=(1.0,) * mesh.dim)],  # type: ignore[arg-type]
         loads=(),
-        regions=[
-            Region(np.flatnonzero(numbers == number), material)  # type: ignore[arg-type]
-            for number, material in enumerate(problem.materials)
-            if (numbers == number).any() and len(problem.materials) > 1
-        ],
+        regions=_regions_of(problem, numbers),
     )
+
+
+def _regions_of(problem: Problem, numbers: Ints) -> list[Region]:
+    """The regions of elements with the material of these numbers."""
+    return [
+        Region(np.flatnonzero(numbers == number), material)  # type: ignore[arg-type]
+        for number, material in enumerate(problem.materials)
+        if (numbers == number).any() and len(problem.materials) > 1
+    ]
 
 
 def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:

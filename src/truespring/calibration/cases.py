@@ -173,7 +173,7 @@ class LoadCase:
         mesh, points = self.problem.mesh, self.reference.whole.points
         if points.shape[1] < mesh.dim:
             raise ProblemError(f"{self.name}: markers in a plane say nothing of a body in space")
-        found = Grid(mesh.nodes, {mesh.kind.vtk: mesh.elements}).locate(points[:, : mesh.dim])
+        found = Grid(mesh.nodes, mesh.cells).locate(points[:, : mesh.dim])
         inside = np.flatnonzero(~found.outside)
         if not inside.size:
             raise ProblemError(f"{self.name}: no marker lies within the body: are unit, axes and origin the same?")

@@ -15,7 +15,7 @@ from truespring.mesh import Mesh
 from truespring.mesh.selections import AXES
 from truespring.models import GivenSprings, SpringNetwork, Springs, VolumeSprings, VolumeTerm, shared_springs
 from truespring.models.elasticity import lattice_classes
-from truespring.models.links import link_vectors
+from truespring.models.links import in_a_row, link_vectors
 from truespring.problem import Problem
 
 Columns = sparse.csr_array[Any, tuple[int, int]]
@@ -119,7 +119,7 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Un
         )
     springs.potential(problem)  # what does not fit is said as it is elsewhere
     pairs, place = shared_springs(problem.mesh)
-    given = springs.element_stiffness(problem).ravel()
+    given = in_a_row(problem.mesh, springs.element_stiffness(problem))
     if springs.sharing == "single":
         given = given / np.bincount(place)[place]
     labels, group = UNKNOWNS[kind](problem, np.asarray(pairs), np.asarray(place))
@@ -161,9 +161,12 @@ Groups = tuple[list[str], Ints]
 
 def _classes(problem: Problem, pairs: Ints, place: Ints) -> Groups:
     """Edges, diagonals of faces and through the body; on lattices edges along each axis apart."""
-    kind = problem.mesh.kind
-    words = ["edge"] * len(kind.edges) + ["diagonal"] * len(kind.diagonals) + ["body"] * len(kind.body_diagonals)
-    per_link = np.tile(np.array(words, dtype=object), len(problem.mesh.elements))
+    words = []
+    for numbers, part in problem.mesh.blocks:
+        kind = part.kind
+        own = ["edge"] * len(kind.edges) + ["diagonal"] * len(kind.diagonals) + ["body"] * len(kind.body_diagonals)
+        words.append(np.tile(np.array(own, dtype=object), len(numbers)))
+    per_link = np.concatenate(words)
     if lattice_classes(problem.mesh) is not None:
         axis = _axis_of(problem.mesh)
         for number, name in enumerate(AXES[: problem.mesh.dim]):
@@ -176,8 +179,9 @@ def _regions(problem: Problem, pairs: Ints, place: Ints) -> Groups:
     if len(problem.materials) < 2:
         raise ModelError("unknowns = 'region' is for bodies of several materials, this one has one: take 'class'")
     names, group = _classes(problem, pairs, place)
-    n_links = len(problem.mesh.kind.links)
-    material = np.repeat(problem.material_numbers, n_links)
+    numbers = problem.material_numbers
+    blocks = problem.mesh.blocks
+    material = np.concatenate([np.repeat(numbers[own], len(part.kind.links)) for own, part in blocks])
     return _numbered(
         np.array(
             [f"{names[g]}, {_material(m)}" for g, m in zip(group.tolist(), material.tolist(), strict=True)],
@@ -193,7 +197,7 @@ def _material(number: int) -> str:
 def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
     """Springs of one direction, up to sign along each axis, at one height."""
     mesh = problem.mesh
-    if mesh.kind.n_nodes not in (4, 8) or not _axis_aligned(mesh):
+    if mesh.element not in ("quadrilateral", "hexahedron") or not _axis_aligned(mesh):
         raise ModelError(
             "unknowns = 'direction-row' is for rectangles and bricks along the axes: take 'class', or 'spring'"
         )
@@ -238,7 +242,7 @@ def _parts(name: str) -> list[str]:
 
 def _components(mesh: Mesh) -> Bools:
     """Along which axes each element's each link goes, shape (n_elements * links, dim)."""
-    vectors = np.abs(link_vectors(mesh).reshape(-1, mesh.dim))
+    vectors = np.abs(np.concatenate([link_vectors(part).reshape(-1, mesh.dim) for _, part in mesh.blocks]))
     return np.asarray(vectors > _ROUNDING * vectors.max(axis=1, keepdims=True))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from truespring.exports.exported import Exported
 from truespring.models import SpringNetwork, VolumeSprings
 from truespring.models.biquadratic import BiquadraticSprings
+from truespring.models.summed import SummedLinks
 
 # The unit of each key that has one.
 _UNITS = {
@@ -85,6 +86,14 @@ def _springs(exported: Exported) -> dict[str, Any]:
     if isinstance(springs, BiquadraticSprings):
         coupling = np.broadcast_to(springs.coupling, (len(mesh.elements), *springs.coupling.shape[1:]))
         return {"springs": springs.springs, "links": list(mesh.kind.links), "coupling": coupling}
+    if isinstance(springs, SummedLinks):
+        found: dict[str, Any] = {"springs": springs.springs}
+        for (numbers, block), part in zip(mesh.blocks, springs.parts, strict=True):
+            coupling = np.broadcast_to(part.coupling, (len(numbers), *part.coupling.shape[1:]))
+            found[f"elements_{block.element}"] = numbers
+            found[f"links_{block.element}"] = list(block.kind.links)
+            found[f"coupling_{block.element}"] = coupling
+        return found
     beyond = {"kappa": springs.term.kappa} if isinstance(springs, VolumeSprings) else {}
     network = springs.network if isinstance(springs, VolumeSprings) else springs
     assert isinstance(network, SpringNetwork)  # all that is exported
@@ -97,7 +106,8 @@ def _springs(exported: Exported) -> dict[str, Any]:
 
 
 def _units(values: Mapping[str, Any]) -> dict[str, str]:
-    return {name: unit for name, unit in _UNITS.items() if name in values}
+    known = {name: _UNITS.get(name.split("_")[0] if name.startswith("coupling") else name) for name in values}
+    return {name: unit for name, unit in known.items() if unit is not None}
 
 
 def _array(value: Any) -> np.ndarray[Any, Any]:

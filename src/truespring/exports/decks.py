@@ -20,6 +20,7 @@ from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.loading.following import FaceMoment
 from truespring.material import PlaneStrain
 from truespring.mesh import outer_facets
+from truespring.mesh.facets import facet_keys
 from truespring.mesh.files.inp_elements import FACES
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
@@ -40,7 +41,11 @@ _AT_REST = 1e-12
 # Numbers in a line.
 _A_LINE = 16
 
-_SOLIDS = {"tetrahedron": "C3D4", "hexahedron": "C3D8"}
+_SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D8", "hexahedron": "C3D8"}
+# CalculiX has no pyramids, and integrates its wedges C3D6 at two points. As bricks with corners that are one they are
+# the elements that they are here: pyramids to the digit, wedges to the quadrature of large strain.
+_AS_BRICKS = ("pyramid", "wedge")
+_BRICKS_EXPLAINED = "** Wedges and pyramids are bricks here, some of whose corners are one node."
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
 # Of elements of second order.
 _SECOND_ORDER = {"triangle": "6", "tetrahedron": "C3D10"}
@@ -190,19 +195,21 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
     Raises ExportError for what cannot be said.
     """
     check_fem(problem, law, element)
-    nodes, elements = problem.mesh.nodes, problem.mesh.elements
+    nodes, blocks = problem.mesh.nodes, _blocks(problem)
     own = list(_own_loads(problem, force_unit))
     loading = replace(problem.loading, external_force=_spread_by_us(problem), following=())
     finer = second_order(problem, element)
     if finer is not None:
-        nodes, elements = finer.nodes, finer.elements
+        nodes, blocks = finer.nodes, [(fem_element(problem, element), np.arange(len(finer.elements)), finer.elements)]
         at_rest = [one for one in finer.loading.following if isinstance(one, FaceMoment)]
         loading = replace(replace(finer.loading, following=tuple(at_rest)).at_rest(nodes), following=())
         own = [one for one in own if one.type != "GRAV"]  # which is among our forces
-    lines = [
-        f"*ELEMENT, TYPE={fem_element(problem, element)}, ELSET=BODY",
-        *(f"{number}, {joined(one)}" for number, one in enumerate((elements + 1).tolist(), 1)),
-    ]
+    bricks = any(kind in _AS_BRICKS for kind in problem.mesh.element_kinds)
+    lines = [_BRICKS_EXPLAINED] if bricks else []
+    for kind, numbers, elements in blocks:
+        lines.append(f"*ELEMENT, TYPE={kind}, ELSET=BODY")
+        rows = np.column_stack([numbers, elements]) + 1
+        lines += map(joined, rows.tolist())
     for number in range(len(problem.materials)):
         lines += _material(problem, number, force_unit)
     return Twin(nodes, lines, loading, own)
@@ -236,11 +243,25 @@ def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
 
 
 def fem_element(problem: Problem, element: str = "linear") -> str:
-    """Return the type of the elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; "quadratic" CPS6, CPE6 or C3D10."""
-    plane = "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
-    names = {**_SOLIDS, **_PLANES} if element == "linear" else _SECOND_ORDER
-    name = names[problem.mesh.element]
-    return name if problem.mesh.dim == 3 else plane + name
+    """Return the types of the elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; "quadratic" CPS6, CPE6 or C3D10."""
+    if element == "linear":
+        return " and ".join(dict.fromkeys(kind for kind, _, _ in _blocks(problem)))
+    name = _SECOND_ORDER[problem.mesh.element]
+    return name if problem.mesh.dim == 3 else _plane(problem) + name
+
+
+def _plane(problem: Problem) -> str:
+    return "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
+
+
+def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
+    """The elements of first order by their types: their numbers and nodes."""
+    found = []
+    for numbers, part in problem.mesh.blocks:
+        kind = _SOLIDS[part.element] if part.element in _SOLIDS else _plane(problem) + _PLANES[part.element]
+        bricks = part.element in _AS_BRICKS
+        found.append((kind, numbers, part.elements[:, part.kind.merged] if bricks else part.elements))
+    return found
 
 
 def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:
@@ -269,11 +290,20 @@ def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
             direction = [*(np.array(load.acceleration) / (size or 1.0)), 0.0][:3]
             yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
         elif isinstance(load, Pressure):
-            pressed = np.sort(outer_facets(mesh, load.on), axis=1)
-            for face, local in enumerate(FACES[mesh.element], 1):
-                theirs = np.sort(mesh.elements[:, local], axis=1)
-                for number in np.flatnonzero(_rows_in(theirs, pressed)).tolist():
-                    yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+            pressed = _face_keys(outer_facets(mesh, load.on))
+            for numbers, part in mesh.blocks:
+                bricks = part.element in _AS_BRICKS
+                nodes = part.elements[:, part.kind.merged] if bricks else part.elements
+                for face, local in enumerate(FACES["hexahedron" if bricks else part.element], 1):
+                    theirs = _face_keys(nodes[:, local])
+                    for number in numbers[_rows_in(theirs, pressed)].tolist():
+                        yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+
+
+def _face_keys(faces: Ints) -> Ints:
+    """Rows of numbers that are equal for faces of the same corners, as long as those of a face can be."""
+    padded = np.concatenate([faces, faces[:, -1:]], axis=1) if faces.shape[1] == len("abc") else faces
+    return np.stack(facet_keys(padded.T), axis=1)
 
 
 def _rows_in(rows: Ints, others: Ints) -> Bools:

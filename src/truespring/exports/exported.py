@@ -128,7 +128,7 @@ class Exported:
 
     def _asked(self) -> Iterator[str]:
         mesh = self.problem.mesh
-        yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.element}."
+        yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}."
         yield from self._body()
         for number, (support, held) in enumerate(zip(self.problem.supports, self.problem.held, strict=True), 1):
             yield f"Support {number}: {_support(support, held.directions)} ({_counted(len(held.nodes), 'node')})."

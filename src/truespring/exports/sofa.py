@@ -86,6 +86,9 @@ def _of_elements(exported: Exported) -> Iterator[str]:
     if not exported.problem.materials:
         yield "A network has no finite element twin. It starts from the first load level that truespring reached."
         return
+    if element not in _ELEMENTS:
+        yield f"There is no finite element twin: SOFA is given no {exported.problem.mesh.kinds} elements."
+        return
     yield (
         f"The twin's elements are SOFA's {_ELEMENTS[element][1]}, method 'large': linear elasticity turned with each "
         "element, which is no law of truespring's; at small strain all agree."
@@ -159,7 +162,7 @@ def _held(held: Bools) -> list[tuple[list[int], list[int]]]:
 def _elements(exported: Exported) -> dict[str, Any] | None:
     """Component, topology and material of the finite element twin."""
     problem = exported.problem
-    if not problem.materials:
+    if not problem.materials or problem.mesh.element not in _ELEMENTS:
         return None
     topology, component = _ELEMENTS[problem.mesh.element]
     elements, times = problem.mesh.elements, 1

@@ -140,14 +140,9 @@ _CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
     "wedge": tuple((*corner, z) for z in (0, 1) for corner in _TRIANGLE),
     "pyramid": ((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, 0, 1)),
 }
-_WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
-_PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
 _EDGES: dict[str, Groups] = {kind.vtk: kind.edges for kind in ELEMENT_KINDS.values()}
-_EDGES |= {"wedge": _WEDGE_EDGES, "pyramid": _PYRAMID_EDGES}
-_FACETS: dict[str, Groups] = {kind.vtk: kind.facets for kind in ELEMENT_KINDS.values()}
-_FACETS |= {
-    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+_FACETS: dict[str, Groups] = {
+    kind.vtk: tuple(tuple(dict.fromkeys(facet)) for facet in kind.facets) for kind in ELEMENT_KINDS.values()
 }
 _HEXAHEDRON_FACES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
@@ -176,10 +171,10 @@ CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
             (*_EDGES["hexahedron"], *_HEXAHEDRON_FACES, tuple(range(8))),
         ),
         "wedge": _shape("wedge", _powers(_prism(1, True))),
-        "wedge15": _shape("wedge", _powers(_prism(2, False)), _WEDGE_EDGES),
-        "wedge18": _shape("wedge", _powers(_prism(2, True)), (*_WEDGE_EDGES, (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))),
+        "wedge15": _shape("wedge", _powers(_prism(2, False)), _EDGES["wedge"]),
+        "wedge18": _shape("wedge", _powers(_prism(2, True)), (*_EDGES["wedge"], *_FACETS["wedge"][2:])),
         "pyramid": _shape("pyramid", np.array(_PYRAMID, dtype=float)),
-        "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _PYRAMID_EDGES),
+        "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _EDGES["pyramid"]),
     }
 )
 

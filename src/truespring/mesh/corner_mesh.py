@@ -1,4 +1,4 @@
-"""The mesh of a grid's corners, of one kind of element: what is drawn of a result, and what bounds its body."""
+"""The mesh of a grid's corners: what is drawn of a result, and what bounds its body."""
 
 from collections.abc import Iterator
 
@@ -8,17 +8,17 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.grid import Grid
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED
+from truespring.mesh.merged import kinds_in, merged, mirrored
 from truespring.mesh.mesh import Mesh
 
 
 def corner_mesh(grid: Grid) -> tuple[Mesh, Ints]:
     """Return a mesh of a grid's corners and the number in the grid of each of its nodes, ascending.
 
-    Cells of one kind become elements of first order. Of several kinds, and wedges and pyramids, become triangles or
-    tetrahedra, which meet face to face. What has no inside becomes lines: the edges of a surface; of points alone the
-    shortest lines that join them all. Elements of either orientation are turned one by one. Raises MeshError where that
-    is no mesh.
+    Cells become elements of first order. Where corners of some are one, all become triangles or tetrahedra, which meet
+    face to face. What has no inside becomes lines: the edges of a surface; of points alone the shortest lines that join
+    them all. Elements of either orientation are turned one by one. Raises MeshError where that is no mesh.
     """
     element, elements = _elements(grid)
     nodes, local = np.unique(elements, return_inverse=True)
@@ -26,11 +26,13 @@ def corner_mesh(grid: Grid) -> tuple[Mesh, Ints]:
     points = grid.points[nodes]
     notes: tuple[str, ...] = ()
     if element != "line":
-        mirrored = _orientation(points, elements, element) < 0
-        elements[mirrored] = elements[mirrored][:, MIRRORED[element]]
+        is_mirrored = np.zeros(len(elements), dtype=bool)
+        for kind, numbers, own in kinds_in(elements, element):
+            is_mirrored[numbers] = _orientation(points, own, kind) < 0
+        elements = mirrored(elements, element, is_mirrored)
         is_whole = len(elements) == sum(len(cells) for cells in grid.cells.values())
-        if is_whole and mirrored.any() and not mirrored.all():  # all are where an axis is turned
-            notes = (f"{mirrored.sum()} of {len(elements)} elements are inverted and were mirrored",)
+        if is_whole and is_mirrored.any() and not is_mirrored.all():  # all are where an axis is turned
+            notes = (f"{is_mirrored.sum()} of {len(elements)} elements are inverted and were mirrored",)
     return Mesh(points, elements, element, notes=notes), nodes
 
 
@@ -41,8 +43,13 @@ def _elements(grid: Grid) -> tuple[str, Ints]:
     bases = {CELL_SHAPES[kind].base for kind in corners}
     plain = {kind.vtk: name for name, kind in ELEMENT_KINDS.items()}
     whole = [cells for cells in corners.values() if not _collapsed(cells).any()]
-    if len(bases) == 1 and bases <= plain.keys() and len(whole) == len(corners):
-        return plain[bases.pop()], np.concatenate(list(corners.values()))
+    if bases <= plain.keys() and len(whole) == len(corners):
+        of_base: dict[str, list[Ints]] = {}
+        for kind, cells in corners.items():
+            of_base.setdefault(plain[CELL_SHAPES[kind].base], []).append(cells)
+        if len(of_base) == 1:
+            return plain[bases.pop()], np.concatenate(list(corners.values()))
+        return MIXED, merged({kind: np.concatenate(cells) for kind, cells in of_base.items()})
     simplices = np.concatenate([one for kind, cells in corners.items() for one in _simplices(kind, cells)])
     simplices = simplices[~_collapsed(simplices)]
     if not len(simplices):

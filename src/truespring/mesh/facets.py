@@ -1,18 +1,77 @@
-"""Facets of elements, each said as an element and the number of its facet in the table of kinds."""
+"""Facets of elements, each said as an element and the number of its facet in the table of kinds.
 
+Elements are those of a mesh, in one table with their kind; see `Mesh`. Beside quadrilaterals triangles name their last
+corner twice.
+"""
+
+from collections.abc import Iterator
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Bools, Ints
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, Groups
+from truespring.mesh.merged import kinds_in
 from truespring.mesh.rows import ascending, distinct_rows
+
+_QUADRILATERAL = 4  # corners of the largest facets
+
+
+class _OfKind(NamedTuple):
+    """Elements of one kind: their numbers among all, their nodes, and their facets as long as the longest of all."""
+
+    numbers: Ints
+    nodes: Ints
+    local: Ints
+
+
+def _tables(elements: Ints, kind: str) -> Iterator[_OfKind]:
+    kinds = kinds_in(elements, kind)
+    longest = max((len(ELEMENT_KINDS[name].facets[0]) for name, _, _ in kinds), default=0)
+    for name, numbers, nodes in kinds:
+        facets = ELEMENT_KINDS[name].facets
+        yield _OfKind(numbers, nodes, np.array([facet + facet[-1:] * (longest - len(facet)) for facet in facets]))
+
+
+def facet_columns(elements: Ints, kind: str) -> Ints:
+    """Return all facets of elements as columns, those of all elements of a kind by facet, shape (k, n)."""
+    found = [own.nodes.T[own.local.T].reshape(own.local.shape[1], -1) for own in _tables(elements, kind)]
+    return found[0] if len(found) == 1 else np.concatenate(found or [np.zeros((0, 0), dtype=np.int64)], axis=1)
+
+
+def facet_keys(facets: Ints) -> list[Ints]:
+    """Return the nodes of facets ascending, from columns to columns; of a corner named twice the largest twice."""
+    ordered = ascending(facets)
+    if len(ordered) < _QUADRILATERAL:
+        return ordered
+    first, second, third, last = ordered
+    early = first == second
+    late = early | (second == third)
+    return [first, np.where(early, third, second), np.where(late, last, third), last] if late.any() else ordered
+
+
+def n_facets(elements: Ints, kind: str) -> Ints:
+    """Return the number of facets of each element, shape (n_elements,)."""
+    found = np.zeros(len(elements), dtype=np.int64)
+    for own in _tables(elements, kind):
+        found[own.numbers] = len(own.local)
+    return found
 
 
 def facet_nodes(elements: Ints, kind: str, facets: Ints) -> Ints:
     """Return the nodes of facets, from outside anticlockwise; `facets` (n, 2) are element and local facet."""
-    local = np.array(ELEMENT_KINDS[kind].facets)
-    return np.asarray(elements[facets[:, :1], local[facets[:, 1]]])
+    tables = list(_tables(elements, kind))
+    if len(tables) == 1:
+        return np.asarray(elements[facets[:, :1], tables[0].local[facets[:, 1]]])
+    place = np.empty(len(elements), dtype=np.int64)
+    found = np.empty((len(facets), tables[0].local.shape[1]), dtype=np.int64)
+    for own in tables:
+        place[:] = -1
+        place[own.numbers] = np.arange(len(own.numbers))
+        here = np.flatnonzero(place[facets[:, 0]] >= 0)
+        found[here] = own.nodes[place[facets[here, :1]], own.local[facets[here, 1]]]
+    return found
 
 
 def find_facets(elements: Ints, kind: str, cells: Ints) -> Ints:
@@ -20,19 +79,25 @@ def find_facets(elements: Ints, kind: str, cells: Ints) -> Ints:
 
     Returns element and local facet of the first element that has it, -1 where none has, shape (n, 2).
     """
-    facets = np.array(ELEMENT_KINDS[kind].facets)
+    tables = list(_tables(elements, kind))
+    longest = tables[0].local.shape[1]
     found = np.full((len(cells), 2), -1, dtype=np.int64)
-    if cells.shape[1] != facets.shape[1]:
+    if cells.shape[1] > longest or (cells.shape[1] < longest < _QUADRILATERAL):
         return found
+    cells = np.concatenate([cells, np.repeat(cells[:, -1:], longest - cells.shape[1], axis=1)], axis=1)
     inside = np.zeros(max(int(elements.max()), int(cells.max(initial=0))) + 1, dtype=bool)
     inside[cells[cells >= 0]] = True
-    owner, local = np.nonzero(inside[elements[:, facets]].all(axis=2))  # element by element
-    there = elements[owner[:, None], facets[local]]
-    distinct = distinct_rows(ascending(np.concatenate([there, cells]).T))
+    which, there = [], []
+    for own in tables:
+        row, local = np.nonzero(inside[own.nodes[:, own.local]].all(axis=2))  # element by element
+        which.append(np.stack([own.numbers[row], local], axis=1))
+        there.append(own.nodes[row[:, None], own.local[local]])
+    known_facets, n_there = np.concatenate(which), sum(map(len, there))
+    distinct = distinct_rows(facet_keys(np.concatenate([*there, cells]).T))
     # Of equal rows the first comes first, and those of elements stand before all cells.
-    first = distinct.first[distinct.of[len(there) :]]
-    known = first < len(there)
-    found[known] = np.stack([owner, local], axis=1)[first[known]]
+    first = distinct.first[distinct.of[n_there:]]
+    known = first < n_there
+    found[known] = known_facets[first[known]]
     return found
 
 
@@ -41,14 +106,50 @@ def folded(elements: Ints, kind: str) -> Bools:
 
     Two elements that share a facet go round it in opposite ways, unless one of them is folded over the other.
     """
-    facets = np.array(ELEMENT_KINDS[kind].facets)
-    nodes = elements[:, facets].reshape(-1, facets.shape[1])
-    turned = np.take_along_axis(nodes, (nodes.argmin(axis=1)[:, None] + np.arange(nodes.shape[1])) % nodes.shape[1], 1)
-    way = turned[:, 1] < turned[:, -1] if nodes.shape[1] > 2 else nodes[:, 0] < nodes[:, 1]
-    distinct = distinct_rows(ascending(nodes.T))
-    n_ways = np.bincount(distinct.of, way.astype(float), len(distinct.starts))
+    tables = list(_tables(elements, kind))
+    nodes = np.concatenate([own.nodes[:, own.local].reshape(-1, own.local.shape[1]) for own in tables])
+    owner = np.concatenate([np.repeat(own.numbers, len(own.local)) for own in tables])
+    distinct = distinct_rows(facet_keys(nodes.T))
+    n_ways = np.bincount(distinct.of, _way(nodes).astype(float), len(distinct.starts))
     alike = (distinct.count == 2) & (n_ways != 1)
-    return np.asarray(alike[distinct.of].reshape(len(elements), -1).any(axis=1))
+    return np.bincount(owner, alike[distinct.of], len(elements)) > 0
+
+
+def _way(nodes: Ints) -> Bools:
+    """Which way round facets go: of those with the same corners those of one way are alike, shape (n,)."""
+    if nodes.shape[1] == len("ab"):
+        return np.asarray(nodes[:, 0] < nodes[:, 1])
+    if nodes.shape[1] == _QUADRILATERAL:
+        is_triangle = nodes[:, 2] == nodes[:, 3]
+        if is_triangle.any():
+            found = np.empty(len(nodes), dtype=bool)
+            found[is_triangle], found[~is_triangle] = _way(nodes[is_triangle, :3]), _way(nodes[~is_triangle])
+            return found
+    around = (nodes.argmin(axis=1)[:, None] + np.arange(nodes.shape[1])) % nodes.shape[1]
+    turned = np.take_along_axis(nodes, around, 1)
+    return np.asarray(turned[:, 1] < turned[:, -1])
+
+
+def halved(facets: Ints) -> Bools:
+    """Tell which facets in space are quadrilaterals on which two triangles of the others lie, or these triangles.
+
+    Facets of shape (n, 3 or 4), the result (n,).
+    """
+    inside = np.zeros(len(facets), dtype=bool)
+    if facets.shape[1] < _QUADRILATERAL or not len(facets):
+        return inside
+    is_triangle = facets[:, 2] == facets[:, 3]
+    triangles, whole = np.flatnonzero(is_triangle), np.flatnonzero(~is_triangle)
+    for halves in (((0, 1, 2), (0, 2, 3)), ((0, 1, 3), (1, 2, 3))):
+        rows = np.concatenate([facets[triangles, :3], *(facets[whole][:, half] for half in halves)])
+        found = distinct_rows(ascending(rows.T))
+        place = np.full(len(found.starts), -1)
+        place[found.of[: len(triangles)]] = triangles
+        one, other = place[found.of[len(triangles) :]].reshape(2, -1)
+        both = (one >= 0) & (other >= 0)
+        for part in (whole, one, other):
+            inside[part[both]] = True
+    return inside
 
 
 def mirrored_facets(kind: str) -> Ints:
@@ -60,20 +161,20 @@ def mirrored_facets(kind: str) -> Ints:
 
 @cache
 def children_of_facet(
-    facets: tuple[tuple[int, ...], ...], parents: tuple[tuple[int, ...], ...], children: tuple[tuple[int, ...], ...]
+    facets: Groups, parents: Groups, children: tuple[tuple[tuple[int, ...], Groups], ...]
 ) -> tuple[tuple[tuple[int, int], ...], ...]:
     """Return, for each facet of an element that is divided, its parts: child and the child's local facet.
 
     Args:
-        facets: of the element and of its children.
+        facets: of the element.
         parents: of each local node, the corners of the element that it is the middle of.
-        children: local nodes of each child.
+        children: local nodes of each child, and its own facets.
     """
     return tuple(
         tuple(
             (child, local)
-            for child, nodes in enumerate(children)
-            for local, part in enumerate(facets)
+            for child, (nodes, own) in enumerate(children)
+            for local, part in enumerate(own)
             if all(set(parents[nodes[node]]) <= set(facet) for node in part)
         )
         for facet in facets

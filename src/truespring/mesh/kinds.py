@@ -16,14 +16,19 @@ class ElementKind:
         n_nodes: the number of its nodes.
         edges, diagonals, body_diagonals: the pairs that may carry a spring: edges, diagonals of a
             quadrilateral or of a face, diagonals through the body.
-        facets: what bounds the element, seen from outside anticlockwise.
+        facets: what bounds the element, seen from outside anticlockwise; beside quadrilaterals a triangle names its
+            last corner twice: a quadrilateral whose last two corners are one is the same, area and shape functions.
         corners: neighbours that span a Jacobian at a node, the node first, in right-handed order; the
-            element is inverted where one is not positive. Simplices have the same one at every node.
+            element is inverted where one is not positive. Simplices have the same one at every node. A pyramid has
+            none at its tip, where it vanishes by nature: along a line to there it is that at the base, shrinking.
         simplices: triangles or tetrahedra, each counted by `simplex_weight`, whose measures add up to
-            the element's own: of a hexahedron both divisions into five, whose mean is exact.
+            the element's own: of a hexahedron both divisions into five, of a wedge or a pyramid two that divide each
+            face of four corners both ways, whose mean is exact.
         vtk: meshio's name of the cell.
         sharing: for each pair (edges first) how many elements of an unbounded regular mesh share it;
             empty where that depends on the mesh.
+        merged: its nodes as the corners of a quadrilateral or hexahedron, of which some are one; so a mesh of several
+            kinds holds it.
     """
 
     dim: int
@@ -37,6 +42,7 @@ class ElementKind:
     simplices: Groups = ()
     simplex_weight: float = 1.0
     sharing: tuple[int, ...] = ()
+    merged: tuple[int, ...] = ()
 
     @property
     def links(self) -> Links:
@@ -56,6 +62,7 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
             corners=((0, 1, 2),),
             simplices=((0, 1, 2),),
             sharing=(2, 2, 2),
+            merged=(0, 1, 2, 2),
         ),
         "quadrilateral": ElementKind(
             dim=2,
@@ -67,6 +74,7 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
             corners=((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
             simplices=((0, 1, 2), (0, 2, 3)),
             sharing=(2, 2, 2, 2, 1, 1),
+            merged=(0, 1, 2, 3),
         ),
         "tetrahedron": ElementKind(
             dim=3,
@@ -76,6 +84,34 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
             facets=((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
             corners=((0, 1, 2, 3),),
             simplices=((0, 1, 2, 3),),
+            merged=(0, 1, 2, 2, 3, 3, 3, 3),
+        ),
+        "pyramid": ElementKind(
+            dim=3,
+            n_nodes=5,
+            vtk="pyramid",
+            edges=((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
+            diagonals=((0, 2), (1, 3)),
+            facets=((0, 3, 2, 1), (0, 1, 4, 4), (1, 2, 4, 4), (2, 3, 4, 4), (3, 0, 4, 4)),
+            corners=((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
+            simplices=((0, 1, 2, 4), (0, 2, 3, 4), (0, 1, 3, 4), (1, 2, 3, 4)),
+            simplex_weight=0.5,
+            merged=(0, 1, 2, 3, 4, 4, 4, 4),
+        ),
+        "wedge": ElementKind(
+            dim=3,
+            n_nodes=6,
+            vtk="wedge",
+            edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+            diagonals=((0, 4), (1, 3), (1, 5), (2, 4), (2, 3), (0, 5)),
+            facets=((0, 2, 1, 1), (3, 4, 5, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+            corners=((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
+            simplices=(
+                *((0, 1, 2, 3), (1, 2, 3, 5), (1, 5, 3, 4)),
+                *((3, 5, 4, 0), (4, 2, 1, 0), (4, 5, 2, 0)),
+            ),
+            simplex_weight=0.5,
+            merged=(0, 1, 2, 2, 3, 4, 5, 5),
         ),
         "hexahedron": ElementKind(
             dim=3,
@@ -103,9 +139,21 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
             ),
             simplex_weight=0.5,
             sharing=(4,) * 12 + (2,) * 12 + (1,) * 4,
+            merged=(0, 1, 2, 3, 4, 5, 6, 7),
         ),
     }
 )
+
+#: What `Mesh.element` says of a mesh of several kinds.
+MIXED = "mixed"
+
+_PLURALS = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def counted(count: int, kind: str) -> str:
+    """Say how many elements of a kind there are: "1 wedge", "8 hexahedra"."""
+    return f"{count} {kind if count == 1 else _PLURALS.get(kind, f'{kind}s')}"
+
 
 #: The nodes of an element in the order of its mirror image.
 MIRRORED: MappingProxyType[str, tuple[int, ...]] = MappingProxyType(
@@ -113,6 +161,8 @@ MIRRORED: MappingProxyType[str, tuple[int, ...]] = MappingProxyType(
         "triangle": (0, 2, 1),
         "quadrilateral": (0, 3, 2, 1),
         "tetrahedron": (0, 2, 1, 3),
+        "pyramid": (0, 3, 2, 1, 4),
+        "wedge": (0, 2, 1, 3, 5, 4),
         "hexahedron": (0, 3, 2, 1, 4, 7, 6, 5),
     }
 )

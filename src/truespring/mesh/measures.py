@@ -3,6 +3,7 @@
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.mesh.kinds import MIXED
 from truespring.mesh.mesh import Mesh
 
 _QUADRILATERAL = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -10,17 +11,29 @@ _HEXAHEDRON = np.array([[*corner, level] for level in (-1, 1) for corner in _QUA
 
 
 def element_corner_measures(mesh: Mesh) -> Floats:
-    """Integrate each corner's shape function over the elements [m^dim of the kind], shape (n_elements, k)."""
-    if mesh.element == "quadrilateral":
-        return corner_measures(mesh.nodes[mesh.elements])
-    if mesh.element == "hexahedron":
-        return _hexahedra(mesh.nodes[mesh.elements])
+    """Integrate each corner's shape function over the elements [m^dim of the kind], shape (n_elements, k).
+
+    Corners of elements of several kinds that are one have parts that add up.
+    """
+    whole = corner_measures if mesh.dim == 2 else _hexahedra
+    if mesh.element in ("quadrilateral", "hexahedron", MIXED):
+        return whole(mesh.nodes[mesh.elements])
+    if mesh.element in ("pyramid", "wedge"):
+        share = np.zeros(mesh.elements.shape)
+        parts = whole(mesh.nodes[mesh.elements[:, mesh.kind.merged]])
+        for corner, part in zip(mesh.kind.merged, parts.T, strict=True):
+            share[:, corner] += part
+        return share
     k = mesh.elements.shape[1]
     return np.repeat(mesh.measures[:, None] / k, k, axis=1)
 
 
 def _hexahedra(corners: Floats) -> Floats:
-    """By 2 x 2 x 2 Gauss points, exact: shape function and Jacobian are of third order along each axis together."""
+    """By 2 x 2 x 2 Gauss points, exact: shape function and Jacobian are of third order along each axis together.
+
+    Also where corners are one, as those of other kinds in `ElementKind.merged`: towards these a Jacobian falls linearly
+    or, of a pyramid, as the square, and the shape functions add up to those of the kind.
+    """
     share = np.zeros(corners.shape[:2])
     for point in _HEXAHEDRON / np.sqrt(3):
         factors = 1 + point * _HEXAHEDRON  # of each corner along each axis
@@ -33,7 +46,8 @@ def _hexahedra(corners: Floats) -> Floats:
 def corner_measures(corners: Floats) -> Floats:
     """Integrate each corner's shape function over edges, triangles or quadrilaterals [m^k], shape (n, corners).
 
-    Corners of shape (n, 2 to 4, dim). Quadrilaterals by 2 x 2 Gauss points, exact where they are plane.
+    Corners of shape (n, 2 to 4, dim). Quadrilaterals by 2 x 2 Gauss points, exact where they are plane, and where two
+    corners are one, a triangle.
     """
     n_corners = corners.shape[1]
     if n_corners < 4:

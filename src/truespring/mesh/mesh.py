@@ -1,10 +1,11 @@
-"""The mesh: nodes, elements of one kind, and what follows from them alone."""
+"""The mesh: nodes, elements of one kind or of several, and what follows from them alone."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -14,9 +15,10 @@ from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
 from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
-from truespring.mesh.facets import facet_nodes
+from truespring.mesh.facets import facet_columns, facet_keys, facet_nodes, halved, n_facets
 from truespring.mesh.forms import Forms, find_forms
-from truespring.mesh.kinds import ELEMENT_KINDS, ElementKind, Links
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links
+from truespring.mesh.merged import merged, unmerged, width
 from truespring.mesh.rows import ascending, distinct_rows
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
@@ -24,17 +26,21 @@ from truespring.mesh.rows import ascending, distinct_rows
 _DEGENERATE = 1e-9
 
 
+_NONE: Mapping[str, Ints] = MappingProxyType({})
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Nodes joined by elements of one kind.
+    """Nodes joined by elements, of one kind or of several; see `of_kinds`.
 
     Attributes:
         nodes: reference positions [m], shape (n_nodes, dim).
-        elements: node numbers, shape (n_elements, nodes of the kind).
-        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses).
+        elements: node numbers, shape (n_elements, nodes of the kind). Of several kinds each is a quadrilateral or
+            hexahedron, some of whose corners are one as `ElementKind.merged` tells.
+        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses); "mixed" of several.
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
-        facet_groups: facets by name, shape (n, 2): an element and the number of its facet in `kind.facets`, in
+        facet_groups: facets by name, shape (n, 2): an element and the number of its facet in its kind's `facets`, in
             lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
             becomes one: the facets' nodes.
         notes: what should be known of a mesh that was read, in words.
@@ -55,14 +61,15 @@ class Mesh:
     middles: Floats | None = None
 
     def __post_init__(self) -> None:
-        if self.element not in ELEMENT_KINDS:
-            allowed = ", ".join(ELEMENT_KINDS)
+        if self.element not in ELEMENT_KINDS and self.element != MIXED:
+            allowed = ", ".join([*ELEMENT_KINDS, MIXED])
             raise MeshError(
                 f"element = '{self.element}' is unknown{nearest(self.element, ELEMENT_KINDS)}; allowed: {allowed}"
             )
         try:
             object.__setattr__(self, "nodes", frozen_floats(self.nodes, (None, None), "nodes"))
-            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, self.kind.n_nodes), "elements"))
+            corners = width(self.dim) if self.element == MIXED else self.kind.n_nodes
+            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, corners), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
@@ -74,12 +81,36 @@ class Mesh:
             object.__setattr__(self, "middles", self._checked_middles(self.middles))
 
     def __repr__(self) -> str:
-        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.element})"
+        return f"Mesh({self.n_nodes} nodes, {len(self.elements)} elements: {self.kinds})"
+
+    @classmethod
+    def of_kinds(
+        cls,
+        nodes: Floats,
+        cells: Mapping[str, Ints],
+        node_groups: Mapping[str, Ints] = _NONE,
+        element_groups: Mapping[str, Ints] = _NONE,
+        facet_groups: Mapping[str, Ints] = _NONE,
+        notes: tuple[str, ...] = (),
+    ) -> "Mesh":
+        """Return a mesh of elements of one kind or several.
+
+        `cells` are node numbers by kind, keys of ELEMENT_KINDS, each of shape (n, nodes of the kind). Elements are
+        numbered kind after kind. They should meet face to face: where two triangles of other elements lie on a
+        quadrilateral, nodes are joined but not what lies between them.
+        """
+        there = {kind: elements for kind, elements in cells.items() if len(elements)}
+        if len(there) == 1:
+            ((kind, elements),) = there.items()
+            return cls(nodes, elements, kind, node_groups, element_groups, facet_groups, notes)
+        if not there:
+            raise MeshError("a mesh without elements is empty")
+        return cls(nodes, merged(there), MIXED, node_groups, element_groups, facet_groups, notes)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):
             raise MeshError(f"a mesh of {len(self.nodes)} nodes and {len(self.elements)} elements is empty")
-        if self.element != "line" and self.dim != self.kind.dim:
+        if self.element not in ("line", MIXED) and self.dim != self.kind.dim:
             raise MeshError(f"a {self.element} has {self.kind.dim} dimensions, the nodes have {self.dim}")
         if self.elements.min() < 0 or self.elements.max() >= len(self.nodes):
             raise MeshError(
@@ -98,7 +129,8 @@ class Mesh:
         )
         if self.element != "line":  # springs may be parallel
             twice = np.ones(len(self.elements), dtype=bool)
-            twice[distinct_rows(ascending(self.elements.T)).first] = False
+            for numbers, part in self.blocks:
+                twice[numbers[distinct_rows(ascending(part.elements.T)).first]] = False
             self._refuse(twice, "elements", "duplicate: others have the same nodes", lambda: self.centres)
 
     def _checked_middles(self, middles: Floats) -> Floats:
@@ -119,6 +151,8 @@ class Mesh:
     @property
     def _degenerate(self) -> Floats:
         """The corner Jacobian below which an element is degenerate [m^dim], shape (n_elements,)."""
+        if self.element == MIXED:
+            return self._by_block(lambda part: part._degenerate)
         longest = np.zeros(len(self.elements))
         if self.element != "line":
             for part, at in corners_in_slices(self.nodes, self.elements):
@@ -141,11 +175,12 @@ class Mesh:
             given = np.asarray(facets)
             if given.ndim != 2 or given.shape[1:] != (2,) or not np.issubdtype(given.dtype, np.integer):
                 raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are wanted")
-            n_there = len(self.elements), len(self.kind.facets)
-            if not len(given) or (given < 0).any() or (given >= n_there).any():
+            there, last = n_facets(self.elements, self.element), len(self.elements) - 1
+            beyond = not len(given) or (given < 0).any() or (given[:, 0] > last).any()
+            if beyond or (given[:, 1] >= there[given[:, 0]]).any():
                 raise MeshError(
-                    f"facet group '{name}' is empty or has a facet that does not exist: elements are 0 to "
-                    f"{n_there[0] - 1}, facets of each 0 to {n_there[1] - 1}"
+                    f"facet group '{name}' is empty or has a facet that does not exist: elements are 0 to {last}, "
+                    f"facets of each 0 to {there.max() - 1}"
                 )
             members = np.unique(given.astype(np.int64), axis=0)
             members.setflags(write=False)
@@ -154,8 +189,56 @@ class Mesh:
 
     @property
     def kind(self) -> ElementKind:
-        """The table entry of the elements."""
+        """The table entry of the elements; raises MeshError where they are of several kinds."""
+        if self.element == MIXED:
+            raise MeshError(
+                f"this is for elements of one kind, the mesh has {self.kinds} elements: springs and fem take several"
+            )
         return ELEMENT_KINDS[self.element]
+
+    @cached_property
+    def blocks(self) -> tuple["Block", ...]:
+        """The elements kind by kind."""
+        if self.element != MIXED:
+            return (Block(np.arange(len(self.elements)), self),)
+        return tuple(Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items())
+
+    def _part(self, kind: str, elements: Ints) -> "Mesh":
+        """Some elements of one kind on all the nodes, which need not all be theirs: checked with the whole."""
+        part = object.__new__(Mesh)
+        groups = dict.fromkeys(("node_groups", "element_groups", "facet_groups"), _NONE)
+        part.__dict__.update(nodes=self.nodes, elements=elements, element=kind, notes=(), **groups)
+        return part
+
+    def _by_block(self, values: Callable[["Mesh"], Floats]) -> Floats:
+        """What each kind's elements have, in the order of the elements, shape (n_elements,)."""
+        found = np.empty(len(self.elements))
+        for numbers, part in self.blocks:
+            found[numbers] = values(part)
+        return found
+
+    @property
+    def element_kinds(self) -> tuple[str, ...]:
+        """The kinds of its elements, keys of ELEMENT_KINDS."""
+        return (self.element,) if self.element != MIXED else tuple(part.element for _, part in self.blocks)
+
+    @property
+    def kinds(self) -> str:
+        """The kind of its elements, to stand before "elements": "wedge"; of several "8 hexahedron and 2 wedge"."""
+        if self.element != MIXED:
+            return self.element
+        *some, last = (f"{len(numbers)} {part.element}" for numbers, part in self.blocks)
+        return f"{', '.join(some)} and {last}" if some else last
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """The elements by VTK's names of their kinds, in the order of `blocks`."""
+        return {part.kind.vtk: part.elements for _, part in self.blocks}
+
+    @property
+    def element_dim(self) -> int:
+        """The dimensions that its elements fill."""
+        return self.dim if self.element == MIXED else self.kind.dim
 
     @property
     def dim(self) -> int:
@@ -185,10 +268,18 @@ class Mesh:
     @property
     def centres(self) -> Floats:
         """The mean of each element's nodes [m], shape (n_elements, dim)."""
-        total = np.zeros((len(self.elements), self.dim))
-        for corner in self.elements.T:
-            total += self.nodes[corner]
-        return np.asarray(total / self.elements.shape[1])
+        return self.means(self.nodes)
+
+    def means(self, values: Floats) -> Floats:
+        """Return the mean of what each element's nodes have, shape (n_nodes, ...) to (n_elements, ...)."""
+        total = np.zeros((len(self.elements), *values.shape[1:]))
+        for numbers, part in self.blocks:
+            own = np.zeros((len(numbers), *values.shape[1:]))
+            for corner in part.elements.T:
+                own += values[corner]
+            own /= part.elements.shape[1]
+            total[numbers] = own
+        return total
 
     def pair_keys(self, pairs: Links) -> Ints:
         """Return a number for each local pair of nodes of each element, shape (pairs, n_elements).
@@ -205,20 +296,28 @@ class Mesh:
     @cached_property
     def edges(self) -> Ints:
         """Every edge of the elements once, shape (n_edges, 2)."""
-        keys = self.pair_keys(self.kind.edges).ravel()
+        keys = np.concatenate([part.pair_keys(part.kind.edges).ravel() for _, part in self.blocks])
         keys.sort(kind="stable")
         return np.stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], self.n_nodes), axis=1)
 
     @cached_property
     def facets(self) -> Ints:
-        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k)."""
+        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k).
+
+        Beside quadrilaterals triangles name their last corner twice.
+        """
         return self.facets_of(self.elements)[0]
 
     @cached_property
     def boundary(self) -> Ints:
-        """The facets that belong to one element only, in that element's own order of nodes, shape (n, k)."""
+        """The facets that belong to one element only, in that element's own order of nodes, shape (n, k).
+
+        Beside quadrilaterals triangles name their last corner twice. A quadrilateral on which two triangles of other
+        elements lie does not bound the body, nor do they.
+        """
         facets, alone = self.facets_of(self.elements)
-        return np.asarray(facets[alone])
+        found = np.asarray(facets[alone])
+        return found[~halved(found)] if self.element == MIXED and self.dim == 3 else found
 
     def facet_nodes(self, facets: Ints) -> Ints:
         """Return the nodes of facets, given as `facet_groups` holds them; from outside anticlockwise, shape (n, k)."""
@@ -229,11 +328,10 @@ class Mesh:
 
         With `within`, true for some nodes, only the facets all of whose nodes are among these.
         """
-        local = np.array(self.kind.facets).T
-        facets = elements.T[local].reshape(len(local), -1)  # a column each, those of all elements by facet
+        facets = facet_columns(elements, self.element)
         if within is not None:
             facets = facets[:, within[facets].all(axis=0)]
-        found = distinct_rows(ascending(facets))
+        found = distinct_rows(facet_keys(facets))
         return np.ascontiguousarray(facets[:, found.first].T), np.asarray(found.count == 1)
 
     @cached_property
@@ -251,8 +349,16 @@ class Mesh:
     def corner_jacobians(self, positions: Floats) -> Floats:
         """Return the Jacobian at each corner of each element [m^dim], shape (n_elements, corners).
 
-        For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive.
+        For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive. Of several
+        kinds those with fewer corners have their last one repeated.
         """
+        if self.element == MIXED:
+            most = max(len(block.kind.corners) for _, block in self.blocks)
+            found = np.empty((len(self.elements), most))
+            for numbers, block in self.blocks:
+                own = block.corner_jacobians(positions)
+                found[numbers] = own[:, np.minimum(np.arange(most), own.shape[1] - 1)]
+            return found
         found = np.empty((len(self.elements), len(self.kind.corners) or 1))
         for part, at in corners_in_slices(positions, self.elements):
             for corner, jacobian in enumerate(self._jacobians(at)):
@@ -264,6 +370,8 @@ class Mesh:
 
         In space it is a ratio of volumes. Not a number where a position is none.
         """
+        if self.element == MIXED:
+            return float(np.min([part.smallest_area_ratio(positions) for _, part in self.blocks]))
         smallest = np.inf
         with np.errstate(over="ignore", invalid="ignore"):  # a solver may ask of a state that has run away
             for part, at in corners_in_slices(positions, self.elements):
@@ -284,6 +392,8 @@ class Mesh:
 
     def measures_at(self, positions: Floats) -> Floats:
         """Signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact for each kind."""
+        if self.element == MIXED:
+            return self._by_block(lambda part: part.measures_at(positions))
         found = np.zeros(len(self.elements))
         for part, at in corners_in_slices(positions, self.elements):
             for determinant in determinants(at, self.kind.simplices):
@@ -297,6 +407,13 @@ class Mesh:
         ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
         graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+class Block(NamedTuple):
+    """The elements of one kind: their numbers in the mesh, ascending, and a mesh of them alone on all its nodes."""
+
+    numbers: Ints
+    mesh: Mesh
 
 
 def _frozen(array: Floats) -> Floats:

@@ -1,6 +1,7 @@
 """Meshes of half the size: each element divided at the middles of its edges, faces and body."""
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
@@ -10,8 +11,8 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.cells import CELL_SHAPES
-from truespring.mesh.facets import children_of_facet, facet_nodes
-from truespring.mesh.kinds import ELEMENT_KINDS
+from truespring.mesh.facets import children_of_facet, facet_nodes, halved
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.middles import SecondOrder, edge_numbers, fitting_middles
 from truespring.mesh.rows import ascending, distinct_rows
@@ -23,21 +24,43 @@ _TETRAHEDRON = (
     *((4, 5, 6, 8), (4, 6, 7, 8), (6, 8, 9, 7), (5, 6, 8, 9)),
 )
 
+# A wedge's corners, middles of its edges, then of its faces of four corners: four wedges below and four above.
+_WEDGE = (
+    *((0, 6, 8, 12, 15, 17), (6, 1, 7, 15, 13, 16), (8, 7, 2, 17, 16, 14), (6, 7, 8, 15, 16, 17)),
+    *((12, 15, 17, 3, 9, 11), (15, 13, 16, 9, 4, 10), (17, 16, 14, 11, 10, 5), (15, 16, 17, 9, 10, 11)),
+)
+# A pyramid's corners, middles of its edges and of its base: pyramids at its five corners and one upside down in the
+# middle, and a tetrahedron at each edge of the base between them.
+_PYRAMID = (
+    *((0, 5, 13, 8, 9), (5, 1, 6, 13, 10), (13, 6, 2, 7, 11), (8, 13, 7, 3, 12)),
+    *((9, 10, 11, 12, 4), (9, 12, 11, 10, 13)),
+)
+_BETWEEN = ((5, 9, 10, 13), (6, 10, 11, 13), (7, 11, 12, 13), (8, 12, 9, 13))
+
 
 class _Division(NamedTuple):
-    """How an element is divided: the corners whose middle each new node is, and the nodes of the children."""
+    """How an element is divided: the corners whose middle each new node is, and the children by kind and nodes."""
 
     parents: tuple[tuple[int, ...], ...]
-    children: tuple[tuple[int, ...], ...]
+    children: tuple[tuple[str, tuple[int, ...]], ...]
 
 
 def refined(mesh: Mesh) -> Mesh:
     """Return the mesh with each edge halved: two elements a line, four a face, eight a body; groups are carried over.
 
-    A group of elements or of facets has their parts, and its group of nodes those of the parts. To a group of nodes
-    alone a new node belongs where all nodes that it is the middle of do. Edges through middles of their own are
-    divided there, and go on as curves; where parts would be folded all are taken for straight, and a note says so.
+    Of a pyramid six pyramids and four tetrahedra. A group of elements or of facets has their parts, and its group of
+    nodes those of the parts. To a group of nodes alone a new node belongs where all nodes that it is the middle of do.
+    Edges through middles of their own are divided there, and go on as curves; where parts would be folded all are
+    taken for straight, and a note says so.
+    Raises MeshError for lines, and where a face of four corners lies on two triangles.
     """
+    if mesh.element == MIXED and mesh.dim == 3:
+        facets, alone = mesh.facets_of(mesh.elements)
+        if halved(facets[alone]).any():
+            raise MeshError(
+                "this mesh cannot be refined: faces of four corners lie on two triangles of other elements, which new "
+                "nodes would tear apart; put pyramids between them, or refine it where it was made"
+            )
     try:
         return _refined(mesh)
     except MeshError:
@@ -48,38 +71,42 @@ def refined(mesh: Mesh) -> Mesh:
 
 
 def _refined(mesh: Mesh) -> Mesh:
-    parents, children = _division(mesh.element)
-    n_corners = mesh.elements.shape[1]
-    numbers = [mesh.elements]
+    divisions = [_division(part.element) for _, part in mesh.blocks]
+    numbers = [[part.elements] for _, part in mesh.blocks]
     places, groups = (
         [mesh.nodes],
         {name: [np.isin(np.arange(mesh.n_nodes), of)] for name, of in mesh.node_groups.items()},
     )
     n_nodes = mesh.n_nodes
-    for size in sorted({len(corners) for corners in parents}):
-        local = np.array([corners for corners in parents if len(corners) == size])
-        corners = mesh.elements[:, local].reshape(-1, size)
+    for size in sorted({len(corners) for parents, _ in divisions for corners in parents}):
+        local = [[corners for corners in parents if len(corners) == size] for parents, _ in divisions]
+        rows = [
+            part.elements[:, np.array(own)].reshape(-1, size) if own else np.zeros((0, size), dtype=np.int64)
+            for (_, part), own in zip(mesh.blocks, local, strict=True)
+        ]
+        corners = rows[0] if len(rows) == 1 else np.concatenate(rows)
         found = distinct_rows(ascending(np.ascontiguousarray(corners.T)))
         new = corners[found.first]
-        numbers.append(n_nodes + found.of.reshape(-1, len(local)))
+        ends = np.cumsum([len(own) for own in rows])[:-1]
+        for known, of, own in zip(numbers, np.split(n_nodes + found.of, ends), local, strict=True):
+            known.append(of.reshape(len(known[0]), len(own)))
         places.append(_halfway(mesh, new))
         for inside in groups.values():
             inside.append(np.asarray(inside[0][new].all(axis=1)))
         n_nodes += len(new)
-    local_numbers = np.concatenate(numbers, axis=1)
-    order = [*range(n_corners), *(n_corners + one for one in _by_size(parents))]
-    elements = local_numbers[:, np.argsort(order)][:, np.array(children)].reshape(-1, n_corners)
-    element_groups = {name: _children_of(of, len(children)) for name, of in mesh.element_groups.items()}
-    facet_groups = {name: _parts_of(of, mesh.element) for name, of in mesh.facet_groups.items()}
+    kind, elements, first = _children(mesh, divisions, [np.concatenate(known, axis=1) for known in numbers])
+    n_children = _of_elements(mesh, [len(children) for _, children in divisions])
+    element_groups = {name: _children_of(first[of], n_children[of]) for name, of in mesh.element_groups.items()}
+    facet_groups = {name: _parts_of(mesh, of, first) for name, of in mesh.facet_groups.items()}
     node_groups = {name: np.flatnonzero(np.concatenate(inside)) for name, inside in groups.items()}
     for name in node_groups.keys() & (element_groups.keys() | facet_groups.keys()):
         members = [mesh.node_groups[name]]
         if name in element_groups:
             members.append(elements[element_groups[name]].ravel())
         if name in facet_groups:
-            members.append(facet_nodes(elements, mesh.element, facet_groups[name]).ravel())
+            members.append(facet_nodes(elements, kind, facet_groups[name]).ravel())
         node_groups[name] = np.concatenate(members)
-    finer = Mesh(np.concatenate(places), elements, mesh.element, node_groups, element_groups, facet_groups, mesh.notes)
+    finer = Mesh(np.concatenate(places), elements, kind, node_groups, element_groups, facet_groups, mesh.notes)
     return finer if mesh.middles is None else _curved(finer, mesh)
 
 
@@ -93,7 +120,8 @@ def _halfway(mesh: Mesh, groups: Ints) -> Floats:
 def _curved(finer: Mesh, mesh: Mesh) -> Mesh:
     """The refined mesh with edges that lie where those of elements of second order are, inside them too."""
     whole, (_, children) = SecondOrder(mesh), _division(mesh.element)
-    local_edges = np.array(children)[:, np.array(mesh.kind.edges)].reshape(-1, 2)
+    corners = np.array([nodes for _, nodes in children])
+    local_edges = corners[:, np.array(mesh.kind.edges)].reshape(-1, 2)
     shape = CELL_SHAPES["triangle6" if mesh.element == "triangle" else "tetra10"]
     shares = shape.shapes(shape.places[local_edges].mean(axis=1))
     places = np.einsum("ek,nki->nei", shares, whole.nodes[whole.of(mesh.elements)])
@@ -101,17 +129,52 @@ def _curved(finer: Mesh, mesh: Mesh) -> Mesh:
     return replace(finer, middles=fitting_middles(finer, pairs.reshape(-1, 2), places.reshape(-1, mesh.dim))[0])
 
 
-def _children_of(elements: Ints, count: int) -> Ints:
-    return np.asarray((count * elements[:, None] + np.arange(count)).ravel())
+def _children(mesh: Mesh, divisions: Sequence[_Division], numbers: Sequence[Ints]) -> tuple[str, Ints, Ints]:
+    """The kind and the table of all children, those of an element one after the other, and the first of each element.
+
+    `numbers` are the nodes of each kind's elements: corners, then new ones, those of few parents first.
+    """
+    kinds = {kind for _, children in divisions for kind, _ in children}
+    kind = kinds.pop() if len(kinds) == 1 else MIXED
+    tables, first, n_children = [], np.zeros(len(mesh.elements), dtype=np.int64), 0
+    for (of, part), (parents, children), known in zip(mesh.blocks, divisions, numbers, strict=True):
+        n_corners = part.kind.n_nodes
+        order = [*range(n_corners), *(n_corners + one for one in _by_size(parents))]
+        local = [nodes if kind != MIXED else _merged(own, nodes) for own, nodes in children]
+        tables.append(known[:, np.argsort(order)][:, np.array(local)].reshape(-1, len(local[0])))
+        first[of] = n_children + len(children) * np.arange(len(of))
+        n_children += len(children) * len(of)
+    return kind, tables[0] if len(tables) == 1 else np.concatenate(tables), first
 
 
-def _parts_of(facets: Ints, element: str) -> Ints:
+def _merged(kind: str, nodes: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(nodes[place] for place in ELEMENT_KINDS[kind].merged)
+
+
+def _of_elements(mesh: Mesh, by_kind: Sequence[int]) -> Ints:
+    """A number of each kind for its elements, shape (n_elements,)."""
+    found = np.empty(len(mesh.elements), dtype=np.int64)
+    for (numbers, _), value in zip(mesh.blocks, by_kind, strict=True):
+        found[numbers] = value
+    return found
+
+
+def _children_of(first: Ints, count: Ints) -> Ints:
+    return np.repeat(first - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
+
+
+def _parts_of(mesh: Mesh, facets: Ints, first: Ints) -> Ints:
     """The facets of the children that make up facets of their parents, each as element and local facet."""
-    kind, (parents, children) = ELEMENT_KINDS[element], _division(element)
-    corners = tuple((corner,) for corner in range(kind.n_nodes))
-    parts = np.array(children_of_facet(kind.facets, corners + parents, children))[facets[:, 1]]  # (n, parts, 2)
-    first = np.stack([len(children) * facets[:, 0], np.zeros(len(facets), dtype=np.int64)], axis=1)
-    return np.asarray((first[:, None] + parts).reshape(-1, 2))
+    found = []
+    for numbers, part in mesh.blocks:
+        own = facets[np.isin(facets[:, 0], numbers)]
+        kind, (parents, children) = part.kind, _division(part.element)
+        corners = tuple((corner,) for corner in range(kind.n_nodes))
+        of_children = tuple((nodes, ELEMENT_KINDS[child].facets) for child, nodes in children)
+        parts = np.array(children_of_facet(kind.facets, corners + parents, of_children))[own[:, 1]]  # (n, parts, 2)
+        start = np.stack([first[own[:, 0]], np.zeros(len(own), dtype=np.int64)], axis=1)
+        found.append((start[:, None] + parts).reshape(-1, 2))
+    return np.concatenate(found)
 
 
 def _by_size(parents: tuple[tuple[int, ...], ...]) -> list[int]:
@@ -124,16 +187,26 @@ def _division(element: str) -> _Division:
     kind = ELEMENT_KINDS[element]
     match element:
         case "triangle":
-            return _Division(kind.edges, ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)))
+            return _Division(kind.edges, _of_one("triangle", ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))))
         case "tetrahedron":
-            return _Division(kind.edges, _TETRAHEDRON)
+            return _Division(kind.edges, _of_one("tetrahedron", _TETRAHEDRON))
+        case "wedge":
+            return _Division(kind.edges + kind.facets[2:], _of_one("wedge", _WEDGE))
+        case "pyramid":
+            children = (*_of_one("pyramid", _PYRAMID), *_of_one("tetrahedron", _BETWEEN))
+            return _Division(kind.edges + kind.facets[:1], children)
         case "quadrilateral" | "hexahedron":
-            return _of_cube(kind.dim)
+            return _of_cube(element)
     raise MeshError(f"a mesh of {element} elements cannot be refined: a network is as fine as its springs are")
 
 
-def _of_cube(dim: int) -> _Division:
+def _of_one(kind: str, children: tuple[tuple[int, ...], ...]) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    return tuple((kind, nodes) for nodes in children)
+
+
+def _of_cube(element: str) -> _Division:
     """A square or cube: the lattice of three nodes along each axis."""
+    dim = ELEMENT_KINDS[element].dim
     ring = ((0, 0), (1, 0), (1, 1), (0, 1))
     corners = ring if dim == 2 else tuple((*corner, level) for level in (0, 1) for corner in ring)
     lattice = list(itertools.product((0, 1, 2), repeat=dim))
@@ -152,4 +225,4 @@ def _of_cube(dim: int) -> _Division:
         tuple(number[tuple(o + c for o, c in zip(origin, corner, strict=True))] for corner in corners)
         for origin in itertools.product((0, 1), repeat=dim)
     )
-    return _Division(tuple(parents), children)
+    return _Division(tuple(parents), _of_one(element, children))

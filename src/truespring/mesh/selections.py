@@ -7,9 +7,10 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, nearest
+from truespring.mesh.facets import facet_keys
 from truespring.mesh.measures import corner_measures, element_corner_measures
 from truespring.mesh.mesh import Mesh
-from truespring.mesh.rows import ascending, distinct_rows
+from truespring.mesh.rows import distinct_rows
 
 #: Side names: direction and whether it is the upper end.
 SIDES: dict[str, tuple[int, bool]] = {
@@ -187,7 +188,7 @@ def named_facets(mesh: Mesh, on: Selection) -> Ints | None:
     if not isinstance(on, str) or on not in mesh.facet_groups:
         return None
     facets = mesh.facet_nodes(mesh.facet_groups[on])
-    return np.asarray(facets[np.sort(distinct_rows(ascending(facets.T)).first)])
+    return np.asarray(facets[np.sort(distinct_rows(facet_keys(facets.T)).first)])
 
 
 def loaded(mesh: Mesh, on: Selection) -> Ints:
@@ -234,7 +235,7 @@ def covering(mesh: Mesh, on: Selection) -> tuple[Ints, Floats] | None:
     whole = n_inside == mesh.elements.shape[1]
     if _reach(mesh.elements[whole], nodes):
         return mesh.elements[whole], element_corner_measures(mesh)[whole]
-    facets, alone = mesh.facets_of(mesh.elements[n_inside >= len(mesh.kind.facets[0])], inside)
+    facets, alone = mesh.facets_of(mesh.elements[n_inside >= mesh.dim], inside)
     for cells in (facets[alone], facets):
         if _reach(cells, nodes):
             return cells, corner_measures(mesh.nodes[cells])
@@ -251,7 +252,8 @@ def facets_within(mesh: Mesh, on: Selection) -> Ints:
     """Return the facets that a load per area acts on, seen from outside anticlockwise, shape (n, 2 to 4).
 
     These are the facets that a group names, on the boundary or inside. Of nodes they are the facets of the boundary
-    all of whose nodes are selected. Raises MeshError where there is none.
+    all of whose nodes are selected. Beside quadrilaterals triangles name their last corner twice. Raises MeshError
+    where there is none.
     """
     named = named_facets(mesh, on)
     if named is not None:
@@ -277,7 +279,7 @@ def outer_facets(mesh: Mesh, on: Selection) -> Ints:
     inner = (
         len(facets)
         + int((~alone).sum())
-        - len(distinct_rows(ascending(np.concatenate([facets, every[~alone]]).T)).starts)
+        - len(distinct_rows(facet_keys(np.concatenate([facets, every[~alone]]).T)).starts)
     )
     if inner:
         raise MeshError(

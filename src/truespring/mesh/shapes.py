@@ -8,13 +8,14 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError, nearest
 from truespring.memory import available_memory
+from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.rows import ascending, distinct_rows
 
-#: What a rectangle and a box may be made of: two triangles a rectangle; six tetrahedra a box, or the
-#: body-centred-cubic lattice, whose `elements` count its cubic cells.
+#: What a rectangle and a box may be made of: two triangles a rectangle; six tetrahedra, two wedges or six pyramids a
+#: box, or the body-centred-cubic lattice, whose `elements` count its cubic cells.
 PLANE_ELEMENTS = ("quadrilateral", "triangle")
-SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron")
+SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron", "wedge", "pyramid")
 
 #: Diagonals of a rectangle of triangles: from the lower left corner to the upper right one, the
 #: other one, or each in turn, so that no direction is preferred.
@@ -61,17 +62,21 @@ def box(size: Sequence[float], elements: Sequence[int], element: str = "hexahedr
     Args:
         size: length along x, y and z [m].
         elements: number of cells along x, y and z.
-        element: "hexahedron"; "tetrahedron", six a cell, all about the same body diagonal; or
-            "bcc-tetrahedron", the body-centred-cubic lattice with a node in the middle of each cell and
-            of each face of the outside.
+        element: "hexahedron"; "tetrahedron", six a cell, all about the same body diagonal; "bcc-tetrahedron", the
+            body-centred-cubic lattice with a node in the middle of each cell and of each face of the outside;
+            "wedge", two a cell, their triangles across z; or "pyramid", six a cell about a node in its middle.
 
     Raises MeshError as `rectangle` does.
     """
     _known(element, SOLID_ELEMENTS, "element")
-    lengths, counts = _checked(size, elements, "box", "xyz", 2 if element == "bcc-tetrahedron" else 1)
+    lengths, counts = _checked(size, elements, "box", "xyz", 2 if element in ("bcc-tetrahedron", "pyramid") else 1)
     nodes, cells = _grid(lengths, counts)
     if element == "hexahedron":
         return Mesh(nodes, cells, element)
+    if element == "wedge":
+        return Mesh(nodes, cells[:, np.array(_TWO)].reshape(-1, 6), element)
+    if element == "pyramid":
+        return _six_pyramids(nodes, cells)
     if element == "tetrahedron":
         return Mesh(nodes, cells[:, np.array(_SIX)].reshape(-1, 4), "tetrahedron")
     return _body_centred(nodes, cells)
@@ -79,6 +84,18 @@ def box(size: Sequence[float], elements: Sequence[int], element: str = "hexahedr
 
 # The six tetrahedra about the diagonal from node 0 to node 6 of a hexahedron (Kuhn).
 _SIX = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+
+
+# The wedges on both sides of the diagonal from node 0 to node 2.
+_TWO = ((0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7))
+
+
+def _six_pyramids(corners: Floats, cells: Ints) -> Mesh:
+    """A pyramid on each face of each cell, its tip in the middle."""
+    inwards = np.array(ELEMENT_KINDS["hexahedron"].facets)[:, ::-1]
+    tips = np.repeat(len(corners) + np.arange(len(cells)), len(inwards))
+    pyramids = np.column_stack([cells[:, inwards].reshape(-1, 4), tips])
+    return Mesh(np.concatenate([corners, corners[cells].mean(axis=1)]), pyramids, "pyramid")
 
 
 def _grid(lengths: Sequence[float], counts: Sequence[int]) -> tuple[Floats, Ints]:

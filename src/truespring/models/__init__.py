@@ -23,6 +23,7 @@ from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness
 from truespring.models.springs import Springs as Springs
 from truespring.models.springs import shared_springs as shared_springs
+from truespring.models.summed import SummedElements as SummedElements
 from truespring.models.terzopoulos import Terzopoulos as Terzopoulos
 from truespring.models.volume import VolumeSprings as VolumeSprings
 from truespring.models.volume import VolumeTerm as VolumeTerm

@@ -71,7 +71,7 @@ def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> I
         )
     if springs_lock(problem, springs):
         yield (
-            f"at a Poisson's ratio of {material.poisson:g} {problem.mesh.element} elements lock with these springs, "
+            f"at a Poisson's ratio of {material.poisson:g} {problem.mesh.kinds} elements lock with these springs, "
             "as linear ones of FEM do: they are too stiff"
         )
 

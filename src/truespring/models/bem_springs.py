@@ -71,6 +71,11 @@ class BemSprings:
     def _parts(self, problem: Problem) -> tuple[Bools, SpringNetwork]:
         """Which elements are the block, shape (n_elements,), and the springs beside it."""
         require_body(problem)
+        if any(len(set(facet)) < len(facet) for facet in problem.mesh.kind.facets):
+            raise ModelError(
+                f"boundary elements are all triangles or all quadrilaterals, but a {problem.mesh.kinds} has both: take "
+                "springs, or fem"
+            )
         chosen = self._chosen(problem)
         _refuse_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
         return chosen, _springs_beside(problem, self.rule, chosen)
@@ -229,9 +234,9 @@ class BlockSprings:
         return np.unique(np.sort(pairs, axis=1), axis=0)
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The springs as lines, then the edges of the block's elements, shape (n_springs + n_edges, 2)."""
-        return "line", np.concatenate([self.springs, self._edges])
+        return {"line": np.concatenate([self.springs, self._edges])}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each line.

@@ -8,7 +8,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.memory import remembered
 from truespring.mesh import Mesh
-from truespring.models.fem import Fem, element_matrices
+from truespring.models.fem import Fem, FemPotential, element_matrices
 from truespring.models.links import CORNERS, all_alike, link_vectors
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs
@@ -123,7 +123,9 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
 def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:
     """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
     if springs is None:
-        return np.asarray(Fem("linear").potential(problem).element_hessians(problem.mesh.nodes)[0])
+        elements = Fem("linear").potential(problem)
+        assert isinstance(elements, FemPotential)  # of one kind, as `cell_counts` sees to
+        return np.asarray(elements.element_hessians(problem.mesh.nodes)[0])
     if springs.coupled:  # these are FEM
         return np.asarray(element_matrices(problem)[0])
     mesh = problem.mesh

@@ -80,11 +80,14 @@ def lattice_elasticity(problem: Problem, stiffness: Floats, classes: Ints | None
         chosen = chosen[classes[chosen] >= 0]
     pairs = voigt_pairs(mesh.dim)
     energy = np.zeros((len(pairs), len(pairs)))
-    for part in slices(len(chosen), 16 * stiffness.shape[1] * len(pairs)):
-        own = chosen[part]
-        across = link_vectors(mesh, own).reshape(-1, mesh.dim)
-        strain = np.stack([across[:, i] * across[:, j] for i, j in pairs], axis=1)
-        energy += strain.T @ ((stiffness[own].ravel() / (across**2).sum(axis=1))[:, None] * strain)
+    for numbers, block in mesh.blocks:
+        of_kind = chosen if len(mesh.blocks) == 1 else np.flatnonzero(np.isin(numbers, chosen))
+        own_stiffness = stiffness if len(mesh.blocks) == 1 else stiffness[numbers, : len(block.kind.links)]
+        for part in slices(len(of_kind), 16 * own_stiffness.shape[1] * len(pairs)):
+            own = of_kind[part]
+            across = link_vectors(block, own).reshape(-1, mesh.dim)
+            strain = np.stack([across[:, i] * across[:, j] for i, j in pairs], axis=1)
+            energy += strain.T @ ((own_stiffness[own].ravel() / (across**2).sum(axis=1))[:, None] * strain)
     return np.asarray(energy / (mesh.measures[chosen].sum() * section.thickness))
 
 

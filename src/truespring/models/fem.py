@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 import skfem
@@ -12,18 +12,24 @@ from skfem.quadrature import get_quadrature
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import PlaneStress
-from truespring.mesh import Mesh
+from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS, MIXED, Mesh, counted
 from truespring.models.laws import LAWS, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, voigt_places
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
+if TYPE_CHECKING:
+    from truespring.models.summed import SummedElements
+
+#: Kinds whose strain is one, as long as they are of first order.
+SIMPLICES = ("triangle", "tetrahedron")
+
 #: Above this Poisson's ratio elements of first order lock; others are then the default.
 LOCKING_POISSON = 0.4
 
-#: Interpolations of `Fem.element`: mean dilatation for quadrilaterals and hexahedra, those that are quadratic for
-#: triangles and tetrahedra.
+#: Interpolations of `Fem.element`: those that are quadratic for meshes of triangles or of tetrahedra, mean dilatation
+#: for others.
 ELEMENTS = ("linear", "mean-dilatation", "quadratic", "quadratic-mean-dilatation")
 
 # scikit-fem's element of each kind and its quadrature: the order, or for the constant strain of a triangle its one
@@ -33,6 +39,20 @@ _SKFEM: dict[str, tuple[Any, Any]] = {
     "quadrilateral": (skfem.ElementQuad1, 3),
     "tetrahedron": (skfem.ElementTetP1, 1),
     "hexahedron": (skfem.ElementHex1, 3),
+}
+
+# Points and weights of kinds that scikit-fem lacks, or lacks a quadrature of, in the coordinates of CELL_SHAPES.
+# Wedges: three points of a triangle by two Gauss points along, as full as those of hexahedra. Pyramids: strain is the
+# same all along a line to the tip, since shape functions and places shrink alike towards it. So one point along it,
+# at the centre, with the integral of the shrinking (1 - z)^2, is exact, beside two Gauss points along x and y.
+_GAUSS = 1 / np.sqrt(3)
+_TRIANGLE = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
+_QUADRATURE: dict[str, tuple[Floats, Floats]] = {
+    "wedge": (np.array([(*at, (1 + z) / 2) for at in _TRIANGLE for z in (-_GAUSS, _GAUSS)]), np.full(6, 1 / 12)),
+    "pyramid": (
+        np.array([(0.75 * x, 0.75 * y, 0.25) for x in (-_GAUSS, _GAUSS) for y in (-_GAUSS, _GAUSS)]),
+        np.full(4, 1 / 3),
+    ),
 }
 
 # scikit-fem counts the corners of a hexahedron in another order than VTK: its places of ours.
@@ -50,12 +70,13 @@ class Fem:
 
     Attributes:
         law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
-        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals and
-            hexahedra), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes in the
-            middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the mean
-            volume. None takes what does not lock: quadratic ones on triangles and tetrahedra, since linear ones are
-            too stiff in bending at any Poisson's ratio, and mean dilatation on all of them above a Poisson's ratio of
-            0.4 in plane strain and in 3D; linear ones on other quadrilaterals and hexahedra.
+        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals, hexahedra,
+            wedges and pyramids), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes
+            in the middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the
+            mean volume. None takes what does not lock: quadratic ones on triangles and tetrahedra, since linear ones
+            are too stiff in bending at any Poisson's ratio, and mean dilatation on all of them above a Poisson's ratio
+            of 0.4 in plane strain and in 3D; linear ones on others. On a mesh of several kinds triangles and
+            tetrahedra are linear: quadratic ones do not meet the others.
     """
 
     law: str
@@ -85,7 +106,7 @@ class Fem:
         if self.element not in allowed:
             within = " in plane stress" if isinstance(problem.section, PlaneStress) else ""
             raise ModelError(
-                f"element = '{self.element}' is not for a mesh of {problem.mesh.element} elements{within}; "
+                f"element = '{self.element}' is not for a mesh of {problem.mesh.kinds} elements{within}; "
                 f"allowed here: {', '.join(allowed)}"
             )
         return self.element
@@ -95,16 +116,18 @@ class Fem:
         return Fem(self.law) if self.chosen_element(problem) == "linear" else None
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: elements that lock."""
-        if self.chosen_element(problem) != "linear" or not locks(problem):
-            return ()
+        """Return what should be known before the model is solved: elements that lock, or that are too stiff."""
+        chosen, stiff = self.chosen_element(problem), _stiff_simplices(problem)
+        if chosen != "linear" or not locks(problem):
+            return stiff
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
             f'element = "{_defaults(problem)[-1]}", the default here, does not lock',
+            *stiff,
         )
 
-    def potential(self, problem: Problem) -> "FemPotential":
+    def potential(self, problem: Problem) -> "FemPotential | SummedElements":
         """Return the potential on the problem's mesh."""
         from truespring.models.mean_dilatation import MeanDilatationPotential
         from truespring.models.quadratic import QuadraticPotential
@@ -117,7 +140,7 @@ class Fem:
 
 def _defaults(problem: Problem) -> tuple[str, str]:
     """The interpolations that are the default on the mesh: usually, and where the usual ones lock."""
-    if problem.mesh.element in ("triangle", "tetrahedron"):
+    if problem.mesh.element in SIMPLICES:
         return "quadratic", "quadratic-mean-dilatation"
     return "linear", "mean-dilatation"
 
@@ -128,6 +151,19 @@ def _allowed(problem: Problem) -> tuple[str, ...]:
     if isinstance(problem.section, PlaneStress):  # the third direction is free to take lambda's part
         found.pop("quadratic-mean-dilatation", None)
     return tuple(found)
+
+
+def _stiff_simplices(problem: Problem) -> tuple[str, ...]:
+    """What should be known of simplices beside elements of other kinds."""
+    blocks = problem.mesh.blocks
+    simplices = [counted(len(numbers), part.element) for numbers, part in blocks if part.element in SIMPLICES]
+    if not simplices or len(blocks) == 1:
+        return ()
+    return (
+        f"the {simplices[0]} beside other kinds of elements are linear, too stiff in bending and where the material is "
+        "nearly incompressible: keep them few and away from where it matters, or mesh the body in them alone, which "
+        "are quadratic then",
+    )
 
 
 def locks(problem: Problem) -> bool:
@@ -147,10 +183,25 @@ def locking_warnings(problem: Problem) -> tuple[str, ...]:
     )
 
 
-def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" = None) -> "FemPotential":
-    """Set up quadrature and constants of `law` on the problem's mesh."""
-    if problem.material is None or problem.section is None or problem.mesh.element not in _SKFEM:
-        raise ModelError(f"finite elements need a material, a section and elements of a kind among {', '.join(_SKFEM)}")
+def fem_potential(
+    problem: Problem, law: str, kind: "type[FemPotential] | None" = None
+) -> "FemPotential | SummedElements":
+    """Set up quadrature and constants of `law` on the problem's mesh, of several kinds of elements on each of them."""
+    _require_continuum(problem)
+    if problem.mesh.element == MIXED:
+        from truespring.models.summed import SummedElements
+
+        return SummedElements(tuple(_of_one_kind(part, law, kind) for _, part in problem.blocks), problem)
+    return _of_one_kind(problem, law, kind)
+
+
+def _require_continuum(problem: Problem) -> None:
+    if problem.material is None or problem.section is None or problem.mesh.element == "line":
+        kinds = ", ".join((*_SKFEM, *_QUADRATURE))
+        raise ModelError(f"finite elements need a material, a section and elements of a kind among {kinds}")
+
+
+def _of_one_kind(problem: Problem, law: str, kind: "type[FemPotential] | None") -> "FemPotential":
     plane_stress = isinstance(problem.section, PlaneStress)
     if len(problem.materials) == 1:
         constants = Constants(*problem.materials[0].lame, plane_stress)
@@ -161,8 +212,18 @@ def fem_potential(problem: Problem, law: str, kind: "type[FemPotential] | None" 
 
 
 def element_matrices(problem: Problem) -> Floats:
-    """Return each element's linear stiffness matrix [N/m], shape (n_elements, n_dof, n_dof), dofs node by node."""
-    return fem_potential(problem, "linear").element_hessians(problem.mesh.nodes)
+    """Return each element's linear stiffness matrix [N/m], shape (n_elements, n_dof, n_dof), dofs node by node.
+
+    Of elements of one kind.
+    """
+    return fem_of_one_kind(problem, "linear").element_hessians(problem.mesh.nodes)
+
+
+def fem_of_one_kind(problem: Problem, law: str) -> "FemPotential":
+    """Return the finite elements of a mesh of one kind; raises MeshError for others."""
+    _require_continuum(problem)
+    _ = problem.mesh.kind
+    return _of_one_kind(problem, law, None)
 
 
 class Reference(NamedTuple):
@@ -180,7 +241,15 @@ class Reference(NamedTuple):
 
 
 def reference_element(kind: str, element: Any = None, order: int | None = None) -> Reference:
-    """Return scikit-fem's reference element of a kind: of first order, or `element` with the quadrature of `order`."""
+    """Return scikit-fem's reference element of a kind: of first order, or `element` with the quadrature of `order`.
+
+    Of pyramids it is the element of Bedrosian (IEEE Transactions on Magnetics 28, 1992), whose shape functions are
+    rational: a hexahedron with four corners made one.
+    """
+    if kind in _QUADRATURE:
+        at, of_points = _QUADRATURE[kind]
+        by_point = np.ascontiguousarray(CELL_SHAPES[ELEMENT_KINDS[kind].vtk].slopes(at))
+        return Reference(by_point, by_point, of_points)
     corners, own = _SKFEM[kind]
     rule = own if order is None else order
     points, weights = rule if isinstance(rule, tuple) else get_quadrature(corners.refdom, rule)
@@ -426,9 +495,9 @@ class FemPotential:
         return blocks
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The elements, shape (n_elements, nodes)."""
-        return self.mesh.kind.vtk, self.mesh.elements
+        return self.mesh.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""

@@ -123,7 +123,7 @@ class _Judge:
 
     def better(self, than: Springs) -> Springs | None:
         """The plain springs that are nearest to the material, or else the first others whose moduli are right."""
-        rules = [name for name, rule in RULES.items() if self.problem.mesh.element in rule.elements]
+        rules = [name for name, rule in RULES.items() if rule.takes(self.problem.mesh)]
         plain = [Springs(name) for name in rules if not RULES[name].coupled]
         # Plain springs that are nearly isotropic are nearly at Cauchy's ratio: for others none need be tried.
         near = max(abs(above) for above in self._above_cauchy()) <= 2 * self.tolerance

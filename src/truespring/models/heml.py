@@ -10,10 +10,11 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import Fem, FemPotential, fem_potential, locking_warnings
+from truespring.models.fem import Fem, FemPotential, fem_of_one_kind, fem_potential, locking_warnings
 from truespring.models.laws import LAWS, Response
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
+from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
@@ -60,17 +61,18 @@ class Heml:
         """Return what should be known before the model is solved: elements that lock."""
         return locking_warnings(problem)
 
-    def potential(self, problem: Problem) -> LinkedElements:
+    def potential(self, problem: Problem) -> LinkedElements | SummedLinks:
         """Return the potential on the problem's mesh; raise ModelError for a law that does not fit its elements."""
         element = problem.mesh.element
         fem_potential(problem, self.law)  # refuses what is no continuum, such as a plain network
         if self.law == "saint-venant-kirchhoff":
-            return BiquadraticSprings(problem)
+            return summed_links(problem, BiquadraticSprings)
         if element not in _SIMPLICES:
             raise ModelError(
                 f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, whose strain is one and told by the "
-                f"lengths of their links; the mesh has {element} elements: take law = 'saint-venant-kirchhoff', which "
-                f"goes with any, kind = 'fem' with this law, or a mesh of {_SIMPLICES[problem.mesh.dim - 2]} elements"
+                f"lengths of their links; the mesh has {problem.mesh.kinds} elements: take law = "
+                "'saint-venant-kirchhoff', which goes with any, kind = 'fem' with this law, or a mesh of "
+                f"{_SIMPLICES[problem.mesh.dim - 2]} elements"
             )
         return HyperelasticLinks(problem, self.law)
 
@@ -103,7 +105,7 @@ class HyperelasticLinks(LinkedElements):
     @cached_property
     def _fem(self) -> FemPotential:
         """The finite elements of the same law, which are the same function."""
-        return fem_potential(self.problem, self.law)
+        return fem_of_one_kind(self.problem, self.law)
 
     @cached_property
     def _work(self) -> _Work:

@@ -173,9 +173,9 @@ class LinkedElements(ABC):
         return self._shared[0]
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The links as lines, shape (n_springs, 2)."""
-        return "line", self.springs
+        return {"line": self.springs}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Tension [N], stretch [-], stiffness at rest [N/m] and strain energy [J] of each link.

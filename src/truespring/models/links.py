@@ -1,11 +1,13 @@
 """Links: the pairs of nodes of an element that may carry springs, and the strain that their lengths tell."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.memory import slices
 from truespring.mesh import Mesh
-from truespring.models.fem import fem_potential
+from truespring.models.fem import fem_of_one_kind
 from truespring.models.laws import Constants
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
@@ -15,6 +17,34 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0
 
 # Elements whose coupling is found at a time.
 _SLICE = 1024
+
+
+def n_links(mesh: Mesh) -> int:
+    """Return the number of links of an element; of several kinds that of the kind with most."""
+    return max(len(part.kind.links) for _, part in mesh.blocks)
+
+
+def in_a_row(mesh: Mesh, values: Floats) -> Floats:
+    """Return a value of each element's each link, shape (n_elements, links), in the order of `shared_springs`.
+
+    Of several kinds rows are as long as that of the kind with most links; what is beyond an element's own is no link's.
+    """
+    if len(mesh.blocks) == 1:
+        return values.ravel()
+    return np.concatenate([values[numbers, : len(part.kind.links)].ravel() for numbers, part in mesh.blocks])
+
+
+def by_kind(problem: Problem, values: Callable[[Problem], Floats]) -> Floats:
+    """Return what `values` makes of the elements of each kind for their links, shape (n_elements, links).
+
+    Of several kinds zero beyond an element's own links.
+    """
+    if len(problem.blocks) == 1:
+        return values(problem)
+    found = np.zeros((len(problem.mesh.elements), n_links(problem.mesh)))
+    for numbers, part in problem.blocks:
+        found[numbers, : len(part.mesh.kind.links)] = values(part)
+    return found
 
 
 def link_vectors(mesh: Mesh, chosen: slice | Ints = slice(None)) -> Floats:
@@ -41,7 +71,7 @@ def link_coupling(problem: Problem) -> Floats:
     quadrature of the finite element: the two are one function. On triangles these are the
     biquadratic springs of Delingette (2008), on tetrahedra the links of Goulette and Chen (2015).
     """
-    potential = fem_potential(problem, "saint-venant-kirchhoff")
+    potential = fem_of_one_kind(problem, "saint-venant-kirchhoff")
     alike = len(problem.materials) == 1 and problem.mesh.forms.single
     n_links = len(problem.mesh.kind.links)
     coupling = np.empty((1 if alike else len(problem.mesh.elements), n_links, n_links))

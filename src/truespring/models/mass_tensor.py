@@ -10,9 +10,10 @@ from truespring.arrays import Floats, Ints, ShortInts
 from truespring.errors import ModelError, nearest
 from truespring.memory import slices
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import Fem, FemPotential, fem_potential, locking_warnings
+from truespring.models.fem import Fem, FemPotential, fem_of_one_kind, fem_potential, locking_warnings
 from truespring.models.laws import LAWS
 from truespring.models.strain import voigt_pairs
+from truespring.models.summed import SummedElements
 from truespring.models.symmetric import identity
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
@@ -67,17 +68,17 @@ class MassTensor:
         if element not in _SIMPLICES:
             raise ModelError(
                 f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, where its tensors are few; the mesh "
-                f"has {element} elements: take kind = 'heml', which is the same function and goes with any, "
+                f"has {problem.mesh.kinds} elements: take kind = 'heml', which is the same function and goes with any, "
                 f"law = 'linear', or a mesh of {_SIMPLICES[problem.mesh.dim - 2]} elements"
             )
-        return NonlinearTensors(fem_potential(problem, self.law))
+        return NonlinearTensors(fem_of_one_kind(problem, self.law))
 
 
 @dataclass(frozen=True, eq=False)
 class _Tensors:
     """What both laws share: the body, and what is drawn, which is told by the finite elements of the same function."""
 
-    fem: FemPotential
+    fem: FemPotential | SummedElements
 
     @property
     def nodes(self) -> Floats:
@@ -85,8 +86,8 @@ class _Tensors:
         return self.fem.nodes
 
     @property
-    def cells(self) -> tuple[str, Ints]:
-        """The elements, shape (n_elements, nodes)."""
+    def cells(self) -> dict[str, Ints]:
+        """The elements by VTK's name of their kind, shape (n_elements, nodes)."""
         return self.fem.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
@@ -144,6 +145,7 @@ class LinearTensors(_Tensors):
         return self.tensors
 
 
+@dataclass(frozen=True, eq=False)
 class NonlinearTensors(_Tensors):
     """St. Venant-Kirchhoff's law on simplices: an energy of fourth order in the displacements.
 
@@ -155,6 +157,8 @@ class NonlinearTensors(_Tensors):
 
     Biquadratic springs and HEML are the same function: the tangent and its stress are theirs.
     """
+
+    fem: FemPotential
 
     @cached_property
     def links(self) -> BiquadraticSprings:

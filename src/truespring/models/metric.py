@@ -147,9 +147,9 @@ class MetricPotential:
         return blocks
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The elements, shape (n_cells, corners)."""
-        return self.problem.mesh.kind.vtk, self.problem.mesh.elements
+        return self.problem.mesh.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Strain energy of each element [J]."""

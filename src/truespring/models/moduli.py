@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
 from truespring.memory import remembered
-from truespring.mesh import Mesh
+from truespring.mesh import MIXED, Mesh
 from truespring.mesh.rows import distinct_rows
 from truespring.models.bending import bending_factors, cell_counts, fem_bending_factors
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
+from truespring.models.links import in_a_row, n_links
 from truespring.models.relaxation import relaxed_elasticity
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs
@@ -267,10 +268,23 @@ def _require_resistance(elasticity: Floats) -> None:
 
 def _sharing(mesh: Mesh) -> Floats:
     """How many elements share each link: of an unbounded regular mesh where that is known, else of this one."""
-    if mesh.kind.sharing:
+    if mesh.element != MIXED and mesh.kind.sharing:
         return np.array(mesh.kind.sharing, dtype=float)
-    found = distinct_rows([mesh.pair_keys(mesh.kind.links).ravel()])
-    return np.asarray(found.count[found.of].reshape(-1, len(mesh.elements)).T, dtype=float)
+    found = distinct_rows([_link_keys(mesh)])
+    count = found.count[found.of].astype(float)
+    shares, first = np.ones((len(mesh.elements), n_links(mesh))), 0
+    for numbers, part in mesh.blocks:
+        k = len(part.kind.links)
+        last = first + k * len(numbers)
+        shares[numbers, :k] = count[first:last].reshape(k, -1).T
+        first = last
+    return shares
+
+
+def _link_keys(mesh: Mesh) -> Ints:
+    """A number for each link of each element, the same for the same two nodes: link after link, kind after kind."""
+    keys = [part.pair_keys(part.kind.links).ravel() for _, part in mesh.blocks]
+    return keys[0] if len(keys) == 1 else np.concatenate(keys)
 
 
 class SpringCounts(NamedTuple):
@@ -283,10 +297,12 @@ class SpringCounts(NamedTuple):
 
 def spring_counts(mesh: Mesh, stiffness: Floats) -> SpringCounts:
     """Count springs, each the sum of what its elements give [N/m], shape (n_elements, links); rounding is zero."""
-    if stiffness.min() > 1e3 * _ROUNDING * stiffness.max():  # no thousand elements share a spring
+    smallest = float(in_a_row(mesh, stiffness).min())
+    if smallest > 1e3 * _ROUNDING * stiffness.max():  # no thousand elements share a spring
         return SpringCounts(_n_links(mesh), 0, 0)
-    found = distinct_rows([mesh.pair_keys(mesh.kind.links).ravel()])
-    sums = np.add.reduceat(stiffness.T.ravel()[found.order], found.starts)
+    found = distinct_rows([_link_keys(mesh)])
+    given = [stiffness[numbers, : len(part.kind.links)].T.ravel() for numbers, part in mesh.blocks]
+    sums = np.add.reduceat(np.concatenate(given)[found.order], found.starts)
     rounding = _ROUNDING * np.abs(sums).max()
     return SpringCounts(len(sums), int((sums < -rounding).sum()), int((np.abs(sums) <= rounding).sum()))
 
@@ -294,6 +310,6 @@ def spring_counts(mesh: Mesh, stiffness: Floats) -> SpringCounts:
 @remembered
 def _n_links(mesh: Mesh) -> int:
     """The number of pairs of nodes that links join."""
-    keys = mesh.pair_keys(mesh.kind.links).ravel()
+    keys = _link_keys(mesh)
     keys.sort(kind="stable")
     return 1 + int(np.count_nonzero(keys[1:] != keys[:-1]))

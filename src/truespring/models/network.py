@@ -69,9 +69,9 @@ class SpringNetwork:
         return Mesh(self.nodes, self.springs, "line")
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The springs as lines, shape (n_springs, 2)."""
-        return "line", self.springs
+        return {"line": self.springs}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring."""

@@ -9,7 +9,7 @@ from truespring.arrays import Bools, Floats
 from truespring.linear.choice import choose
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError
-from truespring.mesh import Mesh
+from truespring.mesh import MIXED, Mesh
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
 from truespring.models.springs import Springs
@@ -39,7 +39,7 @@ def relaxed_elasticity(
     if not inner.any():
         return None, 0.0
     K = None
-    if mesh.forms.few and (springs.sharing == "summed" or mesh.kind.sharing):
+    if mesh.element != MIXED and mesh.forms.few and (springs.sharing == "summed" or mesh.kind.sharing):
         force = _forces_by_form(mesh, stiffness)
     else:
         K = _at_rest(problem, springs)

@@ -17,9 +17,10 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError
 from truespring.material import Material, Section
 from truespring.memory import slices
+from truespring.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
-from truespring.models.fem import fem_potential
-from truespring.models.links import CORNERS, link_coupling, link_vectors
+from truespring.models.fem import fem_of_one_kind
+from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
 from truespring.problem import Problem, sample
 
 #: Share of E h that `isotropic` gives to each body diagonal of a cube unless told otherwise: the member
@@ -49,6 +50,10 @@ class Rule:
     parameters: tuple[str, ...] = ()
     coupled: bool = False
 
+    def takes(self, mesh: Mesh) -> bool:
+        """Return whether it is made for all kinds of elements that a mesh has."""
+        return all(kind in self.elements for kind in mesh.element_kinds)
+
 
 @dataclass(frozen=True, slots=True)
 class UserStiffness:
@@ -77,8 +82,15 @@ def require_body(problem: Problem) -> tuple[Material, Section]:
 
 
 def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
-    """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links)."""
+    """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links).
+
+    Of several kinds of elements zero beyond an element's own links.
+    """
     check_rule(problem, rule, parameters)
+    return by_kind(problem, lambda part: _of_one_kind(part, rule, parameters))
+
+
+def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
     recipe = partial(RULES[rule].stiffness, **parameters)
     forms = problem.mesh.forms
     if not forms.few:
@@ -94,27 +106,36 @@ def check_rule(problem: Problem, rule: str, parameters: dict[str, float]) -> Non
     """Raise ModelError where a rule is not for the problem's elements or does not take the parameters."""
     require_body(problem)
     entry = RULES[rule]
-    if problem.mesh.element not in entry.elements:
-        allowed = [name for name, other in RULES.items() if problem.mesh.element in other.elements]
+    if not entry.takes(problem.mesh):
+        allowed = [name for name, other in RULES.items() if other.takes(problem.mesh)]
         raise ModelError(
-            f"rule = '{rule}' is for {', '.join(entry.elements)}; for this mesh of {problem.mesh.element} elements "
+            f"rule = '{rule}' is for {', '.join(entry.elements)}; for this mesh of {problem.mesh.kinds} elements "
             f"there are {', '.join(allowed)}"
         )
     idle = sorted(parameters.keys() - set(entry.parameters))
     if idle:
         owners = [name for name, other in RULES.items() if set(idle) & set(other.parameters)]
         raise ModelError(f"rule = '{rule}' takes no {', '.join(idle)}; that is for {', '.join(owners)}")
-    if "k_body" in parameters and not problem.mesh.kind.body_diagonals:
+    if "k_body" in parameters and not any(part.kind.body_diagonals for _, part in problem.mesh.blocks):
         raise ModelError("k_body is for cubes: there are no diagonals through the body of a plane element")
 
 
 def user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
-    """Return stiffness of the user's own for each element's springs [N/m], shape (n_elements, links)."""
+    """Return stiffness of the user's own for each element's springs [N/m], shape (n_elements, links).
+
+    Of several kinds of elements zero beyond an element's own links.
+    """
     require_body(problem)
+    kinds = [part.kind for _, part in problem.mesh.blocks]
+    there = {"diagonal": any(kind.diagonals for kind in kinds), "body": any(kind.body_diagonals for kind in kinds)}
+    for name, value in (("diagonal", own.diagonal), ("body", own.body)):
+        if value and not there[name]:
+            raise ModelError(f"stiffness: {name} = {value:g}, but a {problem.mesh.kinds} has no such diagonals")
+    return by_kind(problem, lambda part: _given(part, own))
+
+
+def _given(problem: Problem, own: UserStiffness) -> Floats:
     kind = problem.mesh.kind
-    for name, value, pairs in (("diagonal", own.diagonal, kind.diagonals), ("body", own.body, kind.body_diagonals)):
-        if value and not pairs:
-            raise ModelError(f"stiffness: {name} = {value:g}, but a {problem.mesh.element} has no such diagonals")
     values = [own.edge] * len(kind.edges) + [own.diagonal] * len(kind.diagonals) + [own.body] * len(kind.body_diagonals)
     return np.asarray(_scale(problem)[:, None] * np.array(values))
 
@@ -260,8 +281,8 @@ def van_gelder(problem: Problem) -> Floats:
 def biquadratic(problem: Problem) -> Floats:
     """k = 8 L^2 M_ss of the coupled springs W = q . M q, q = l^2 - L^2, which are exact St. Venant-Kirchhoff FEM.
 
-    Delingette (2008) on triangles, Goulette and Chen (2015) on tetrahedra; on squares and hexahedra the
-    same between all pairs of nodes. See `link_coupling`.
+    Delingette (2008) on triangles, Goulette and Chen (2015) on tetrahedra; on the others the same between all pairs
+    of nodes. See `link_coupling`.
     """
     length_squared = (link_vectors(problem.mesh) ** 2).sum(axis=2)
     return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(problem)))
@@ -273,7 +294,7 @@ def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats
     From the unit vectors of their links, shape (n, links, dim), and their linear FEM matrices as blocks [N/m],
     shape (n, nodes, dim, nodes, dim).
     """
-    mesh, potential = problem.mesh, fem_potential(problem, "linear")
+    mesh, potential = problem.mesh, fem_of_one_kind(problem, "linear")
     shape = (mesh.kind.n_nodes, mesh.dim)
     found = np.empty((len(mesh.elements), len(mesh.kind.links)))
     for part in slices(len(found), 16 * math.prod(shape) ** 2):
@@ -283,7 +304,7 @@ def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats
     return found
 
 
-_ALL = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
+_ALL = ("triangle", "quadrilateral", "tetrahedron", "pyramid", "wedge", "hexahedron")
 
 RULES: MappingProxyType[str, Rule] = MappingProxyType(
     {

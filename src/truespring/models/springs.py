@@ -10,8 +10,11 @@ from truespring.material import Material
 from truespring.mesh import Mesh
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
+from truespring.models.linked import LinkedElements
+from truespring.models.links import in_a_row
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
+from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.volume import VolumeSprings, VolumeTerm
 from truespring.problem import Problem
 
@@ -77,7 +80,10 @@ class Springs:
         return f"springs ({', '.join(words)})"
 
     def element_stiffness(self, problem: Problem) -> Floats:
-        """Stiffness of each element's own springs [N/m], shape (n_elements, links of the kind)."""
+        """Stiffness of each element's own springs [N/m], shape (n_elements, links of the kind).
+
+        Of several kinds of elements as many as the kind with most has, zero beyond an element's own.
+        """
         given = self._given_stiffness(problem)
         if not self.volume:
             return given
@@ -131,11 +137,11 @@ class Springs:
         wanted = section.lame_within(material)
         return wanted.mu / mu, wanted.lam - wanted.mu
 
-    def potential(self, problem: Problem) -> SpringNetwork | BiquadraticSprings | VolumeSprings:
+    def potential(self, problem: Problem) -> SpringNetwork | LinkedElements | SummedLinks | VolumeSprings:
         """Return the springs on the problem's mesh; raise ModelError for a negative one unless allowed."""
         if self.coupled:
             check_rule(problem, str(self.rule), self._parameters)
-            return BiquadraticSprings(problem)
+            return summed_links(problem, BiquadraticSprings)
         network = self.network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
@@ -143,7 +149,7 @@ class Springs:
         """Return the springs of the given stiffness of each element's links [N/m], shape (n_elements, links)."""
         mesh = problem.mesh
         springs, place = shared_springs(mesh)
-        stiffness = np.bincount(place, per_element.ravel()).astype(np.float64)
+        stiffness = np.bincount(place, in_a_row(mesh, per_element)).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)
         # Rules whose sum is zero on some links leave rounding there, which is no negative spring.
@@ -163,11 +169,11 @@ class Springs:
 def shared_springs(mesh: Mesh) -> tuple[Ints, Ints]:
     """Return the pairs of nodes that links join, each once, and the number of the pair of each element's each link.
 
-    Shapes (n_springs, 2) and (n_elements * links,).
+    Shapes (n_springs, 2) and (n_elements * links,), of several kinds of elements kind after kind.
     """
     from truespring.kernels.sparsity import unique_pairs
     from truespring.kernels.threads import writable
 
-    pairs = writable(mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2))
-    springs, place = unique_pairs(pairs, mesh.n_nodes)
+    pairs = [part.elements[:, np.array(part.kind.links)].reshape(-1, 2) for _, part in mesh.blocks]
+    springs, place = unique_pairs(writable(pairs[0] if len(pairs) == 1 else np.concatenate(pairs)), mesh.n_nodes)
     return springs, place

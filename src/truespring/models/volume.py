@@ -179,7 +179,7 @@ class VolumeSprings:
         return self.network.stretch(positions)
 
     @property
-    def cells(self) -> tuple[str, Ints]:
+    def cells(self) -> dict[str, Ints]:
         """The springs as lines, shape (n_springs, 2)."""
         return self.network.cells
 

@@ -47,7 +47,7 @@ def path_lines(path: Path) -> Ints:
     if spring_lines(path) is None:
         return path.problem.mesh.edges
     assert isinstance(path.potential, Visible)  # as all that have springs are
-    return path.potential.cells[1]
+    return path.potential.cells["line"]
 
 
 def magnification(result: Result) -> float:
@@ -215,7 +215,7 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     if mesh.element == "line":
         draw_shaded_dots(area, positions / scale.size, apart / farthest)
     else:
-        draw_shaded(area, positions[mesh.elements] / scale.size, apart[mesh.elements].mean(axis=1) / farthest)
+        draw_shaded(area, positions[mesh.elements] / scale.size, mesh.means(apart) / farthest)
     outline = reference.problem.mesh.boundary if reference.problem.mesh.element != "line" else path_lines(reference)
     _lines(area, others / scale.size, outline, INK, 1.0, 4, "reference")
     if comparison.n_outside:

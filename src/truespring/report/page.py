@@ -17,7 +17,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Path, Status
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.mesh import Box, select_elements
-from truespring.models import FemPotential, Moduli
+from truespring.models import FemPotential, Moduli, SummedElements
 from truespring.problem import Problem, Region
 from truespring.report.figures import Drawing, distance_name, over_name, render_figures
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
@@ -171,7 +171,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     size = " × ".join(given(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
     facts = [
         ("body", size),
-        ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.element})"),
+        ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.kinds})"),
     ]
     if problem.material is not None:
         facts.append(("material", _material_words(problem.material)))
@@ -188,7 +188,8 @@ def _facts(result: Result) -> list[tuple[str, str]]:
 
 def _element_facts(result: Result) -> list[tuple[str, str]]:
     """Elements of FEM that are not linear ones."""
-    used = {path.potential.interpolation for path in result.paths.values() if isinstance(path.potential, FemPotential)}
+    potentials = [path.potential for path in result.paths.values()]
+    used = {one.interpolation for one in potentials if isinstance(one, FemPotential | SummedElements)}
     told = {
         "mean-dilatation": "of mean dilatation, which do not lock where the material is nearly incompressible",
         "quadratic": "of second order, with nodes in the middle of the edges",

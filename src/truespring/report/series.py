@@ -50,9 +50,7 @@ def write_mesh(mesh: Mesh, file: FilePath, held: Bools | None = None) -> None:
     import meshio
 
     fields = {} if held is None else {"held": _in_space(held.astype(float))}
-    meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data=fields).write(
-        file, file_format="vtu"
-    )
+    meshio.Mesh(_in_space(mesh.nodes), list(mesh.cells.items()), point_data=fields).write(file, file_format="vtu")
 
 
 def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
@@ -60,13 +58,14 @@ def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
 
     mesh = path.problem.mesh
     visible = path.potential if isinstance(path.potential, Visible) else None
-    kind, cells = visible.cells if visible else (mesh.kind.vtk, mesh.elements)
+    cells = dict(visible.cells) if visible else mesh.cells
+    ends = np.cumsum([len(nodes) for nodes in cells.values()])[:-1]
     fields = visible.cell_fields(state.all_positions) if visible else {}
     return meshio.Mesh(
         _in_space(mesh.nodes),
-        [(kind, cells)],
+        list(cells.items()),
         point_data={"displacement": _in_space(state.displacement), "reaction": _in_space(state.reaction)},
-        cell_data={field: [values] for field, values in fields.items()},
+        cell_data={field: np.split(values, ends) for field, values in fields.items()},
     )
 
 
@@ -116,7 +115,7 @@ def write_difference(comparison: Comparison, file: FilePath) -> None:
         "distance": np.linalg.norm(apart, axis=1),
         "outside": comparison.outside.astype(np.uint8),
     }
-    written = meshio.Mesh(_in_space(mesh.nodes), [(mesh.kind.vtk, mesh.elements)], point_data=fields)
+    written = meshio.Mesh(_in_space(mesh.nodes), list(mesh.cells.items()), point_data=fields)
     written.write(file, file_format="vtu")
 
 

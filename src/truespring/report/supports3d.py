@@ -54,10 +54,9 @@ def _hatch(area: Area, points: Floats, facets: Ints, facing: Floats, scale: Scal
     """Short strokes out of the rim of a patch of facets, those that face away behind the body."""
     if not len(facets):
         return
-    around = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2)
-    edges = around.reshape(-1, 2)
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    rim = first[count == 1]
+    rim = first[(count == 1) & (edges[first, 0] != edges[first, 1])]  # a triangle may name a corner twice
     starts, ends, owner = points[edges[rim, 0]], points[edges[rim, 1]], rim // facets.shape[1]
     length = np.linalg.norm(ends - starts, axis=1)
     for front, zorder in ((True, 5), (False, 1.5)):

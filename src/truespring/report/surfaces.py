@@ -34,10 +34,14 @@ def facets_of(mesh: Mesh) -> Ints:
 
 
 def triangles_of(facets: Ints) -> Ints:
-    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3)."""
+    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3).
+
+    Triangles among quadrilaterals, whose last two corners are one, have no second half.
+    """
     if facets.shape[1] == 3:
         return facets
-    return np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
+    second = facets[:, [0, 2, 3]]
+    return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])
 
 
 def normals(points: Floats, facets: Ints) -> Floats:
@@ -71,8 +75,13 @@ def lines_on(facets: Ints, lines: Ints) -> tuple[Bools, Ints]:
 
 def edges_of(facets: Ints) -> Ints:
     """Return every edge of the facets once, shape (n, 2)."""
+    return np.unique(np.sort(rims(facets), axis=1), axis=0)
+
+
+def rims(facets: Ints) -> Ints:
+    """Return the edges of each facet as they go round it, shape (n, 2), facet after facet."""
     around = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
-    return np.unique(np.sort(around, axis=1), axis=0)
+    return np.asarray(around[around[:, 0] != around[:, 1]])
 
 
 def outline(points: Floats, facets: Ints, silhouette: bool = False) -> Ints:

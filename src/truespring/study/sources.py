@@ -157,7 +157,7 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
     record = _record(series, FileOptions(), report)
     if elements.is_file():  # a series of springs holds lines; the body has elements
         mesh = read_mesh(elements)
-        record = replace(record, cells={mesh.kind.vtk: mesh.elements}) if mesh.n_nodes == len(record.points) else record
+        record = replace(record, cells=mesh.cells) if mesh.n_nodes == len(record.points) else record
     path = placed(record, Placing(), f"{told['label']} of {folder.name}")
     energies = {float(level): float(energy) for level, energy in told.get("energies", [])}
     states = [

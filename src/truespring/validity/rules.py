@@ -81,17 +81,17 @@ def _named(name: str, own: dict[str, Springs], study: Study) -> Springs:
     if rule not in RULES or volume not in ("", "volume"):
         allowed = [*own, *RULES, *(f"{one}+volume" for one in RULES if not RULES[one].coupled), "all"]
         raise StudyError(f"rule '{name}' is unknown{nearest(name, allowed)}; allowed: {', '.join(allowed)}")
-    if study.problem.mesh.element not in RULES[rule].elements:
-        fit = [one for one in RULES if study.problem.mesh.element in RULES[one].elements]
+    if not RULES[rule].takes(study.problem.mesh):
+        fit = [one for one in RULES if RULES[one].takes(study.problem.mesh)]
         raise StudyError(
-            f"rule '{rule}' is not for {study.problem.mesh.element} elements, of which this study's body is made; "
+            f"rule '{rule}' is not for {study.problem.mesh.kinds} elements, of which this study's body is made; "
             f"for them there are {', '.join(fit)}"
         )
     return Springs(rule, volume=bool(volume))
 
 
 def _all(problem: Problem, varies_poisson: bool) -> dict[str, Springs]:
-    found = {name: Springs(name) for name, rule in RULES.items() if problem.mesh.element in rule.elements}
+    found = {name: Springs(name) for name, rule in RULES.items() if rule.takes(problem.mesh)}
     assert problem.material is not None and problem.section is not None  # a body has both
     _, poisson = problem.section.apparent_moduli(problem.material)
     if varies_poisson or abs(poisson - _CAUCHY[problem.mesh.dim]) > _SAME:

@@ -8,11 +8,21 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
-from truespring.mesh.facets import facet_nodes, find_facets, folded, mirrored_facets
+from truespring.mesh.facets import (
+    facet_columns,
+    facet_keys,
+    facet_nodes,
+    find_facets,
+    folded,
+    halved,
+    mirrored_facets,
+)
 from truespring.mesh.joining import merged
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED
+from truespring.mesh.merged import kinds_in, mirrored, repeats, turned
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.middles import fitting_middles
+from truespring.mesh.rows import distinct_rows
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
 #: fixed number of corners are here to be refused by name.
@@ -32,7 +42,8 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
 }
 
 _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
-_SUPPORTED = "a body is made of triangles, quadrilaterals, tetrahedra or hexahedra"
+_SUPPORTED = "a body is made of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
+_DIVIDE = "divide the others into these, as meshers do by an option and ParaView by its filter Tetrahedralize"
 
 _AGAIN = "write the file anew with the program that made it, or mend it there"
 _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
@@ -120,17 +131,20 @@ class Contents:
             whole = self._joined(body, always=bool(join))
             if whole is not self:
                 return whole._mesh(scale, join=False)
-        kind = body[0].kind
-        corners = self._rows(np.concatenate([block.corners for block in body]))
+        kind, table = _table(body)
+        corners = self._rows(table)
         nodes = np.unique(corners)
-        positions = _in_their_dimensions(self.points[nodes] * scale, kind, self.hint)
+        positions = _in_their_dimensions(self.points[nodes] * scale, body[0], self.hint)
         elements = np.searchsorted(nodes, corners)
         is_turned = _is_inverted(positions, elements, kind)
-        facet_groups, facet_notes = self._facet_groups(cells, body, nodes, elements)
-        elements[is_turned] = elements[is_turned][:, MIRRORED[kind]]
-        for facets in facet_groups.values():
-            of_turned = is_turned[facets[:, 0]]
-            facets[of_turned, 1] = mirrored_facets(kind)[facets[of_turned, 1]]
+        facet_groups, facet_notes = self._facet_groups(cells, body, nodes, elements, kind)
+        for name, numbers, _ in kinds_in(elements, kind):
+            here = np.zeros(len(elements), dtype=bool)
+            here[numbers] = is_turned[numbers]
+            for facets in facet_groups.values():
+                of_turned = here[facets[:, 0]]
+                facets[of_turned, 1] = mirrored_facets(name)[facets[of_turned, 1]]
+        elements = mirrored(elements, kind, is_turned)
         element_groups, node_groups = self._groups(cells, body, nodes)
         for name, facets in facet_groups.items():
             if name in self.node_groups:
@@ -145,10 +159,12 @@ class Contents:
                 if facets.size and element_groups.get(name, facets[:0]).size
             ),
             *self._second_order(body, nodes),
+            *_made_of_bricks(body),
             *self._unreferenced(body, scale),
             *_coincident(positions, self.node_numbers[nodes]),
             *_turned(is_turned, elements, kind, positions),
             *facet_notes,
+            *_halved(elements, kind),
             *(
                 f"group '{name}' has {self._none_of(name, body)} and was left out"
                 for name in node_groups
@@ -170,13 +186,20 @@ class Contents:
             raise MeshError(f"{error}; elements are counted from 0 in the file's order: {_MEND}") from None
 
     def _facet_groups(
-        self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints, elements: Ints
+        self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints, elements: Ints, kind: str
     ) -> tuple[dict[str, Ints], list[str]]:
         """Return facets by name, each as element and local facet of `elements`; and notes on those that are none."""
-        kind, numbers = body[0].kind, np.concatenate([block.numbers for block in body])
+        numbers = np.concatenate([block.numbers for block in body])
         found: dict[str, list[Ints]] = {}
         for name, given in self.facet_groups.items():
             found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
+            for block in body:  # of bricks that are something else facets are found by their corners
+                at = places(block.numbers, given[:, 0])
+                other = np.flatnonzero((at >= 0) & _collapsed(block)[at])
+                if other.size:
+                    local = np.array(ELEMENT_KINDS[block.kind].facets)[given[other, 1]]
+                    facets = np.take_along_axis(block.corners[at[other]], local, axis=1)
+                    found[name][0][other] = find_facets(elements, kind, places(nodes, self._rows(facets)))
         for block in cells:
             if block.dim == body[0].dim - 1 and self.cell_groups:
                 facets = find_facets(elements, kind, places(nodes, self._rows(block.corners)))
@@ -365,7 +388,7 @@ def _lines(cells: Sequence[Cells]) -> Ints | None:
 
 
 def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
-    """Return the blocks of the highest dimension; raise MeshError where they are no body of one kind of element."""
+    """Return the blocks of the highest dimension; raise MeshError where they are no body."""
     counts = Counter[str]()
     for block in cells:
         counts[block.kind] += len(block.nodes)
@@ -376,16 +399,28 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
     body = {kind: count for kind, count in counts.items() if CELL_KINDS[kind][0] == dim}
     unread = {kind: count for kind, count in body.items() if kind not in MIRRORED}
     if unread:
-        raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}")
-    if len(body) > 1:
-        raise MeshError(
-            f"{listed(body)}: {_SUPPORTED}, of one kind only; mesh it with one kind (in gmsh without recombining)"
-        )
+        raise MeshError(f"not supported: {listed(unread)}; {_SUPPORTED}: {_DIVIDE}")
     return [block for block in cells if block.dim == dim]
+
+
+def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
+    """The kind of the body, and its corners by the file's numbers, in the table that a mesh of that kind has.
+
+    Bricks and quadrilaterals with corners that are one are what these make of them: wedges, pyramids, simplices.
+    """
+    kind = body[0].kind
+    alone = len({block.kind for block in body}) == 1
+    if alone and not any(_collapsed(block).any() for block in body):
+        return kind, np.concatenate([block.corners for block in body])
+    table = turned(np.concatenate([block.corners[:, ELEMENT_KINDS[block.kind].merged] for block in body]))
+    kinds = kinds_in(table, MIXED)
+    return (kinds[0][0], kinds[0][2]) if len(kinds) == 1 else (MIXED, table)
 
 
 def _with_middles(body: Sequence[Cells]) -> list[Cells]:
     """Return the blocks of triangles and tetrahedra that have a node in the middle of each edge and no other."""
+    if len({block.kind for block in body}) > 1:  # beside other kinds they are of first order
+        return []
     simplices = [block for block in body if block.kind in ("triangle", "tetrahedron")]
     kinds = [ELEMENT_KINDS[block.kind] for block in simplices]
     return [
@@ -399,9 +434,10 @@ def _joined(*advice: str) -> str:
     return "; ".join(filter(None, advice))
 
 
-def _in_their_dimensions(positions: Floats, kind: str, hint: str) -> Floats:
-    if ELEMENT_KINDS[kind].dim == 3:
+def _in_their_dimensions(positions: Floats, cells: Cells, hint: str) -> Floats:
+    if cells.dim == 3:
         return positions
+    kind = cells.kind
     spans = np.ptp(positions, axis=0)
     if spans[2] <= _FLAT * np.linalg.norm(spans):
         return positions[:, :2]
@@ -423,10 +459,13 @@ def _in_their_dimensions(positions: Floats, kind: str, hint: str) -> Floats:
 
 def _is_inverted(positions: Floats, elements: Ints, kind: str) -> Bools:
     """Tell which elements have no positive corner; those that have some of either sign, the mesh refuses."""
-    corners = np.array(ELEMENT_KINDS[kind].corners)
-    at = positions[elements]
-    jacobians = np.linalg.det(at[:, corners[:, 1:]] - at[:, corners[:, :1]])
-    return np.asarray((jacobians <= 0).all(axis=1) & (jacobians < 0).any(axis=1))
+    found = np.zeros(len(elements), dtype=bool)
+    for name, numbers, own in kinds_in(elements, kind):
+        corners = np.array(ELEMENT_KINDS[name].corners)
+        at = positions[own]
+        jacobians = np.linalg.det(at[:, corners[:, 1:]] - at[:, corners[:, :1]])
+        found[numbers] = (jacobians <= 0).all(axis=1) & (jacobians < 0).any(axis=1)
+    return found
 
 
 def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> list[str]:
@@ -444,6 +483,37 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
             f"{_place(positions[elements[first]].mean(axis=0))} m: the mesh is folded there; {_MEND}"
         )
     return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]
+
+
+def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
+    """Say how many elements have corners that are one."""
+    count = sum(int(_collapsed(block).sum()) for block in body)
+    if not count:
+        return []
+    kind = ("quadrilateral", "hexahedron")[body[0].dim - 2]
+    return [f"{count} {kind} cell{'s' * (count != 1)} with corners that are one node became what they are"]
+
+
+def _collapsed(block: Cells) -> Bools:
+    """Tell which cells are quadrilaterals or hexahedra with corners that are one."""
+    if block.kind not in ("quadrilateral", "hexahedron"):
+        return np.zeros(len(block.nodes), dtype=bool)
+    return repeats(block.corners)
+
+
+def _halved(elements: Ints, kind: str) -> list[str]:
+    """Say where elements are joined at their corners alone."""
+    if kind != MIXED:
+        return []
+    facets = facet_columns(elements, kind)
+    found = distinct_rows(facet_keys(facets))
+    n_whole = int(halved(facets[:, found.first[found.count == 1]].T).sum()) // 3
+    if not n_whole:
+        return []
+    return [
+        f"{n_whole} face{'s' * (n_whole != 1)} of four corners {'lie' if n_whole > 1 else 'lies'} on two triangles of "
+        "other elements: joined at the corners, but not between them; pyramids make a joint without gaps"
+    ]
 
 
 def _coincident(positions: Floats, numbers: Ints) -> list[str]:

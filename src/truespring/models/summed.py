@@ -1,0 +1,170 @@
+"""Elements of several kinds on the same nodes: what each kind stores, pulls and resists is added up."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Floats, Ints, ShortInts
+from truespring.mesh import Mesh
+from truespring.models.fem import FemPotential
+from truespring.models.laws import Law
+from truespring.models.linked import LinkedElements
+from truespring.potential import SparseMatrix
+from truespring.problem import Problem
+
+Part = TypeVar("Part", FemPotential, LinkedElements)
+
+
+class _Blocks(NamedTuple):
+    """The blocks of a sum of matrices: as of a BSR matrix, and the place of those of each part among them."""
+
+    starts: ShortInts
+    columns: ShortInts
+    places: tuple[Ints, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Summed(Generic[Part]):
+    """Potentials on the nodes of one problem.
+
+    Attributes:
+        parts: one for each kind of element, in the order of `Problem.blocks`.
+        problem: of them together.
+    """
+
+    parts: tuple[Part, ...]
+    problem: Problem
+
+    @property
+    def mesh(self) -> Mesh:
+        """The problem's mesh."""
+        return self.problem.mesh
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference positions [m], shape (n_nodes, dim)."""
+        return self.problem.mesh.nodes
+
+    def energy(self, positions: Floats) -> float:
+        """Stored energy [J]; infinite where one of a part is."""
+        return sum(part.energy(positions) for part in self.parts)
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Internal force [N], shape (n_nodes, dim)."""
+        return np.asarray(sum(part.gradient(positions) for part in self.parts))
+
+    def stress(self, positions: Floats) -> Floats:
+        """What the parts call stress, one after the other, shape (n,)."""
+        return np.concatenate([part.stress(positions).ravel() for part in self.parts])
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """What they carry on linearly along `step` [m], as `stress`."""
+        return np.concatenate([part.extrapolated_stress(positions, step).ravel() for part in self.parts])
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
+        if stress is None:
+            return self._sum([part.hessian(positions) for part in self.parts])
+        given = np.split(stress, np.cumsum([np.prod(shape) for shape in self._stress_shapes])[:-1])
+        pairs = zip(self.parts, given, self._stress_shapes, strict=True)
+        return self._sum([part.hessian(positions, own.reshape(shape)) for part, own, shape in pairs])
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """The sum of those of the parts, positive semidefinite [N/m]."""
+        return self._sum([part.projected_hessian(positions) for part in self.parts])
+
+    @cached_property
+    def _stress_shapes(self) -> tuple[tuple[int, ...], ...]:
+        return tuple(part.stress(self.nodes).shape for part in self.parts)
+
+    def _sum(self, matrices: Sequence[SparseMatrix]) -> SparseMatrix:
+        blocks, dim = self._blocks(matrices), self.nodes.shape[1]
+        values = np.zeros((len(blocks.columns), dim, dim))
+        for matrix, places in zip(matrices, blocks.places, strict=True):
+            values[places] += matrix.data  # a matrix names each of its blocks once
+        return sparse.bsr_array((values, blocks.columns, blocks.starts), shape=matrices[0].shape)
+
+    def _blocks(self, matrices: Sequence[SparseMatrix]) -> _Blocks:
+        """The blocks of the sum, found at the first one: those of a part are always the same."""
+        if "_found" not in self.__dict__:
+            n_nodes = len(self.nodes)
+            rows = [np.repeat(np.arange(n_nodes), np.diff(one.indptr)) for one in matrices]
+            keys = [row * n_nodes + one.indices for row, one in zip(rows, matrices, strict=True)]
+            every = np.unique(np.concatenate(keys))
+            starts = np.searchsorted(every, np.arange(n_nodes + 1) * n_nodes).astype(np.int32)
+            places = tuple(np.asarray(np.searchsorted(every, own)) for own in keys)
+            self.__dict__["_found"] = _Blocks(starts, (every % n_nodes).astype(np.int32), places)
+        found: _Blocks = self.__dict__["_found"]
+        return found
+
+    def _by_part(self, values: Callable[[Part], dict[str, Floats]]) -> dict[str, Floats]:
+        """Values on the cells of all parts, part after part."""
+        found = [values(part) for part in self.parts]
+        return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+
+
+def summed_links(problem: Problem, make: Callable[[Problem], LinkedElements]) -> "LinkedElements | SummedLinks":
+    """Return what `make` makes of a problem; of one of several kinds of elements the sum of what it makes of each."""
+    if len(problem.blocks) == 1:
+        return make(problem)
+    return SummedLinks(tuple(make(part) for _, part in problem.blocks), problem)
+
+
+class SummedElements(_Summed[FemPotential]):
+    """Finite elements of several kinds: where they meet face to face, their displacements do."""
+
+    @property
+    def law(self) -> Law:
+        """The law of all of them."""
+        return self.parts[0].law
+
+    @property
+    def interpolation(self) -> str:
+        """One of ELEMENTS, of all of them; triangles and tetrahedra have one strain either way."""
+        return self.parts[0].interpolation
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """The elements by VTK's name of their kind, shape (n_elements, nodes)."""
+        return self.problem.mesh.cells
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element, kind after kind."""
+        return self._by_part(lambda part: part.cell_fields(positions))
+
+
+class SummedLinks(_Summed[Any]):
+    """Elements of several kinds that know their links' squared lengths."""
+
+    @cached_property
+    def _shared(self) -> tuple[Ints, Ints]:
+        """Each pair of nodes that a link joins once, and the pair of each line of each part."""
+        lines = np.sort(np.concatenate([part.springs for part in self.parts]), axis=1)
+        springs, of = np.unique(lines, axis=0, return_inverse=True)
+        return springs, of.ravel()
+
+    @property
+    def springs(self) -> Ints:
+        """Each pair of nodes that a link joins once, shape (n_springs, 2)."""
+        return self._shared[0]
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Length over rest length of each element's links, kind after kind."""
+        return np.concatenate([part.stretch(positions) for part in self.parts])
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """The links as lines, shape (n_springs, 2)."""
+        return {"line": self.springs}
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Tension [N], stretch [-], stiffness at rest [N/m] and strain energy [J] of each link, over all elements."""
+        springs, of = self._shared
+        fields = self._by_part(lambda part: part.cell_fields(positions))
+        found = {name: np.bincount(of, values, len(springs)).astype(np.float64) for name, values in fields.items()}
+        found["stretch"][of] = fields["stretch"]
+        return found
