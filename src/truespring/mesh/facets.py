@@ -37,7 +37,9 @@ def _tables(elements: Ints, kind: str) -> Iterator[_OfKind]:
 def facet_columns(elements: Ints, kind: str) -> Ints:
     """Return all facets of elements as columns, those of all elements of a kind by facet, shape (k, n)."""
     found = [own.nodes.T[own.local.T].reshape(own.local.shape[1], -1) for own in _tables(elements, kind)]
-    return found[0] if len(found) == 1 else np.concatenate(found or [np.zeros((0, 0), dtype=np.int64)], axis=1)
+    if not found:  # no element, of several kinds: facets of these have two corners in the plane, four in space
+        return np.zeros((2 if elements.shape[1] == _QUADRILATERAL else _QUADRILATERAL, 0), dtype=np.int64)
+    return found[0] if len(found) == 1 else np.concatenate(found, axis=1)
 
 
 def facet_keys(facets: Ints) -> list[Ints]:
