@@ -40,7 +40,8 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "probe_displacement": last.displacement[probe].tolist() if last else None,
         "energies": [[s.load_factor, s.energy] for s in path.states if math.isfinite(s.energy + s.load_factor)],
         "force": [_known(force) for force in path.applied_force(last).tolist()] if last else None,
-        "residual": _known(last.residual) if last else None,
+        # Where a level was not reached, that of the best state there.
+        "residual": _known((path.best or last).residual) if last else None,
         "negative_eigenvalues": last.negative_eigenvalues if last else None,
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),
         "warnings": list(path.warnings),
