@@ -69,13 +69,18 @@ def determinant(tensor: Floats) -> Floats:
 
 
 def inverted(tensor: Floats) -> Floats:
-    """Return the inverse of a symmetric tensor."""
+    """Return the inverse of a symmetric tensor; not finite where it has none, as of an element that has collapsed."""
     if len(tensor) == 3:
         xx, yy, xy = tensor
-        return np.stack([yy, xx, -xy]) / determinant(tensor)
+        return _ratio(np.stack([yy, xx, -xy]), determinant(tensor))
     xx, yy, zz, yz, xz, xy = tensor
     cofactors = [
         *(yy * zz - yz**2, xx * zz - xz**2, xx * yy - xy**2),
         *(xy * xz - xx * yz, xy * yz - yy * xz, yz * xz - zz * xy),
     ]
-    return np.stack(cofactors) / determinant(tensor)
+    return _ratio(np.stack(cofactors), determinant(tensor))
+
+
+def _ratio(cofactors: Floats, determinant: Floats) -> Floats:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(cofactors / determinant)
