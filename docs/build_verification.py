@@ -424,6 +424,8 @@ largest nodal distance over largest displacement, or distance at the tip over it
 | the same, stretching, tip | 1e-4 and 5e-5 |
 | spring lattices (SPRINGA), plane and in space, bending, stretching, prescribed motion | 1e-6 |
 | hexahedra (C3D8), tetrahedra (C3D4, C3D10), linear and NLGEOM, bending, tension, torsion, rms | 1e-6 |
+| pyramids (C3D8 with corners that are one), triangles beside quadrilaterals (CPE3, CPE4), linear and NLGEOM, rms | 1e-6 |
+| wedges (C3D8 with corners that are one) and solids of four kinds, tension and pressure, linear, NLGEOM, rms | 1e-6, 1e-5 |
 | pressure that follows, gravity, traction, twisted ends, linear and NLGEOM, plane strain and in space | 1e-3 |
 | the shipped organ, linear and NLGEOM under 0.3 of its loads, Poisson's ratio 0.3 (`make verification`) | 1e-3 |
 """

@@ -64,8 +64,9 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     The elements of the highest dimension are the body, in the file's order; cells of a lower one only
     carry groups: those of one dimension less are facets of the elements that they bound. A group of
     elements or facets is one of their nodes, too; where several have one name, the nodes are united.
-    Cells of second order become their corners, inverted elements are mirrored, nodes without an element
-    are left out: the mesh's notes say so. A plane body loses its z.
+    Cells of second order become their corners, bricks with corners that are one node wedges, pyramids or
+    simplices, inverted elements are mirrored, nodes without an element are left out: the mesh's notes say
+    so. A plane body loses its z.
 
     Args:
         file: the mesh file.
@@ -73,7 +74,7 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
         join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
-    where the file cannot be read, is damaged or cut off, or holds no body of one kind of element.
+    where the file cannot be read, is damaged or cut off, or holds no body.
     A .inp or .vtk file has no end mark: one that was cut off between two lines may pass, the former
     mostly with a note on nodes that no element has.
     """
