@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ COST = 10.0
 # How work grows with the number of unknowns, measured in the plane and in space.
 _GROWTH = 1.25
 # Newton iterations from the coarse state, of which five are usual.
-_ITERATIONS, _MOST_ITERATIONS = 6, 20
+_ITERATIONS, _MOST_ITERATIONS = 6, 10
 # Meshes are halved twice at most.
 _LEVELS = 2
 
@@ -119,7 +120,7 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
         return OwnError(None, "it was not solved to full load here")
     found, spent = None, 0.0
     try:
-        for finer in _finer(path.problem, model):
+        for finer in _finer(path, model):
             cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
             if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
@@ -147,30 +148,35 @@ def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> O
 
 
 class _Finer(NamedTuple):
-    """A finer way to solve a problem, and what the distance to it is multiplied by."""
+    """A finer way to solve a problem, made when it is wanted, and what the distance to it is multiplied by."""
 
-    problem: Problem
+    problem: Callable[[], Problem]
     model: Any
     how: str
     factor: float
     n_unknowns: int
 
 
-def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
-    """Yield finer and finer ways."""
-    n_unknowns = int((~problem.loading.held).sum())
+def _finer(path: Path, model: Any) -> Iterator[_Finer]:
+    """Yield finer and finer ways to solve the problem of a path."""
+    problem, n_unknowns = path.problem, path.n_unknowns
     growth = 2**problem.mesh.dim
     better = model.second_order(problem) if hasattr(model, "second_order") else None
     if better is not None:
-        divided = simplex_problem(problem)
-        n_unknowns = _with_middles(divided.mesh, n_unknowns)
-        yield _Finer(divided, better, "second order", SECOND_ORDER, n_unknowns)
+        yield _Finer(partial(simplex_problem, problem), better, "second order", SECOND_ORDER, growth * n_unknowns)
         return
     if not hasattr(model, "potential"):
         raise ModelError(f"{getattr(model, 'label', model)} has one mesh")
     for halvings in range(1, _LEVELS + 1):
-        problem, n_unknowns = refined_problem(problem), growth * n_unknowns
-        yield _Finer(problem, model, "refined", 1 / (1 - 2 ** (-ORDER * halvings)), n_unknowns)
+        factor = 1 / (1 - 2 ** (-ORDER * halvings))
+        make = partial(_halved, problem, halvings)
+        yield _Finer(make, model, "refined", factor, growth**halvings * n_unknowns)
+
+
+def _halved(problem: Problem, times: int) -> Problem:
+    for _ in range(times):
+        problem = refined_problem(problem)
+    return problem
 
 
 def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
@@ -182,10 +188,6 @@ def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
     if chosen or problem.mesh.kind.n_nodes == problem.mesh.dim + 1:
         return None
     return simplex_problem(problem), model
-
-
-def _with_middles(mesh: Mesh, n_unknowns: int) -> int:
-    return round(n_unknowns * (1 + len(mesh.edges) / mesh.n_nodes))
 
 
 def refined_problem(problem: Problem) -> Problem:
@@ -254,17 +256,18 @@ def _by_groups(problem: Problem) -> Problem:
 
 def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Path:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
+    problem = finer.problem()
     if isinstance(solver, Newton):
         # From a state that is near, so that the path is not taken again, and on the same branch.
         nearby = Nearby(
             1, solver.tolerance, _MOST_ITERATIONS, method=solver.method, linear=solver.linear, start=_carrying(coarse)
         )
-        path = solve(finer.problem, finer.model, nearby)
+        path = solve(problem, finer.model, nearby)
         if _sound(path):
             return path
     if coarse.newton_iterations * finer.n_unknowns**_GROWTH > most_work:
         raise ModelError("other meshes cost too much")
-    path = solve(finer.problem, finer.model, solver)
+    path = solve(problem, finer.model, solver)
     if not _sound(path):
         raise ModelError("a finer mesh finds no stable equilibrium")
     return path
