@@ -34,9 +34,9 @@ from truespring.solvers import Nearby, Newton
 #: The order of convergence that refinement is taken to have: the lowest that is met, at clamps and corners. Bodies
 #: without these have twice that or more, and their error is overestimated: by half, and twofold at most.
 ORDER = 1.0
-#: By how much the distance to elements of second order on the same nodes falls short of an error, at most: these are
-#: still off themselves. Measured on cantilevers, blocks and tubes: by 1.004 to 1.08.
-SECOND_ORDER = 1.1
+#: The share of an error of first order that elements of second order on the same nodes still have, at most: measured on
+#: cantilevers, blocks and tubes, 0.004 to 0.08.
+SECOND_ORDER = 1 / 11
 #: Refinement may cost so many times what the paths of a study did.
 COST = 10.0
 
@@ -109,12 +109,12 @@ def reference_error(
 def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
     """Return how far the path of a model is from its own limit at full load.
 
-    A model of first order whose law has elements of second order is held against these, on simplices of the same nodes:
-    their distance times SECOND_ORDER. Others are solved on meshes of half and, if that costs little, of a quarter of
-    the size: the distance to the finest over 1 - 2^(-p k), after k halvings, p = ORDER (Richardson). Where that takes
-    more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if elements are alike and
-    along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path that did not reach full
-    load, was read from a file, or finds no equilibrium on other meshes.
+    A model of first order whose law has elements of second order is held against these, on simplices of the same
+    nodes; they have the share SECOND_ORDER of its error at most. Others are solved on meshes of half and, if that costs
+    little, of a quarter of the size, which have the share 2^(-p k) of it after k halvings, p = ORDER (Richardson).
+    Where that takes more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if
+    elements are alike and along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path
+    that did not reach full load, was read from a file, or finds no equilibrium on other meshes.
     """
     if not path.complete or not path.solved:
         return OwnError(None, "it was not solved to full load here")
@@ -127,7 +127,7 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
             limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
             spent += work_of(limit)
             against = compare(path, limit)
-            value = None if against.error is None else finer.factor * against.error
+            value = None if against.error is None else _whole(against.error, finer.left)
             found = OwnError(value, finer.how, limit, against)
     except (TruespringError, MemoryError):
         pass
@@ -147,13 +147,22 @@ def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> O
     return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
 
 
+def _whole(distance: float, left: float) -> float:
+    """Return the error of a path by its distance to one that has the share `left` of it.
+
+    With the limit u, the path (1 - e) u and the other (1 - left e) u, their distance relative to that one is
+    d = (1 - left) e / (1 - left e): small ones are multiplied by 1 / (1 - left), none becomes more than the whole.
+    """
+    return distance / (1 - left * max(1 - distance, 0.0))
+
+
 class _Finer(NamedTuple):
-    """A finer way to solve a problem, made when it is wanted, and what the distance to it is multiplied by."""
+    """A finer way to solve a problem, made when it is wanted, and the share of the error that it still has."""
 
     problem: Callable[[], Problem]
     model: Any
     how: str
-    factor: float
+    left: float
     n_unknowns: int
 
 
@@ -168,9 +177,9 @@ def _finer(path: Path, model: Any) -> Iterator[_Finer]:
     if not hasattr(model, "potential"):
         raise ModelError(f"{getattr(model, 'label', model)} has one mesh")
     for halvings in range(1, _LEVELS + 1):
-        factor = 1 / (1 - 2 ** (-ORDER * halvings))
+        left = 2 ** (-ORDER * halvings)
         make = partial(_halved, problem, halvings)
-        yield _Finer(make, model, "refined", factor, growth**halvings * n_unknowns)
+        yield _Finer(make, model, "refined", left, growth**halvings * n_unknowns)
 
 
 def _halved(problem: Problem, times: int) -> Problem:
