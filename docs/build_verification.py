@@ -355,10 +355,8 @@ def loads_and_paths() -> Iterator[Row]:
 
 def shipped_studies() -> str:
     """What the shipped studies show: among it the two findings of Lembryk and Ciszkiewicz."""
-    lines = [
-        "| study | springs | reference | error at the probe | rms error | largest error | reference itself off "
-        "| off it refined |"
-    ]
+    errors = "error at the probe | rms error | largest error"
+    lines = [f"| study | springs | reference | {errors} | reference itself off | off it refined |"]
     lines.append("|---|---|---|---|---|---|---|---|")
     for name in ("stretching", "bending", "soft_block", "tissue"):
         result = run(read_study(ROOT / "examples" / f"{name}.toml"))
@@ -455,8 +453,7 @@ def page() -> str:
     )
     parts.append(
         "The plane ones once more, against the truth: triangles of second order on a mesh twice halved, root mean "
-        "square. "
-        "Beside springs stand the four-node elements of their own mesh, against which they would else be "
+        "square. Beside springs stand the four-node elements of their own mesh, against which they would else be "
         "measured.\n\n" + against_the_truth() + "\n"
     )
     return "\n".join(parts)
