@@ -152,7 +152,7 @@ def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Pat
         path = follow(study, entry) if problem is study.problem else solve(problem, entry, study.solver)  # type: ignore[arg-type]
     own = own_error(path, entry, study.solver, COST * work_of(path))
     kind = " of second order on the same nodes" if better else ""
-    itself = "how far itself off is not known" if own.value is None else f"itself about {percent(own.value)} off"
+    itself = "its own error is not known" if own.value is None else f"itself about {percent(own.value)} off"
     return path, f"{path.label}{kind}, {itself}"
 
 
