@@ -356,7 +356,7 @@ def loads_and_paths() -> Iterator[Row]:
 def shipped_studies() -> str:
     """What the shipped studies show: among it the two findings of Lembryk and Ciszkiewicz."""
     errors = "error at the probe | rms error | largest error"
-    lines = [f"| study | springs | reference | {errors} | reference itself off | off it refined |"]
+    lines = [f"| study | springs | reference | {errors} | reference's own error | error against it refined |"]
     lines.append("|---|---|---|---|---|---|---|---|")
     for name in ("stretching", "bending", "soft_block", "tissue"):
         result = run(read_study(ROOT / "examples" / f"{name}.toml"))
@@ -398,7 +398,7 @@ the limits against CalculiX are held by tests.
 
 The gap between springs and FEM is a measurement, not a test: it is in the last tables. What is tested is that
 the springs do what a lattice of springs must, and the finite elements what their law says. Where a figure is of finite
-elements the last column tells how far these are from their own limit, that of finer and finer meshes, root mean square
+elements the last column is their own error: their distance from the limit of finer and finer meshes, root mean square
 over the nodes ([what that is](study.md#how-far-a-reference-is-itself-off)).
 """
 
@@ -441,7 +441,7 @@ def page() -> str:
         ("Loads, and paths past limit points", (loads_and_paths,)),
         ("Finite elements", (cook, locking)),
     ):
-        table = ["| what | truespring | reference | apart | source | itself off |", "|---|---|---|---|---|---|"]
+        table = ["| what | truespring | reference | apart | source | own error |", "|---|---|---|---|---|---|"]
         table += [str(row) for make in rows for row in make()]
         parts.append(f"## {title}\n\n" + "\n".join(table) + "\n")
     parts.append(LOCKING)
@@ -452,9 +452,8 @@ def page() -> str:
         "mesh, but for the last column: against the same law refined.\n\n" + shipped_studies() + "\n"
     )
     parts.append(
-        "The plane ones once more, against the truth: triangles of second order on a mesh twice halved, root mean "
-        "square. Beside springs stand the four-node elements of their own mesh, against which they would else be "
-        "measured.\n\n" + against_the_truth() + "\n"
+        "The plane ones once more, against triangles of second order on a mesh twice halved, root mean square; for "
+        "comparison also the four-node elements on the mesh of the springs.\n\n" + against_the_truth() + "\n"
     )
     return "\n".join(parts)
 

@@ -447,7 +447,7 @@ def faults(verb: str, text: str, folder: Path) -> list[str]:
     found = [f"warned: {one}" for one in got.warned]
     if got.code not in (0, 1, 2, 130):
         found.append(f"exit code {got.code}")
-    if "Traceback" in got.error or "a fault of truespring" in got.error:
+    if "Traceback" in got.error or "internal error" in got.error:
         found.append(f"fault: {got.error}")
     if any(len(line) > 2000 or not line.startswith("truespring: ") for line in got.error.splitlines()):
         found.append(f"standard error: {got.error[:3000]}")

@@ -142,7 +142,7 @@ def test_a_mesh_that_is_inverted_settles_nothing(tmp_path: Path, capsys: pytest.
     file.write_text(INVERTED)
     assert main(["converge", str(file), "--out", str(tmp_path / "out"), "--meshes", "3", "--tolerance", "0.3"]) == 1
     said = capsys.readouterr().out
-    assert "settled" not in said and "It does not settle: springs is inverted on 729 nodes" in said
+    assert "settled" not in said and "The study does not settle: springs is inverted on 729 nodes" in said
     assert "inverted on 729 nodes" in (tmp_path / "out" / "inverted" / "converge.html").read_text()
 
 
@@ -168,7 +168,9 @@ def test_only_sound_meshes_settle() -> None:
     """Of the three that tell the order none may be inverted, unstable, or short of full load."""
     known = {("a", "energy", "J"): values(1.0, 1.0, 1.0)}
     sound = refinement(attempts(*["converged"] * 3), known, 0.01)
-    assert sound.settled and sound.ended and "has settled to 1 % on 3 meshes, the finest of 160 nodes" in sound.sentence
+    assert (
+        sound.settled and sound.ended and "have settled to 1 % on 3 meshes, the finest of 160 nodes" in sound.sentence
+    )
     for place, bad in itertools.product(range(3), ("inverted", "unstable")):
         found = refinement(attempts(*[bad if place == other else "converged" for other in range(3)]), known, 0.01)
         assert not found.settled and not found.ended and f"a is {bad} on {10 * 4**place} nodes" in found.sentence
@@ -211,11 +213,11 @@ def test_force_and_torque_of_supports_settle_and_the_loop_stops_at_what_it_shows
     assert watched["torque of right"].settled and not watched["torque of right"].zero
     assert main(["converge", str(file), "--out", str(tmp_path / "out"), "--tolerance", "0.05"]) == 0
     out = capsys.readouterr().out
-    assert out.count("turned: ") == len(found) and "All that is watched has settled to 5 %" in " ".join(out.split())
+    assert out.count("turned: ") == len(found) and "All watched quantities have settled to 5 %" in " ".join(out.split())
     page = (tmp_path / "out" / "turned" / "converge.html").read_text(encoding="utf-8")
     assert (
         "torque of right" in page
-        and "has settled" in page
+        and "have settled" in page
         and "http" not in page.split("</style>")[1].split("data:")[0]
     )
 

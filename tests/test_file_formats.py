@@ -48,13 +48,11 @@ def test_a_damaged_mesh_is_refused_as_what_its_content_is(tmp_path: Path) -> Non
     with pytest.raises(MeshError, match=r"mesh\.vtk: line \d+: \$"):
         read_mesh(tmp_path / "mesh.vtk")
     (tmp_path / "mesh.vtk").write_bytes(b"nothing of the kind\n")
-    neither = r"mesh\.vtk: this is no \.vtk file.*; it does not begin as \.msh, \.inp, .* files do, either; if ParaView"
+    neither = r"mesh\.vtk: this is no \.vtk file.*; it does not begin like \.msh, \.inp, .* files either; if ParaView"
     with pytest.raises(MeshError, match=neither):
         read_mesh(tmp_path / "mesh.vtk")
     (tmp_path / "mesh.obj").write_bytes(b"v 0 0 0\n")
-    both = (
-        r"a mesh file ends in \.msh, .*, not in '\.obj', and what this one begins with is none of their forms: convert"
-    )
+    both = r"a mesh file ends in \.msh, .*, not in '\.obj', and what this one begins with is none of these"
     with pytest.raises(MeshError, match=both):
         read_mesh(tmp_path / "mesh.obj")
 
@@ -101,7 +99,7 @@ def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -
     (tmp_path / f"result{key}").write_bytes(b"nothing of the kind\n")
     (tmp_path / "result.inp").write_text("*NODE\n1,0,0\n2,1,0\n3,1,1\n*ELEMENT,TYPE=CPS3\n1,1,2,3\n")
     others = [other for other in READERS if other != key]
-    with pytest.raises(ReferenceFileError, match=rf"it does not begin as {re.escape(others[0])}, .* do, either"):
+    with pytest.raises(ReferenceFileError, match=rf"it does not begin like {re.escape(others[0])}, .* either"):
         read_record(tmp_path / f"result{key}")
 
 

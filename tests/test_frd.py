@@ -176,7 +176,7 @@ DAMAGED = {
     "an element's node": (rb"(?m)^ -2         1", b" -2        99", "a hexahedron20 names node 99"),
     "an unknown element": (rb"(?m)^ -1         1    4", b" -1         1   15", r"element type 15 is not read; 1, 2"),
     "fewer nodes of an element": (rb"(?m)^ -1         1    4", b" -1         1    2", "has 6"),
-    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are announced, behind 19 stands '-3'"),
+    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are announced, after 19 comes '-3'"),
     "more rows than announced": (rb"(?m)^( -1         4.*\n)", rb"\1\1", "-3 is wanted|there twice"),
     "an unknown format": (rb"(?m)^(    2C.*)1$", rb"\g<1>7", "format 7 is not read"),
     "no number of rows": (rb"(?m)^(    2C +)20", rb"\1xx", "does not say how many rows"),

@@ -54,7 +54,7 @@ def test_a_set_of_the_assembly_and_one_of_the_part_are_two(tmp_path: Path) -> No
     mesh = deck(tmp_path, part(more=of_part) + assembly(of_assembly))
     assert sizes(mesh) == {"Set-1": 4, "Tip": 4, "Bar-1.Set-1": 12, "Bar-1.Own": 1, "Own": 1}
     assert x_of(mesh, "Set-1") == [0] and x_of(mesh, "Bar-1.Set-1") == [0, 1, 2]
-    assert mesh.notes == ("names that several scopes have are told by their instance: Bar-1.Set-1",)
+    assert mesh.notes == ("names used in several scopes are qualified by their instance: Bar-1.Set-1",)
     pull = ts.Force(on="Tip", total=(1.0, 0.0, 0.0))
     problem = ts.Problem(mesh, ts.Material(1e4, 0.0), None, [ts.Fixed(on="Set-1")], [pull])
     moved = ts.solve(problem, ts.Fem(law="linear")).states[-1].displacement
@@ -89,7 +89,7 @@ def test_instances_are_moved_then_turned(tmp_path: Path) -> None:
     half = "*Instance, name=Bar-1, part=Bar\n1., 1., 0., 2., 2., 0., 180.\n*End Instance\n"  # x and y change places
     mesh = deck(tmp_path, part() + assembly("", half))
     assert mesh.nodes == pytest.approx(np.array([(y, x, -z) for x, y, z in PLACES]))
-    with pytest.raises(MeshError, match=r"line 31: \*INSTANCE: the two points of the axis are one"):
+    with pytest.raises(MeshError, match=r"line 31: \*INSTANCE: the two points of the axis coincide"):
         deck(tmp_path, part() + assembly("", half.replace("2., 2., 0., 180.", "1., 1., 0., 180.")))
 
 
@@ -326,7 +326,7 @@ def test_what_is_included_is_bounded_and_never_shown(tmp_path: Path) -> None:
         "wide.inc": "1000 times at most: write them into one",
         "secret": "line 1 of secret: this is no .inp file: a keyword such as .NODE is wanted(;|$)",
         "bad.inc": "line 2 of bad.inc: a coordinate: numbers are wanted here",
-        "set.inc": "line 2 of set.inc: what stands there is neither a number nor a set",
+        "set.inc": "line 2 of set.inc: the entry is neither a number nor a set",
         "binary.inc": "this file is binary, not text",
     }.items():
         with pytest.raises(MeshError, match=message) as error:
@@ -439,7 +439,7 @@ def test_rows_that_are_cut_are_refused(tmp_path: Path) -> None:
         MeshError, match=r"line \d+: .NODE: 2 coordinates in the last line, which has no end: it is cut"
     ):
         deck(tmp_path, elements + NODES.rstrip()[:-4])
-    with pytest.raises(MeshError, match="line 26: an element of C3D8R takes 9 numbers, here are 8"):
+    with pytest.raises(MeshError, match="line 26: an element of C3D8R takes 9 numbers, found 8"):
         deck(tmp_path, BAR.rstrip()[:-4])
     with pytest.raises(MeshError, match="line 23: node 20 is there twice, at two places"):
         deck(tmp_path, f"{NODES}*NODE\n20, 4, 1, 1.5\n{elements}")

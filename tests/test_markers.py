@@ -130,7 +130,7 @@ WRONG = {
     "rests elsewhere": (LEVELS.replace("b,1,1,0", "b,1,2,0"), None, "markers.csv:4: this marker rests elsewhere"),
     "names in one file": ("marker,x,y\na,0,0\n", "x,y\n0,0\n", "only one of both files has a column marker"),
     "more rows": ("x,y\n0,0\n1,1\n", "x,y\n0,0\n", "2 markers are here, 1 at rest: give them names"),
-    "two units in one column": (MARKERS.replace("x [mm]", "x_mm [m]"), None, "tells two units, mm and m: leave one"),
+    "two units in one column": (MARKERS.replace("x [mm]", "x_mm [m]"), None, "has two units, mm and m: keep one"),
     "units of places alone": (
         "x [mm],y [mm],ux,uy\n1,2,3,4\n",
         None,

@@ -465,7 +465,9 @@ def test_second_order_becomes_its_corners(tmp_path: Path) -> None:
     text = TWO_QUADS.replace("CPS4", "CPS8R").replace("*ELEMENT", f"{middle}*ELEMENT")
     text = text.replace("3, 4\n2, 2", "3, 4,\n11, 12, 13, 14\n2, 2").replace("6, 3\n", "6, 3, 15, 16, 17,\n12\n")
     mesh = deck(tmp_path, text + "*NSET, NSET=top\n3, 4, 6, 13, 17\n")
-    assert mesh.notes == ("2 elements of second order became their corners; 7 nodes between the corners were left out",)
+    assert mesh.notes == (
+        "2 elements of second order were reduced to their corners; 7 nodes between the corners were left out",
+    )
     assert mesh.elements.tolist() == deck(tmp_path, TWO_QUADS).elements.tolist()
     assert sizes(mesh) == {"Body": (6, 2), "top": (3, 0)}
 
@@ -515,7 +517,7 @@ def test_a_piece_that_is_there_twice_is_taken_once(tmp_path: Path) -> None:
     file.write_bytes(text.replace(piece[0], piece[0] * 2))
     mesh = read_mesh(file)
     assert mesh.n_nodes == 8 and len(mesh.elements) == 1
-    assert "1 cells stand in two pieces and were taken once" in mesh.notes
+    assert "1 cells are in two pieces and were taken once" in mesh.notes
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -530,13 +532,13 @@ def test_a_piece_that_is_there_twice_is_taken_once(tmp_path: Path) -> None:
         ("4, 0, 1\n", "2, 0, 1\n", "line 5: node 2 is there twice"),
         ("4, 0, 1\n", "4.5, 0, 1\n", "line 5: the number of a node: '4.5' is not a whole number"),
         ("5, 6, 3", "5, 66, 3", r"line 10: element 2 \(quadrilateral\) names node 66, which is not in the file"),
-        ("5, 6, 3", "5, 6", "line 10: an element of CPS4 takes 5 numbers, here are 4"),
-        ("5, 6, 3", "5, 6, 3, 1", "line 10: an element of CPS4 takes 5 numbers, here are 6"),
+        ("5, 6, 3", "5, 6", "line 10: an element of CPS4 takes 5 numbers, found 4"),
+        ("5, 6, 3", "5, 6, 3, 1", "line 10: an element of CPS4 takes 5 numbers, found 6"),
         ("2, 2, 5", "1, 2, 5", "line 10: element 1 is there twice"),
         ("2, 2, 5, 6, 3", "2, 1, 2, 3, 4", "1 of 2 elements are duplicate"),
         ("2, 2, 5, 6, 3", "2, 2, 5, 3, 6", "1 of 2 elements are inverted.*element 1 at"),
         ("2, 2, 5, 6, 3", "2, 2, 5, 2, 3", "1 of 2 elements are degenerate"),
-        ("CPS4", "C3D6", r"line 9: an element of C3D6 takes 7 numbers, here are 10"),
+        ("CPS4", "C3D6", r"line 9: an element of C3D6 takes 7 numbers, found 10"),
         ("*NODE", "*NODE, SYSTEM=C", r"line 1: \*NODE: coordinates that are not rectangular"),
         ("*ELEMENT", "*NGEN, NSET=a\n1, 4, 1\n*ELEMENT", r"line 8: \*NGEN: this is not followed"),
         ("*NODE", "*NODE\n*NODE", r"line 1: \*NODE: there are no lines of data below"),
@@ -562,7 +564,7 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
         ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n77", r"line 89: \$EndNodes is wanted here, not '78 .*counts"),
         ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n79", r"line 90: \$Nodes ends here, 1 lines before its count"),
         ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n-8", r"line 11: \$Nodes begins with a count, not with '-8'"),
-        ("plate_triangles_22.msh", "\n2 0 0 0\n", "\n2 0 0\n", r"line 13: \$Nodes takes 4 numbers, here are 3"),
+        ("plate_triangles_22.msh", "\n2 0 0 0\n", "\n2 0 0\n", r"line 13: \$Nodes takes 4 numbers, found 3"),
         ("plate_triangles_22.msh", "\n2 0 0 0\n", "\n2 0 0 z\n", "line 13: a coordinate: 'z' is not a number"),
         ("plate_triangles_22.msh", "\n2 0 0 0\n", "\n0 0 0 0\n", "line 97: .* names node 2, which is not in the file"),
         (
@@ -670,7 +672,7 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
             "block.vtu",
             "UnstructuredGrid",
             "PolyData",
-            "array 'region' of <CellData> is damaged: its header tells 1304 bytes, wanted are 0",
+            "array 'region' of <CellData> is damaged: its header announces 1304 bytes, 0 are wanted",
         ),
     ],
 )
@@ -698,7 +700,7 @@ def test_a_count_of_cells_that_does_not_match(tmp_path: Path) -> None:
     grid(tmp_path, CUBE, [("hexahedron", np.array([range(8)]))])
     file = tmp_path / "grid.vtu"
     file.write_bytes(file.read_bytes().replace(b'NumberOfCells="1"', b'NumberOfCells="2"'))
-    with pytest.raises(MeshError, match=r"array 'offsets' of <Cells> is damaged: .* wanted are 16"):
+    with pytest.raises(MeshError, match=r"array 'offsets' of <Cells> is damaged: .* 16 are wanted"):
         read_mesh(file)
 
 

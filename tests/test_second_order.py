@@ -329,7 +329,7 @@ def test_middles_that_do_not_fit_are_refused() -> None:
     with pytest.raises(MeshError, match="folded by the nodes in the middle"):
         replace(mesh, middles=folded)
     squares = quarter("quadrilateral")
-    with pytest.raises(MeshError, match="middles are of triangles and tetrahedra"):
+    with pytest.raises(MeshError, match="middles are for triangles and tetrahedra"):
         replace(squares, middles=squares.nodes[squares.edges].mean(axis=1))
 
 

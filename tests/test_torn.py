@@ -41,7 +41,7 @@ def test_a_mesh_whose_cells_are_all_apart_is_joined(name: str) -> None:
     apart = torn(whole)
     mesh, wanted = apart.mesh(1.0), whole.mesh(1.0)
     n_before = body.elements.size
-    told = f"{n_before} nodes that stand at {body.n_nodes} places were joined, for no two elements share a node"
+    told = f"{n_before} nodes at {body.n_nodes} places were joined, because no two elements share a node"
     assert mesh.notes == (told,)
     assert mesh.n_nodes == wanted.n_nodes and len(mesh.boundary) == len(wanted.boundary)
     assert (mesh.nodes[mesh.elements] == wanted.nodes[wanted.elements]).all()

@@ -95,7 +95,7 @@ def _run_verb(arguments: Sequence[str] | None) -> int:
         if sys.flags.dev_mode:  # python -X dev shows where
             raise
         told = f"{type(error).__name__}: {one_line(str(error))}"
-        _say(f"a fault of truespring's own, please report it with the study: {told}")
+        _say(f"internal error, please report it with the study: {told}")
         return NOT_CONVERGED
 
 
@@ -144,8 +144,10 @@ def _parser() -> argparse.ArgumentParser:
             _add_timeout(verb)
     verb = add("converge", _converge, "solve a study on finer and finer meshes until what is watched settles")
     verb.add_argument("--out", type=Path, default=Path("out"), metavar="DIR", help="default: out")
-    verb.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relative, default: 0.01")
-    verb.add_argument("--meshes", type=_positive, default=5, metavar="N", help="at most so many, default: 5")
+    verb.add_argument(
+        "--tolerance", type=float, default=0.01, metavar="E", help="relative error to reach, default: 0.01"
+    )
+    verb.add_argument("--meshes", type=_positive, default=5, metavar="N", help="largest number of meshes, default: 5")
     verb = add("compare", _compare, "compare results, whoever computed them: the first is the reference", studies=False)
     _add_sources(verb)
     verb = add("export", _export, "write the springs of a study for another simulator, and what to expect there")
@@ -179,7 +181,7 @@ def _add_timeout(verb: argparse.ArgumentParser) -> None:
         "--timeout",
         type=_seconds,
         metavar="SECONDS",
-        help="give a model up after so long; default: never, another program after 3600",
+        help="stop a model after this time; default: no limit, 3600 for other programs",
     )
 
 
@@ -269,7 +271,7 @@ def _add_sources(verb: argparse.ArgumentParser) -> None:
         "--probe", metavar="POINT", help='such as right-middle or "160 mm, 20 mm"; default: what moves most'
     )
     verb.add_argument(
-        "--tolerance", type=float, metavar="E", help="the rms error up to which they agree, default: 0.05"
+        "--tolerance", type=float, metavar="E", help="largest error (rms or force) at which they agree, default: 0.05"
     )
     for name, what in _TOLD.items():
         verb.add_argument(f"--{name.replace('_', '-')}", action="append", default=[], metavar="[FILE=]VALUE", help=what)

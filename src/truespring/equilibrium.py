@@ -200,11 +200,6 @@ class Path:
         return self.potential is not None or self.n_unknowns > 0
 
     @property
-    def has_reactions(self) -> bool:
-        """Whether the forces of the supports are known at every state."""
-        return bool(self.states) and all(bool(np.isfinite(state.reaction).all()) for state in self.states)
-
-    @property
     def newton_iterations(self) -> int:
         """All Newton iterations spent."""
         return sum(state.iterations for state in self.states) + (self.best.iterations if self.best else 0)
@@ -539,8 +534,8 @@ def _path_warnings(
 
 
 _DROWNED = (
-    "the load drowns in rounding: it is too small for the stiffness and the coordinates of the body; load more, or "
-    "place the body near the origin"
+    "the load is lost in rounding: it is too small for the stiffness and the coordinates of the body; apply a larger "
+    "load, or place the body near the origin"
 )
 
 

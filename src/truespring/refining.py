@@ -130,8 +130,10 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
             value = None if against.error is None else _whole(against.error, finer.left)
             found = OwnError(value, finer.how, limit, against)
     except (TruespringError, MemoryError):
-        pass
-    return replace(found or _from_coarser(path, model, solver, most_work - spent), work=spent)
+        pass  # what was found before stands, else a coarser mesh tells
+    if found is None:
+        found = _from_coarser(path, model, solver, most_work - spent)
+    return replace(found, work=spent + found.work)
 
 
 def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
@@ -175,7 +177,7 @@ def _finer(path: Path, model: Any) -> Iterator[_Finer]:
         yield _Finer(partial(simplex_problem, problem), better, "second order", SECOND_ORDER, growth * n_unknowns)
         return
     if not hasattr(model, "potential"):
-        raise ModelError(f"{getattr(model, 'label', model)} has one mesh")
+        raise ModelError(f"{getattr(model, 'label', model)} can be solved on its own mesh only")
     for halvings in range(1, _LEVELS + 1):
         left = 2 ** (-ORDER * halvings)
         make = partial(_halved, problem, halvings)
@@ -223,7 +225,7 @@ def coarser_problem(problem: Problem) -> Problem:
     chosen = [getattr(one, "on", None) for one in (*problem.supports, *problem.loads)]
     plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
     if counts is None or any(count % 2 for count in counts) or not plain or mesh.element_groups or mesh.facet_groups:
-        raise MeshError("no mesh of twice the size is known")
+        raise MeshError("there is no mesh of twice the size")
     half = tuple(count // 2 for count in counts)
     size = mesh.upper - mesh.lower
     made = (rectangle if mesh.dim == 2 else box)(tuple(size.tolist()), half)

@@ -109,25 +109,30 @@ class Refinement:
             f"{len(self.n_nodes)} mesh{'es' if len(self.n_nodes) > 1 else ''}, the finest of {self.n_nodes[-1]:,} nodes"
         )
         if self.settled:
-            return f"All that is watched has settled to {_percent(self.tolerance)} on {count}."
+            return f"All watched quantities have settled to {_percent(self.tolerance)} on {count}."
         troubled = [one for one in self.last if not one.sound]
         if troubled:
             one = troubled[0]
             where = "" if one.complete else f" beyond load factor {one.load_factor:.4g}"
-            return f"It does not settle: {one.model} is {one.status}{where} on {one.n_nodes:,} nodes: {one.advice}."
+            return (
+                f"The study does not settle: {one.model} is {one.status}{where} on {one.n_nodes:,} nodes: {one.advice}."
+            )
         coarse = [one for one in self.attempts if not one.sound and one.n_nodes in self.n_nodes[-_MESHES:]]
         if coarse:
             one = coarse[-1]
-            return f"It does not settle on {count}: {one.model} is {one.status} on {one.n_nodes:,} nodes."
+            return f"The study does not settle on {count}: {one.model} is {one.status} on {one.n_nodes:,} nodes."
         if len(self.n_nodes) < _MESHES:
-            return f"It is too early to tell on {count}: that takes {_MESHES}."
+            return f"Too early to tell on {count}: at least {_MESHES} are needed."
         if not self.told:
-            return f"Nothing settles on {count}: all that is watched is zero."
-        worst = max((one for one in self.told if not one.settled), key=lambda one: one.error or 0.0)
-        off = "not known" if worst.error is None else f"{_percent(worst.error)} off"
-        return (
-            f"It does not settle to {_percent(self.tolerance)} on {count}: {worst.quantity} of {worst.model} is {off}."
-        )
+            return f"Nothing settles on {count}: all watched quantities are zero."
+        untold = [one.model for one in self.attempts if one.model not in {told.model for told in self.told}]
+        if untold:
+            return f"The study does not settle on {count}: all watched quantities of {untold[0]} are zero."
+        unsettled = [one for one in self.told if not one.settled]
+        worst = max(unsettled, key=lambda one: math.inf if one.error is None else one.error)
+        off = "off by an unknown error" if worst.error is None else f"{_percent(worst.error)} off"
+        wanted = _percent(self.tolerance)
+        return f"The study does not settle to {wanted} on {count}: {worst.quantity} of {worst.model} is {off}."
 
 
 def _percent(share: float) -> str:

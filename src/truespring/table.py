@@ -128,7 +128,7 @@ class Table:
         if glued and self._dimension(self._spelt(glued["name"])) and self._is_unit(glued["unit"]):
             if unit and unit != glued["unit"]:
                 raise self._error(
-                    f"{self._file}:1: column '{head.strip()}' tells two units, {glued['unit']} and {unit}: leave one"
+                    f"{self._file}:1: column '{head.strip()}' has two units, {glued['unit']} and {unit}: keep one"
                 )
             return self._spelt(glued["name"]), glued["unit"]
         return name, unit

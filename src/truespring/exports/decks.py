@@ -19,7 +19,7 @@ from truespring.exports.exported import Exported, printable
 from truespring.loading import Gravity, Moment, Pressure, nodal_force
 from truespring.loading.following import FaceMoment
 from truespring.material import PlaneStrain
-from truespring.mesh import outer_facets
+from truespring.mesh import outer_facets, plural
 from truespring.mesh.facets import facet_keys
 from truespring.mesh.files.inp_elements import FACES
 from truespring.models import Fem, SpringNetwork
@@ -237,8 +237,8 @@ def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
         )
     if element not in ELEMENTS or (element == "quadratic" and problem.mesh.element not in _SECOND_ORDER):
         raise ExportError(
-            f"element = '{element}' is not written of a mesh of {problem.mesh.element} elements: \"linear\" is of all, "
-            f'"quadratic" of {" and ".join(f"{name}s" for name in _SECOND_ORDER)}'.replace("tetrahedrons", "tetrahedra")
+            f"element = '{element}' cannot be written for a mesh of {problem.mesh.element} elements: \"linear\" is for "
+            f'all, "quadratic" for {" and ".join(map(plural, _SECOND_ORDER))}'
         )
 
 

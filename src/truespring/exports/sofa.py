@@ -87,7 +87,7 @@ def _of_elements(exported: Exported) -> Iterator[str]:
         yield "A network has no finite element twin. It starts from the first load level that truespring reached."
         return
     if element not in _ELEMENTS:
-        yield f"There is no finite element twin: SOFA is given no {exported.problem.mesh.kinds} elements."
+        yield f"There is no finite element twin: {exported.problem.mesh.kinds} elements are not exported to SOFA."
         return
     yield (
         f"The twin's elements are SOFA's {_ELEMENTS[element][1]}, method 'large': linear elasticity turned with each "

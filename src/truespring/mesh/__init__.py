@@ -12,6 +12,7 @@ from truespring.mesh.kinds import ELEMENT_KINDS as ELEMENT_KINDS
 from truespring.mesh.kinds import MIXED as MIXED
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.kinds import counted as counted
+from truespring.mesh.kinds import plural as plural
 from truespring.mesh.measures import corner_measures as corner_measures
 from truespring.mesh.measures import element_corner_measures as element_corner_measures
 from truespring.mesh.mesh import Mesh as Mesh

@@ -147,12 +147,17 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
 #: What `Mesh.element` says of a mesh of several kinds.
 MIXED = "mixed"
 
-_PLURALS = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}
+_PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
+
+
+def plural(kind: str) -> str:
+    """Return the plural of a kind of cell: "wedges", "hexahedra"."""
+    return _PLURALS.get(kind, f"{kind}s")
 
 
 def counted(count: int, kind: str) -> str:
-    """Say how many elements of a kind there are: "1 wedge", "8 hexahedra"."""
-    return f"{count} {kind if count == 1 else _PLURALS.get(kind, f'{kind}s')}"
+    """Say how many cells of a kind there are: "1 wedge", "8 hexahedra"."""
+    return f"{count} {kind if count == 1 else plural(kind)}"
 
 
 #: The nodes of an element in the order of its mirror image.

@@ -27,13 +27,13 @@ def merged(cells: Mapping[str, Ints]) -> Ints:
         own = ELEMENT_KINDS.get(kind)
         if own is None or not own.merged:
             allowed = ", ".join(name for name, other in ELEMENT_KINDS.items() if other.merged)
-            raise MeshError(f"'{kind}' is no kind of element that others stand beside; allowed: {allowed}")
+            raise MeshError(f"'{kind}' elements cannot be mixed with others; allowed: {allowed}")
         given = np.asarray(elements)
         if given.ndim != 2 or given.shape[1] != own.n_nodes:
             raise MeshError(f"elements of kind {kind} have {own.n_nodes} nodes each, not shape {given.shape}")
         tables.append(given[:, own.merged])
     if len({table.shape[1] for table in tables}) != 1:
-        raise MeshError(f"{', '.join(cells)}: the elements of a mesh all are plane or all are solid")
+        raise MeshError(f"{', '.join(cells)}: the elements of a mesh are all plane or all solid")
     return np.concatenate(tables)
 
 
@@ -53,7 +53,7 @@ def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
     if not known.all():
         first = int(known.argmin())
         raise MeshError(
-            f"{int((~known).sum())} of {len(known)} elements are degenerate: corners that are one as in no kind of "
+            f"{int((~known).sum())} of {len(known)} elements are degenerate: their coinciding corners match no kind of "
             f"element; the first is element {first}, of nodes {', '.join(map(str, elements[first].tolist()))}"
         )
     return found

@@ -135,7 +135,7 @@ class Mesh:
 
     def _checked_middles(self, middles: Floats) -> Floats:
         if self.element not in ("triangle", "tetrahedron"):
-            raise MeshError(f"middles are of triangles and tetrahedra, not of {self.element} elements")
+            raise MeshError(f"middles are for triangles and tetrahedra, not for {self.element} elements")
         try:
             frozen = frozen_floats(middles, (len(self.edges), self.dim), "middles")
         except ValueError as error:

@@ -161,8 +161,8 @@ def _stiff_simplices(problem: Problem) -> tuple[str, ...]:
         return ()
     return (
         f"the {simplices[0]} beside other kinds of elements are linear, too stiff in bending and where the material is "
-        "nearly incompressible: keep them few and away from where it matters, or mesh the body in them alone, which "
-        "are quadratic then",
+        "nearly incompressible: keep them few and away from where it matters, or mesh the body with them alone: "
+        "they are quadratic then",
     )
 
 

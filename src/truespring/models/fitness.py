@@ -11,10 +11,10 @@ from truespring.errors import ModelError
 from truespring.loading import Fixed
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.memory import remembered
-from truespring.mesh import Mesh, box, rectangle
+from truespring.mesh import Mesh, box, plural, rectangle
 from truespring.models.bending import bending_excess
 from truespring.models.elasticity import hooke, lattice_classes
-from truespring.models.fem import fem_potential, locks
+from truespring.models.fem import SIMPLICES, fem_potential, locks
 from truespring.models.moduli import Moduli, moduli, spring_counts
 from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import RULES, require_body
@@ -27,7 +27,6 @@ from truespring.problem import Problem
 _CAUCHY = {2: 1 / 3, 3: 1 / 4}
 
 # Meshes on which plain springs can be isotropic, by the kind of element that mostly is no such mesh.
-_PLURAL = {"triangle": "triangles", "tetrahedron": "tetrahedra"}
 _ISOTROPIC_MESH = {
     "triangle": "equilateral triangles, or squares",
     "tetrahedron": 'body-centred-cubic tetrahedra (of a box: element = "bcc-tetrahedron")',
@@ -115,9 +114,9 @@ class _Judge:
         kind = twin.mesh.element
         if springs.coupled and springs_lock(twin, springs):
             yield f"they are linear finite elements, which lock at a Poisson's ratio of {material.poisson:g}"
-        elif springs.coupled and kind in _PLURAL and (excess := bending_excess(twin)) > self.tolerance:
+        elif springs.coupled and kind in SIMPLICES and (excess := bending_excess(twin)) > self.tolerance:
             yield (
-                f"they are finite elements of linear {_PLURAL[kind]}, which on this mesh are too stiff in bending by "
+                f"they are finite elements of linear {plural(kind)}, which on this mesh are too stiff in bending by "
                 f"{100 * excess:.2g} %"
             )
 
@@ -169,7 +168,7 @@ class _Judge:
         )
         yield f"Not fit for {self._whom()}: {'; '.join(found)}."
         if better is None:
-            mend = " Finite elements of second order are, and finer meshes." if springs.coupled else ""
+            mend = " Finite elements of second order and finer meshes are better." if springs.coupled else ""
             yield f"No rule here is better on this mesh.{mend}"
             yield from self._remarks(springs) if springs.coupled else ()
             yield from self._bending(springs)
@@ -178,7 +177,7 @@ class _Judge:
         exact = self._deviation(better) < 1e-6
         yield f"Better here: {key}{', which realises it exactly' if exact else f': {self._realised(better)}'}."
         for text in self.said(lambda twin: self.of_elements(twin, better)):
-            yield f"But {text}, and so fit for no more than a first look; finite elements of second order are not."
+            yield f"But {text}: use them for a first look only, or take finite elements of second order."
         yield from self._remarks(better)
         simpler = min(self._above_cauchy()) >= -self.tolerance  # below, the volume term is negative on any mesh
         if better.coupled and simpler and self.problem.mesh.element in _ISOTROPIC_MESH:

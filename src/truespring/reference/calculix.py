@@ -241,7 +241,7 @@ class CalculiX:
 
 def _said(finished: Finished) -> str:
     if finished.timeout is not None:
-        return f"nothing, the time of {finished.timeout:g} s was up (--timeout)"
+        return f"nothing, the time limit of {finished.timeout:g} s was reached (--timeout)"
     if finished.errors:
         return f"'{finished.errors[-1]}'"
     return f"nothing (exit code {finished.code}); are its equations singular at rest, a part of the body free to move?"

@@ -179,8 +179,8 @@ class _Result:
         """Return a further row of a block, empty where its end mark stands; refuse anything else."""
         line = self._scan.line()
         if not line.startswith((b" -1", b" -3")):
-            why = f"stands {self._scan.shown(line)}" if line else "the file is cut off"
-            self._scan.refuse(f"behind {done} rows {why}: -3 is wanted at the end of a block")
+            why = f"comes {self._scan.shown(line)}" if line else "the file is cut off"
+            self._scan.refuse(f"after {done} rows {why}: -3 is wanted at the end of a block")
         return line if line.startswith(b" -1") else b""
 
     def _tell_more(self, what: str, announced: int, there: int) -> None:
@@ -193,7 +193,7 @@ class _Result:
         for place, line in enumerate(lines):
             if not line.startswith(b" -1"):
                 where = scan.line_number - len(lines) + 1 + place
-                scan.refuse(f"{count} rows are announced, behind {before + place} stands {scan.shown(line)}", where)
+                scan.refuse(f"{count} rows are announced, after {before + place} comes {scan.shown(line)}", where)
         if len(lines) < wanted:
             scan.refuse(f"the file is cut off: {count} rows are announced, {before + len(lines)} are there")
 

@@ -129,7 +129,7 @@ def read_record(
     if key is None:
         raise ReferenceFileError(
             f"{file}: a result ends in {', '.join(READERS)}, not in '{file.suffix}'"
-            f"{nearest(file.suffix.lower(), READERS)}, and what it begins with is none of their forms: "
+            f"{nearest(file.suffix.lower(), READERS)}, and what it begins with is none of these formats: "
             "convert it to VTK"
         )
     options = {
@@ -148,6 +148,6 @@ def read_record(
     except ReferenceFileError as error:
         if not READERS[key].is_marked or _is_recognised(file, key):
             raise
-        raise ReferenceFileError(f"{error}; it does not begin as {listed_keys(READERS, key)} do, either") from None
+        raise ReferenceFileError(f"{error}; it does not begin like {listed_keys(READERS, key)} either") from None
     record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

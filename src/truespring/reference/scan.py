@@ -141,7 +141,7 @@ class Scan:
             if not number.isdigit() or len(found) != count or b"".join(found) != text:
                 self.refuse(
                     f"{self.shown(line)} is no row of this block: a node and {count} numbers are wanted, with "
-                    "exponents of two or three digits; write the results anew, in CalculiX also by *NODE OUTPUT",
+                    "exponents of two or three digits; write the results again, in CalculiX also by *NODE OUTPUT",
                     first + place,
                 )
             numbers[place], values[place] = int(number), [float(one) for one in found]

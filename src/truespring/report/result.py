@@ -31,7 +31,7 @@ class Result:
         probe: number of the node that is watched.
         model: name of the path that is compared with the others; None where nothing is compared.
         comparisons: by name of the reference.
-        tolerance: the rms error up to which two paths agree.
+        tolerance: the error, rms or of force, up to which two paths agree.
         source: text of the study file; comments at its head are shown with its results.
         fitness: whether the springs of a path are fit for the material, by its name.
         standings: how far each reference is from its own limit, by its name; empty where none was refined.

@@ -65,7 +65,7 @@ def _figure(found: Refinement) -> dict[str, str] | None:
         style = SPRING_STYLES[place % len(SPRING_STYLES)]
         curves.append(Curve(meshes, shares, *style, label=f"{one.quantity}\n{one.model}", strong=False))
     with figure_style():
-        sheet = plot("What is watched over what it comes to", "mesh", "share [%]", curves, far=True).sheet
+        sheet = plot("Watched quantities over their limits", "mesh", "share [%]", curves, far=True).sheet
         return picture(Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width))
 
 

@@ -39,7 +39,7 @@ def own_error_sentence(result: Result, called: dict[str, str]) -> str | None:
     rest = f"; of {_listed(called[name] for name in unknown)} it is not known" if unknown else ""
     refined = {name: one.refined_error for name, one in known.items() if one.refined_error is not None}
     against = [f"{called[name]} {percent(refined[name])}" for name in sorted(refined, key=lambda name: refined[name])]
-    truth = f"; against it refined, {', '.join(against)}" if against else ""
+    truth = f"; against refined references, {', '.join(against)}" if against else ""
     return f"{_who(result, list(told), 'is', 'are')} {shown} off{truth}{rest}."
 
 

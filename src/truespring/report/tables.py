@@ -142,7 +142,7 @@ def settling_table(title: str, found: Refinement) -> "Table":
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
     by = ("by",) if forced else ()
-    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "itself")
+    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "own error")
     table = _table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))

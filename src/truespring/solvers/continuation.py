@@ -178,8 +178,8 @@ def _idle(balance: Balance, rest: Equilibrium, weights: Floats, step: float) -> 
     if abs(step) * moved <= _FAR * balance.size * own:
         return ""
     return (
-        f"the load does not move what is controlled: at rest that moves by {own / moved:.1e} of what the node moves "
-        "that moves most; control a displacement along the load, or follow the path by its arc length"
+        f"the load does not move what is controlled: at rest it moves {own / moved:.1e} times as far as the node that "
+        "moves most; control a displacement along the load, or follow the path by its arc length"
     )
 
 

@@ -71,7 +71,7 @@ class Study:
         model: the name of the entry that is compared with the others, None where there is nothing to compare.
         references: the names that it is compared with.
         probe: number of the node that is watched; None takes the one that moves most.
-        tolerance: the rms error up to which two paths agree.
+        tolerance: the error, rms or of force, up to which two paths agree.
         refine: whether references are refined to tell how far they are themselves off.
     """
 

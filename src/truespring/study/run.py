@@ -141,7 +141,7 @@ def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
 
     def timed(load_factor: float, iteration: int, residual: float) -> None:
         if time.monotonic() > end:
-            raise TimeoutError(f"the time of {timeout:g} s was up (--timeout)")
+            raise TimeoutError(f"the time limit of {timeout:g} s was reached (--timeout)")
         if report:
             report(load_factor, iteration, residual)
 

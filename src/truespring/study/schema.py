@@ -68,7 +68,7 @@ def _strict_number(value: Any) -> Any:
 
 def _file_name(value: Any) -> Any:
     if isinstance(value, str) and not value.isprintable():
-        raise ValueError(f"{shown(value)} is no name of a file: it has a character that does not print")
+        raise ValueError(f"{shown(value)} is not a file name: it has a non-printing character")
     return value
 
 

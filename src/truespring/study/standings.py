@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from truespring.equilibrium import Path
+from truespring.equilibrium import Path, error_words
 from truespring.refining import COST, Standing, own_error, standing, work_of
 from truespring.study.read import Study
 
@@ -18,7 +18,10 @@ def standings(study: Study, paths: Mapping[str, Path], names: Sequence[str]) -> 
     found = {}
     # What has a law tells most by its limit: springs as references come last.
     for name in sorted(names, key=lambda name: not hasattr(study.entries[name], "second_order")):
-        own = own_error(paths[name], study.entries[name], study.solver, left)
-        left -= own.work
-        found[name] = standing(paths[study.model], own)
+        try:
+            own = own_error(paths[name], study.entries[name], study.solver, left)
+            left -= own.work
+            found[name] = standing(paths[study.model], own)
+        except Exception as error:  # what was solved before is not lost for that
+            found[name] = Standing(None, error_words(error))
     return {name: found[name] for name in names}

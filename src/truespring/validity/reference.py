@@ -8,7 +8,6 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.comparison import compare
-from truespring.equilibrium import Path
 from truespring.errors import MeshError, StudyError
 from truespring.settling import Settling, settle
 from truespring.validity.bodies import Body
@@ -243,8 +242,3 @@ def _by_richardson(changes: list[float]) -> tuple[float, float | None]:
     shown = len(orders) > 1 and low >= _LOWEST and high - low <= _ASYMPTOTIC * high
     order = min(low, _HIGHEST) if shown else _CAUTIOUS if not orders else min(max(orders[-1], _LOWEST), _CAUTIOUS)
     return _SAFETY * changes[-1] / (2**order - 1), order if shown else None
-
-
-def label_of(path: Path) -> str:
-    """How a reference is called in sentences: its law, not its elements."""
-    return path.label.partition(" (")[0]

@@ -35,8 +35,8 @@ class Format(NamedTuple):
     again: str = ""
 
 
-_GMSH = "if gmsh reads it, save it anew by: gmsh FILE -0 -format msh41 -o NEW.msh"
-_PARAVIEW = "if ParaView reads it, save it anew there as an unstructured grid, .vtu"
+_GMSH = "if gmsh reads it, save it again: gmsh FILE -0 -format msh41 -o NEW.msh"
+_PARAVIEW = "if ParaView reads it, save it again there as an unstructured grid, .vtu"
 
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
@@ -86,13 +86,13 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     if key is None:
         raise MeshError(
             f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
-            "is none of their forms: convert it, as by: meshio convert FILE NEW.vtu"
+            "is none of these formats: convert it, for example: meshio convert FILE NEW.vtu"
         )
     form = FORMATS[key]
     try:
         contents = form.read(data, file.parent)
     except MeshError as error:
-        others = "" if form.recognises(data) else f"it does not begin as {listed_keys(FORMATS, key)} do, either"
+        others = "" if form.recognises(data) else f"it does not begin like {listed_keys(FORMATS, key)} either"
         raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
     try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)

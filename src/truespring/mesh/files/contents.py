@@ -18,7 +18,7 @@ from truespring.mesh.facets import (
     mirrored_facets,
 )
 from truespring.mesh.joining import merged
-from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED
+from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED, counted
 from truespring.mesh.merged import kinds_in, mirrored, repeats, turned
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.middles import fitting_middles
@@ -41,11 +41,10 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
     "polyhedron": (3, 0),
 }
 
-_PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
 _SUPPORTED = "a body is made of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
 _DIVIDE = "divide the others into these, as meshers do by an option and ParaView by its filter Tetrahedralize"
 
-_AGAIN = "write the file anew with the program that made it, or mend it there"
+_AGAIN = "write the file again with the program that made it, or mend it there"
 _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
 
 # A coordinate beyond this was damaged, whatever the unit; its square still is a number.
@@ -211,7 +210,7 @@ class Contents:
             groups[name] = facets[facets[:, 0] >= 0]
             n_lost = len(facets) - len(groups[name])
             if n_lost:
-                left = "no load acts on them" if n_lost < len(facets) else "they are taken for their nodes alone"
+                left = "no load acts on them" if n_lost < len(facets) else "only their nodes are used"
                 notes.append(f"{n_lost} of {len(facets)} facets of group '{name}' bound no element of the body: {left}")
         return groups, notes
 
@@ -226,7 +225,7 @@ class Contents:
         if n_after == n_before:
             return self
         number = self.node_numbers[first][place]  # of each node, the one that it becomes
-        why = "were joined" if always else "were joined, for no two elements share a node"
+        why = "were joined" if always else "were joined, because no two elements share a node"
         return replace(
             self,
             node_numbers=self.node_numbers[first],
@@ -236,7 +235,7 @@ class Contents:
                 name: np.unique(number[_found(self.node_numbers, group)]) for name, group in self.node_groups.items()
             },
             node_lines=None if self.node_lines is None else self.node_lines[first],
-            notes=(*self.notes, f"{n_before} nodes that stand at {n_after} places {why}"),
+            notes=(*self.notes, f"{n_before} nodes at {n_after} places {why}"),
         )
 
     def _rows(self, node_numbers: Ints) -> Ints:
@@ -297,7 +296,7 @@ class Contents:
                 "edges, springs and elements of first order the corners alone"
             ]
         left = f"{between} nodes between the corners were left out"
-        return [f"{count} elements of second order became their corners; {left}"]
+        return [f"{count} elements of second order were reduced to their corners; {left}"]
 
     def _curved(self, mesh: Mesh, body: Sequence[Cells], nodes: Ints, scale: float) -> Mesh:
         """Return the mesh with the nodes in the middle of the edges of triangles and tetrahedra."""
@@ -312,7 +311,7 @@ class Contents:
             return mesh
         note = (
             f"{n_folded} elements of second order are folded by the nodes in the middle of their edges: these edges "
-            "were taken for straight"
+            "were taken as straight"
         )
         return replace(mesh, middles=middles, notes=(*mesh.notes, *([note] if n_folded else [])))
 
@@ -535,7 +534,7 @@ def _coincident(positions: Floats, numbers: Ints) -> list[str]:
 
 def listed(counts: Mapping[str, int]) -> str:
     """List kinds of cells with their counts."""
-    words = [f"{count} {kind if count == 1 else _PLURALS.get(kind, f'{kind}s')}" for kind, count in counts.items()]
+    words = [counted(count, kind) for kind, count in counts.items()]
     return " and ".join([*([", ".join(words[:-1])] if words[1:] else []), *words[-1:]])
 
 

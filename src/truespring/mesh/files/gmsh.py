@@ -271,7 +271,7 @@ class _Text(_Sections):
                 raise MeshError(
                     f"line {at[wrong[0]]}: "
                     + (
-                        f"an element of gmsh's type {type_} with {n_tags} tags takes {wanted} numbers, here are "
+                        f"an element of gmsh's type {type_} with {n_tags} tags takes {wanted} numbers, found "
                         f"{width[wrong[0]]}"
                         if wanted >= 0
                         else _unsupported(type_)

@@ -24,8 +24,8 @@ def format_by_head(suffix: str, head: bytes, formats: Mapping[str, Recognises]) 
 
 def read_as(key: str, suffix: str) -> tuple[str, ...]:
     """Say as what a file was read whose suffix tells something else."""
-    ending = f"not that of a file that ends in '{suffix}'" if suffix else "though its name does not tell"
-    return (f"read as a {key} file, whose form it has, {ending}",) if key != suffix.lower() else ()
+    ending = f"although its name ends in '{suffix}'" if suffix else "although its name has no ending"
+    return (f"read as a {key} file by its content, {ending}",) if key != suffix.lower() else ()
 
 
 def listed_keys(formats: Iterable[str], without: str) -> str:

@@ -54,7 +54,7 @@ def _npy(file: Path) -> Labels:
         raise MeshError(f"the array holds {dtype}: integers are wanted, one label a voxel")
     wanted, there = n_voxels(shape) * dtype.itemsize, len(data) - stream.tell()
     if wanted != there:
-        raise MeshError(f"its header tells {wanted} bytes of voxels, {there} are there: is it cut off? {SAVE_ANEW}")
+        raise MeshError(f"its header announces {wanted} bytes of voxels, {there} are there: is it cut off? {SAVE_ANEW}")
     values = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if is_fortran else "C")
     return Labels(values, np.ones(3), np.zeros(3), np.eye(3))
 
@@ -79,7 +79,7 @@ def _vti(file: Path) -> Labels:
         scalars = {name: values for name, values in one.items() if values.dtype.kind in "iu"} or one
         if scalars:
             if len(scalars) > 1:
-                raise MeshError(f"there are several arrays ({', '.join(scalars)}): leave that of the labels alone")
+                raise MeshError(f"there are several arrays ({', '.join(scalars)}): keep only that of the labels")
             values = next(iter(scalars.values())).reshape(counts, order="F")
             return Labels(values, spacing, origin + direction @ ((low + shift) * spacing), direction)
     raise MeshError("there is no array of labels among the points or cells")

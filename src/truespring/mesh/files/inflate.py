@@ -32,14 +32,14 @@ def inflated(data: bytes | memoryview, size: int, method: str) -> bytes:
     """
     refuse_too_large(size)
     if size > 64 + _BEST_RATIO.get(method, size) * len(data):
-        raise ValueError(f"{size} bytes are wanted, {len(data)} by {method} cannot hold as many")
+        raise ValueError(f"{size} bytes are expected, more than {len(data)} bytes of {method} can hold")
     found, is_ended = _inflated(data, size + 1, method)
     if len(found) > size:
-        raise ValueError(f"more than the {size} bytes that are wanted come out of {method}")
+        raise ValueError(f"{method} gives more than the expected {size} bytes")
     if not is_ended:
         raise ValueError(f"cut off: {method} has no end mark, {len(found)} of {size} bytes are there")
     if len(found) < size:
-        raise ValueError(f"{size} bytes are wanted, {len(found)} come out of {method}")
+        raise ValueError(f"{size} bytes are expected, {method} gives {len(found)}")
     return found
 
 
@@ -58,7 +58,7 @@ def _inflated(data: bytes | memoryview, most: int, method: str) -> tuple[bytes, 
                 if method in _MANY and not piece.strip(b"\0"):
                     break
                 if method not in _MANY:
-                    raise ValueError(f"there are more bytes behind the end of {method}")
+                    raise ValueError(f"there are more bytes after the end of {method}")
                 stream = _METHODS[method]()
             try:
                 parts.append(bytes(stream.decompress(piece, left)))

@@ -127,7 +127,7 @@ class _Deck:
 def _no_body(assembly: Assembly, left_out: Mapping[str, int]) -> str:
     if not assembly.nodes.numbers.size and not left_out:
         return "there is no *NODE: is this the whole deck, and does it include the file of its mesh?"
-    what = f": {counted(left_out)} {'is' if sum(left_out.values()) == 1 else 'are'} none" if left_out else ""
+    what = f": {counted(left_out)} {'makes' if sum(left_out.values()) == 1 else 'make'} none" if left_out else ""
     return f"there is no *ELEMENT of a body{what}; a body is made of {READ}"
 
 
@@ -169,7 +169,7 @@ class _Groups:
                         names.pop()
                 self._take(one, key, names)
         if hidden:
-            self.notes.append(f"names that several scopes have are told by their instance: {', '.join(hidden)}")
+            self.notes.append(f"names used in several scopes are qualified by their instance: {', '.join(hidden)}")
 
     def _take(self, owner: Placed, key: str, names: list[str]) -> None:
         """Take the sets and the surface of a key under some names."""

@@ -76,7 +76,7 @@ class Assembly:
             nodes = nodes._replace(points=move(nodes.points))
         is_kept = np.ones(len(nodes.numbers), dtype=bool)
         if is_root and self.placed:
-            is_kept = self._refuse_reference_points(nodes, scope)
+            is_kept = self._without_reference_points(nodes, scope)
         elements = tuple(self._elements(scope, nodes))
         numbers = {"NSET": nodes.numbers[is_kept], "ELSET": _joined(block.numbers for block in elements)}
         left_out = {
@@ -118,7 +118,7 @@ class Assembly:
             nodes = nodes.of(np.isin(np.arange(len(nodes.numbers)), first))
         return nodes
 
-    def _refuse_reference_points(self, nodes: Nodes, scope: Scope) -> Bools:
+    def _without_reference_points(self, nodes: Nodes, scope: Scope) -> Bools:
         """Return which nodes of an assembly some element has; say how many none has."""
         is_kept = np.isin(nodes.numbers, _joined(block.nodes.ravel() for block in scope.elements))
         count = int((~is_kept).sum())
@@ -139,7 +139,9 @@ class Assembly:
         is_first[np.unique(numbers, return_index=True)[1]] = True
         if not is_first.all():
             row = int(is_first.argmin())
-            raise MeshError(f"{self._lines.at(lines[row])}: element {numbers[row]} is there twice: number one anew")
+            raise MeshError(
+                f"{self._lines.at(lines[row])}: element {numbers[row]} is there twice: renumber one of them"
+            )
         for block in scope.elements:
             unknown = places(nodes.numbers, block.nodes) < 0
             lost = np.asarray(unknown.any(axis=1))
@@ -228,7 +230,7 @@ class Assembly:
             else:
                 continue
             return numbers if member.kind == kind else self._nodes_of(numbers)
-        shown = "what stands there" if self._lines.is_included(member.place) else f"'{member.name[:40]}'"
+        shown = "the entry" if self._lines.is_included(member.place) else f"'{member.name[:40]}'"
         raise MeshError(f"{self._lines.at(member.place)}: {shown} is neither a number nor a set that is in the file")
 
     def _readings(self, owner: Placed, name: str) -> Iterator[tuple[Placed, str]]:

@@ -120,7 +120,7 @@ class Card:
 
     def shown(self, text: bytes, place: int) -> str:
         """Return a field for a message, but nothing of another file than the deck."""
-        return "what stands there" if self.deck.is_included(place) else f"'{word(text)}'"
+        return "the entry" if self.deck.is_included(place) else f"'{word(text)}'"
 
     def integers(self, rows: Rows, places: Sequence[int], what: str) -> Any:
         """Return all fields as whole numbers, shape (n,); raise MeshError with the place of one that is none."""

@@ -36,10 +36,10 @@ def read_move(card: Card) -> Move | None:
             origin, axis = values[:3], values[3:6] - values[:3]
             length = float(np.linalg.norm(axis))
             if not length:
-                raise card.error("the two points of the axis are one", place)
+                raise card.error("the two points of the axis coincide", place)
             rotation = _rotation(axis / length, float(np.radians(values[6])))
         else:
-            raise card.error(f"x, y, z, or two points and an angle are wanted, here are {len(values)} numbers", place)
+            raise card.error(f"x, y, z, or two points and an angle are wanted, found {len(values)} numbers", place)
     if not card.rows:
         return None
     return Move(translation, origin, rotation)

@@ -305,7 +305,7 @@ def _whole_elements(card: Card, name: str, n_nodes: int) -> tuple[Ints, Ints]:
             places.append(place)
     for row, place in zip(rows, places, strict=True):
         if len(row) != width:
-            why = f"an element of {name} takes {width} numbers, here are {len(row)}"
+            why = f"an element of {name} takes {width} numbers, found {len(row)}"
             raise MeshError(f"{card.deck.at(place)}: {why}")
     return card.integers(rows, places, "an element").reshape(-1, width), np.array(places, dtype=np.int64)
 

@@ -10,7 +10,7 @@ from truespring.errors import MeshError, nearest
 # Labels beside which a list of all of them is of no help.
 _MANY = 30
 
-# Axes whose directions have a cosine beyond the first are taken as upright on each other, and that is told: headers
+# Axes whose directions have a cosine beyond the first are taken as perpendicular, and that is told: headers
 # round. Beyond the second the image is sheared.
 _UPRIGHT, _SHEARED = 1e-5, 1e-2
 
@@ -57,10 +57,10 @@ class Labels(NamedTuple):
         exact = [one for one in self.segments if one.name == name]
         same = exact or [one for one in self.segments if one.name.casefold() == name.casefold()]
         if len({(one.layer, one.value) for one in same}) > 1:
-            raise MeshError(f"{len(same)} segments are called '{name}': take its label; there are {self._told()}")
+            raise MeshError(f"{len(same)} segments are called '{name}': give a label; there are {self._told()}")
         if not same:
             known = [one.name for one in self.segments]
-            why = nearest(name, known) if known else ", for the image has no names"
+            why = nearest(name, known) if known else ", the image has no names"
             raise MeshError(f"there is no segment '{name}'{why}; there are {self._told()}")
         return same[0].layer, same[0].value
 
@@ -70,7 +70,7 @@ class Labels(NamedTuple):
         layers = [layer for layer in range(self.values.shape[3]) if (self.values[..., layer] == value).any()]
         if len(layers) > 1:
             raise MeshError(
-                f"the label {value} stands in {len(layers)} of {self.values.shape[3]} layers: name the segment, as "
+                f"the label {value} is in {len(layers)} of {self.values.shape[3]} layers: name the segment, as "
                 f'label = "{self.segments[0].name if self.segments else "liver"}"; there are {self._told()}'
             )
         return (layers or [0])[0], value
@@ -84,10 +84,10 @@ class Labels(NamedTuple):
 
 
 def checked(labels: Labels) -> Labels:
-    """Return labels that are whole numbers, on axes that stand upright on each other; raise MeshError."""
+    """Return labels that are whole numbers, on perpendicular axes; raise MeshError."""
     values = labels.values
     if values.ndim == 4 and labels.segments and max(one.layer for one in labels.segments) >= values.shape[3]:
-        raise MeshError(f"a segment stands in a layer that is not there: there are {values.shape[3]}")
+        raise MeshError(f"a segment is in a layer that does not exist: there are {values.shape[3]}")
     if values.ndim not in (3, 4) or not values.size:
         raise MeshError(f"the image has shape {values.shape}: three axes are wanted, none of them empty")
     if values.dtype.kind == "f":
@@ -110,13 +110,13 @@ def _upright(labels: Labels) -> Labels:
     off = float(np.abs(cosines).max()) if np.isfinite(cosines).all() else np.inf
     if off > _SHEARED:
         raise MeshError(
-            f"the axes of the image do not stand upright on each other: the cosine between two is {off:.2g}, up to "
-            f"{_SHEARED:g} is taken; a sheared image has no cubes: resample it onto upright axes (3D Slicer: Resample "
+            f"the axes of the image are not perpendicular: the cosine between two is {off:.2g}, up to {_SHEARED:g} is "
+            "accepted; a sheared image has no cubes: resample it onto perpendicular axes (3D Slicer: Resample "
             "Scalar/Vector/DWI Volume, by nearest neighbour)"
         )
     left, _, right = np.linalg.svd(labels.direction)
     told = (
-        f"the axes of the image are off from upright, the cosine between two is {off:.2g}: the nearest upright ones "
-        "were taken"
+        f"the axes of the image are not quite perpendicular, the cosine between two is {off:.2g}: the nearest "
+        "perpendicular ones were taken"
     )
     return labels._replace(direction=left @ right, notes=(*labels.notes, *([told] if off > _UPRIGHT else [])))

@@ -44,7 +44,7 @@ _LPS = (
     "NIfTI's places are RAS, with x to the right and y to the front; here they are LPS, as in DICOM and ITK: x and y "
     "have the other sign than in nibabel or FSL"
 )
-_NOWHERE = "its header has no places of voxels (qform and sform are 0): the first one stands at the origin"
+_NOWHERE = "its header has no places of voxels (qform and sform are 0): the first one is at the origin"
 # Places, and spacings, that differ by more of a voxel's edge are two different ones.
 _SAME = 1e-2
 
@@ -82,7 +82,7 @@ def _header(begin: bytes) -> tuple[Any, _Order]:
             layout = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
             header = np.frombuffer(begin[:size], layout.newbyteorder(order))[0]
             if header["magic"] == b"ni1" or header["magic"][:3] == b"ni2":
-                raise MeshError(f"its voxels stand in another file (.hdr and .img): {SAVE_ANEW}, as .nii or .nii.gz")
+                raise MeshError(f"its voxels are in another file (.hdr and .img): {SAVE_ANEW}, as .nii or .nii.gz")
             if header["magic"] != _MAGIC[size]:
                 raise MeshError(f"the mark of NIfTI in its header is damaged; {SAVE_ANEW}")
             return header, order
@@ -92,7 +92,7 @@ def _header(begin: bytes) -> tuple[Any, _Order]:
 def _shape(dim: Any) -> tuple[int, ...]:
     sizes = [int(size) for size in dim]
     if not 1 <= sizes[0] <= 7:
-        raise MeshError(f"the header tells {sizes[0]} axes, 1 to 7 are allowed; {SAVE_ANEW}")
+        raise MeshError(f"the header gives {sizes[0]} axes, 1 to 7 are allowed; {SAVE_ANEW}")
     shape = sizes[1 : 1 + sizes[0]]
     n_voxels(tuple(shape))
     while len(shape) > 3 and shape[-1] == 1:
@@ -107,8 +107,8 @@ def _dtype(header: Any) -> np.dtype[Any]:
     dtype = np.dtype(_TYPES[code])
     if int(header["bitpix"]) != 8 * dtype.itemsize:
         raise MeshError(
-            f"the header is damaged: voxels of type {code} have {8 * dtype.itemsize} bits, {int(header['bitpix'])} "
-            f"are told; {SAVE_ANEW}"
+            f"the header is damaged: voxels of type {code} have {8 * dtype.itemsize} bits, it gives "
+            f"{int(header['bitpix'])}; {SAVE_ANEW}"
         )
     return dtype
 
@@ -137,7 +137,7 @@ def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
     rows = header["rows"].astype(np.float64)
     unit = _MILLIMETRES.get(int(header["units"]) & 7)
     if unit is None:
-        raise MeshError(f"the header tells an unknown unit of length, {int(header['units']) & 7}; {SAVE_ANEW}")
+        raise MeshError(f"the header gives an unknown unit of length, {int(header['units']) & 7}; {SAVE_ANEW}")
     by_q = _by_quaternion(header, sides) if int(header["qform"]) > 0 else None
     if int(header["sform"]) > 0:
         matrix, told = rows, "sform"
@@ -149,7 +149,7 @@ def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
         raise MeshError(f"the header's {told} gives its voxels no places: it is not finite or flat; {SAVE_ANEW}")
     notes = [_NOWHERE if told == "pixdim" else _LPS]
     if told == "sform" and by_q is not None and not _same(rows, by_q):
-        notes.append("its header has two places for the voxels, qform and sform: sform was taken, as nibabel does")
+        notes.append("its header has two transforms, qform and sform, that differ: sform was taken, as nibabel does")
     norms = np.linalg.norm(matrix[:, :3], axis=0)
     if (np.abs(norms - sides) <= _SAME * norms).all():
         norms = sides

@@ -12,7 +12,7 @@ from truespring.opening import file_beside, read_file
 Values = np.ndarray[Any, Any]
 
 #: The way out of a header that is damaged or of a kind that is not read.
-SAVE_ANEW = "copy it anew, or save it anew from 3D Slicer or ITK-SNAP"
+SAVE_ANEW = "copy it again, or save it again from 3D Slicer or ITK-SNAP"
 
 
 def n_voxels(shape: tuple[int, ...]) -> int:
@@ -62,7 +62,7 @@ def text_values(data: bytes, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Va
     if dtype.kind in "iu":
         limits = np.iinfo(dtype)
         if not ((values == np.rint(values)) & (values >= limits.min) & (values <= limits.max)).all():
-            raise MeshError(f"a voxel is no number of the type that its header tells; {SAVE_ANEW}")
+            raise MeshError(f"a voxel is no number of the type that its header gives; {SAVE_ANEW}")
     return values.astype(dtype).reshape(shape, order="F")
 
 

@@ -27,7 +27,7 @@ def refuse_ragged(rows: Rows, lines: Sequence[int], columns: int, what: str) -> 
     """Raise MeshError with the first line that has another number of fields."""
     for row, line in zip(rows, lines, strict=True):
         if len(row) != columns:
-            raise MeshError(f"line {line}: {what} takes {columns} numbers, here are {len(row)}")
+            raise MeshError(f"line {line}: {what} takes {columns} numbers, found {len(row)}")
 
 
 def word(field: bytes) -> str:

@@ -48,7 +48,7 @@ def read_vtk_grid(data: bytes, folder: Path) -> Grid:
         )
     names = [piece.get("Source", "") for piece in root.iterfind(f"{kind}/Piece")]
     if not names or len(names) > _MOST_PIECES or len(set(names)) < len(names):
-        raise MeshError(f"it names {len(names)} pieces, {len(set(names))} of them different: each once is wanted")
+        raise MeshError(f"it names {len(names)} pieces, {len(set(names))} of them different: name each once")
     return one_grid([grid for name in names for grid in _piece(file_beside(folder, name, MeshError), kind[1:])])
 
 

@@ -93,7 +93,7 @@ def _joined(pieces: Sequence[Grid]) -> Grid:
     notes = [
         *dict.fromkeys(note for piece in pieces for note in piece.notes),
         f"{len(pieces)} pieces were joined at the {n_shared} points that they share",
-        *([f"{is_again.sum()} cells stand in two pieces and were taken once"] if is_again.any() else []),
+        *([f"{is_again.sum()} cells are in two pieces and were taken once"] if is_again.any() else []),
         *([f"at {n_left} places a piece has several points: pieces were not joined there"] if n_left else []),
         *(
             f"pieces differ in {name} by up to {gap:.2g} of its largest value at points that they share: the first "

@@ -93,7 +93,7 @@ def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell
     order = np.concatenate(rows)
     for name, values in cell_arrays.items():
         if len(values) != first:
-            raise MeshError(f"array '{name}' of the cells has {len(values)} rows, wanted are {first}")
+            raise MeshError(f"array '{name}' of the cells has {len(values)} rows, {first} are wanted")
     return Grid(
         points,
         np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64),

@@ -141,7 +141,7 @@ class Reader:
     def _points(self, piece: ElementTree.Element, n_points: int) -> Floats:
         points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 3)))
         if points.shape != (n_points, 3):
-            raise MeshError(f"<Points> holds an array of shape {points.shape}, wanted is ({n_points}, 3)")
+            raise MeshError(f"<Points> holds an array of shape {points.shape}, not ({n_points}, 3)")
         return points.astype(np.float64)
 
     def _lists(self, piece: ElementTree.Element, section: str, n_cells: int) -> Lists:
@@ -222,7 +222,7 @@ class Reader:
         _, block, last, *compressed = self._sizes(coded, 3 + count, is_raw)
         sizes = [block] * (count - 1) + [last or block]  # of the blocks when they are inflated
         if sum(sizes) != wanted:
-            raise ValueError(f"its header tells {sum(sizes)} bytes, wanted are {wanted}")
+            raise ValueError(f"its header announces {sum(sizes)} bytes, {wanted} are wanted")
         self._n_bytes += wanted
         refuse_too_large(self._n_bytes)
         data = _split(_split(coded, (3 + count) * size, is_raw)[1], sum(compressed), is_raw)[0]
