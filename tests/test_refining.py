@@ -132,20 +132,51 @@ def test_regions_and_groups_go_with_the_mesh() -> None:
     assert values[0] == pytest.approx(values[1]) and values[0] is not None and values[0] > 0.05
 
 
-@pytest.mark.parametrize("element", ["quadrilateral", "hexahedron"])
+@pytest.mark.parametrize("element", ["quadrilateral", "hexahedron", "wedge", "pyramid", "mixed in 2D", "mixed in 3D"])
 def test_division_into_simplices_keeps_the_body(element: str) -> None:
-    mesh = ts.rectangle((3.0, 2.0), (3, 2)) if element == "quadrilateral" else ts.box((3.0, 2.0, 1.0), (3, 2, 2))
+    mesh = divided_body(element)
     rng = np.random.default_rng(1)
     numbers = rng.permutation(mesh.n_nodes)  # no order of the numbers is taken for granted
     nodes = np.empty_like(mesh.nodes)
     nodes[numbers] = mesh.nodes
-    found, parents = in_simplices(ts.Mesh(nodes, numbers[mesh.elements], element, element_groups={"one": [1]}))
+    groups = {"element_groups": {"one": [1]}, "facet_groups": {"some": [[0, 0], [1, 1]]}}
+    found, parents = in_simplices(ts.Mesh(nodes, numbers[mesh.elements], mesh.element, **groups))  # type: ignore[arg-type]
     assert np.bincount(parents, found.measures) == pytest.approx(mesh.measures, rel=1e-12)
     assert np.array_equal(found.element_groups["one"], np.flatnonzero(parents == 1))
     # Every facet inside has two elements: neighbours divide what they share alike.
-    per_facet = {2: 1, 3: 2}[mesh.dim]
-    assert len(found.boundary) == per_facet * len(mesh.boundary)
+    n_parts = [len(set(facet)) - mesh.dim + 1 for facet in mesh.boundary.tolist()]
+    assert len(found.boundary) == sum(n_parts)
+    whole = mesh.facet_nodes(np.array(groups["facet_groups"]["some"])).tolist()
+    parts = numbers[np.unique(np.concatenate(whole))]
+    assert np.array_equal(np.unique(found.facet_nodes(found.facet_groups["some"])), np.sort(parts))
     assert len(found.facets) == (len(found.elements) * (mesh.dim + 1) + len(found.boundary)) // 2
+
+
+def divided_body(element: str) -> ts.Mesh:
+    if element == "mixed in 2D":
+        flat = ts.rectangle((3.0, 2.0), (3, 2)).elements
+        cells = {"quadrilateral": flat[:4], "triangle": flat[4:][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)}
+        return ts.Mesh.of_kinds(ts.rectangle((3.0, 2.0), (3, 2)).nodes, cells)
+    if element == "mixed in 3D":
+        cubes, tips = ts.box((3.0, 2.0, 1.0), (3, 2, 1)), ts.box((3.0, 2.0, 1.0), (3, 2, 1), "pyramid")
+        cells = {"hexahedron": cubes.elements[:5], "pyramid": tips.elements[30:]}
+        nodes = np.concatenate([cubes.nodes, tips.nodes[-1:]])
+        return ts.Mesh.of_kinds(nodes, {**cells, "pyramid": np.minimum(cells["pyramid"], len(nodes) - 1)})
+    if element == "quadrilateral":
+        return ts.rectangle((3.0, 2.0), (3, 2))
+    return ts.box((3.0, 2.0, 1.0), (3, 2, 2), element)
+
+
+@pytest.mark.parametrize("element", ["wedge", "pyramid"])
+def test_wedges_and_pyramids_have_an_error_of_their_own(element: str) -> None:
+    """No further off than is said, by the deflection of tetrahedra of second order on a mesh halved once more."""
+    mesh = ts.box((0.16, 0.04, 0.04), (4, 1, 1), element)
+    load = ts.Force("right", (0.0, -0.03, 0.0))
+    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), supports=[ts.Fixed("left")], loads=[load])
+    found = ts.reference_error(problem, ts.Fem("linear"))
+    truth = compare(ts.solve(problem, ts.Fem("linear")), limit_of(problem, "linear", 1)).error
+    assert truth is not None and found.value is not None and truth > 0.05
+    assert truth <= found.value <= 1.15 * truth
 
 
 def test_a_coarser_mesh_tells_where_finer_ones_cost_too_much() -> None:
