@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from tests.meshes import plane_of_two, solid_of_four
 from tests.studies import changed, written
+from truespring.arrays import Ints
 from truespring.cli import main
 from truespring.comparison import compare
 from truespring.mesh import in_simplices, refined
@@ -132,39 +134,33 @@ def test_regions_and_groups_go_with_the_mesh() -> None:
     assert values[0] == pytest.approx(values[1]) and values[0] is not None and values[0] > 0.05
 
 
-@pytest.mark.parametrize("element", ["quadrilateral", "hexahedron", "wedge", "pyramid", "mixed in 2D", "mixed in 3D"])
-def test_division_into_simplices_keeps_the_body(element: str) -> None:
-    mesh = divided_body(element)
-    rng = np.random.default_rng(1)
-    numbers = rng.permutation(mesh.n_nodes)  # no order of the numbers is taken for granted
+BODIES = [
+    ts.rectangle((3.0, 2.0), (3, 2)),
+    ts.box((3.0, 2.0, 1.0), (3, 2, 2)),
+    plane_of_two((6.0, 4.0), (6, 4)),
+    ts.box((3.0, 3.0, 3.0), (3, 3, 3), "wedge"),
+    solid_of_four(),
+]
+
+
+def with_numbers(mesh: ts.Mesh, numbers: Ints) -> ts.Mesh:
+    """The mesh with its nodes in another order, and a group of one element."""
     nodes = np.empty_like(mesh.nodes)
     nodes[numbers] = mesh.nodes
-    groups = {"element_groups": {"one": [1]}, "facet_groups": {"some": [[0, 0], [1, 1]]}}
-    found, parents = in_simplices(ts.Mesh(nodes, numbers[mesh.elements], mesh.element, **groups))  # type: ignore[arg-type]
+    return ts.Mesh(nodes, numbers[mesh.elements], mesh.element, element_groups={"one": [1]})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("mesh", BODIES)
+def test_division_into_simplices_keeps_the_body(mesh: ts.Mesh) -> None:
+    rng = np.random.default_rng(1)
+    numbers = rng.permutation(mesh.n_nodes)  # no order of the numbers is taken for granted
+    found, parents = in_simplices(with_numbers(mesh, numbers))
     assert np.bincount(parents, found.measures) == pytest.approx(mesh.measures, rel=1e-12)
     assert np.array_equal(found.element_groups["one"], np.flatnonzero(parents == 1))
     # Every facet inside has two elements: neighbours divide what they share alike.
-    n_parts = [len(set(facet)) - mesh.dim + 1 for facet in mesh.boundary.tolist()]
-    assert len(found.boundary) == sum(n_parts)
-    whole = mesh.facet_nodes(np.array(groups["facet_groups"]["some"])).tolist()
-    parts = numbers[np.unique(np.concatenate(whole))]
-    assert np.array_equal(np.unique(found.facet_nodes(found.facet_groups["some"])), np.sort(parts))
+    triangles = sum(len(np.unique(facet)) - 2 for facet in mesh.boundary) if mesh.dim == 3 else len(mesh.boundary)
+    assert len(found.boundary) == triangles
     assert len(found.facets) == (len(found.elements) * (mesh.dim + 1) + len(found.boundary)) // 2
-
-
-def divided_body(element: str) -> ts.Mesh:
-    if element == "mixed in 2D":
-        flat = ts.rectangle((3.0, 2.0), (3, 2)).elements
-        cells = {"quadrilateral": flat[:4], "triangle": flat[4:][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)}
-        return ts.Mesh.of_kinds(ts.rectangle((3.0, 2.0), (3, 2)).nodes, cells)
-    if element == "mixed in 3D":
-        cubes, tips = ts.box((3.0, 2.0, 1.0), (3, 2, 1)), ts.box((3.0, 2.0, 1.0), (3, 2, 1), "pyramid")
-        cells = {"hexahedron": cubes.elements[:5], "pyramid": tips.elements[30:]}
-        nodes = np.concatenate([cubes.nodes, tips.nodes[-1:]])
-        return ts.Mesh.of_kinds(nodes, {**cells, "pyramid": np.minimum(cells["pyramid"], len(nodes) - 1)})
-    if element == "quadrilateral":
-        return ts.rectangle((3.0, 2.0), (3, 2))
-    return ts.box((3.0, 2.0, 1.0), (3, 2, 2), element)
 
 
 @pytest.mark.parametrize("element", ["wedge", "pyramid"])

@@ -154,7 +154,7 @@ def test_what_a_clamp_leaves_is_told_of_cubes() -> None:
         found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
     assert found.elements == 4
     apart = _two_refinements_finer(found, body)
-    assert apart < found.error < 6 * apart
+    assert apart < found.error < 8 * apart  # of three meshes no order is believed: it is told with the first
 
 
 def test_richardson_and_roache_to_the_letter() -> None:

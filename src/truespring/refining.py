@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,16 +35,16 @@ from truespring.solvers import Nearby, Newton
 #: The order of convergence that refinement is taken to have: the lowest that is met, at clamps and corners. Bodies
 #: without these have twice that or more, and their error is overestimated: by half, and twofold at most.
 ORDER = 1.0
-#: By how much the distance to elements of second order on the same nodes falls short of an error, at most: these are
-#: still off themselves. Measured on cantilevers, blocks and tubes: by 1.004 to 1.08.
-SECOND_ORDER = 1.1
+#: The share of an error of first order that elements of second order on the same nodes still have, at most: measured on
+#: cantilevers, blocks and tubes, 0.004 to 0.08.
+SECOND_ORDER = 1 / 11
 #: Refinement may cost so many times what the paths of a study did.
 COST = 10.0
 
 # How work grows with the number of unknowns, measured in the plane and in space.
 _GROWTH = 1.25
 # Newton iterations from the coarse state, of which five are usual.
-_ITERATIONS, _MOST_ITERATIONS = 6, 20
+_ITERATIONS, _MOST_ITERATIONS = 6, 10
 # Meshes are halved twice at most.
 _LEVELS = 2
 
@@ -109,25 +110,25 @@ def reference_error(
 def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
     """Return how far the path of a model is from its own limit at full load.
 
-    A model of first order whose law has elements of second order is held against these, on simplices of the same nodes:
-    their distance times SECOND_ORDER. Others are solved on meshes of half and, if that costs little, of a quarter of
-    the size: the distance to the finest over 1 - 2^(-p k), after k halvings, p = ORDER (Richardson). Where that takes
-    more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if elements are alike and
-    along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path that did not reach full
-    load, was read from a file, or finds no equilibrium on other meshes.
+    A model of first order whose law has elements of second order is held against these, on simplices of the same
+    nodes; they have the share SECOND_ORDER of its error at most. Others are solved on meshes of half and, if that costs
+    little, of a quarter of the size, which have the share 2^(-p k) of it after k halvings, p = ORDER (Richardson).
+    Where that takes more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if
+    elements are alike and along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path
+    that did not reach full load, was read from a file, or finds no equilibrium on other meshes.
     """
     if not path.complete or not path.solved:
         return OwnError(None, "it was not solved to full load here")
     found, spent = None, 0.0
     try:
-        for finer in _finer(path.problem, model):
+        for finer in _finer(path, model):
             cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
             if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
             limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
             spent += work_of(limit)
             against = compare(path, limit)
-            value = None if against.error is None else finer.factor * against.error
+            value = None if against.error is None else _whole(against.error, finer.left)
             found = OwnError(value, finer.how, limit, against)
     except (TruespringError, MemoryError):
         pass  # what was found before stands, else a coarser mesh tells
@@ -149,31 +150,45 @@ def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> O
     return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
 
 
-class _Finer(NamedTuple):
-    """A finer way to solve a problem, and what the distance to it is multiplied by."""
+def _whole(distance: float, left: float) -> float:
+    """Return the error of a path by its distance to one that has the share `left` of it.
 
-    problem: Problem
+    With the limit u, the path (1 - e) u and the other (1 - left e) u, their distance relative to that one is
+    d = (1 - left) e / (1 - left e): small ones are multiplied by 1 / (1 - left), none becomes more than the whole.
+    """
+    return distance / (1 - left * max(1 - distance, 0.0))
+
+
+class _Finer(NamedTuple):
+    """A finer way to solve a problem, made when it is wanted, and the share of the error that it still has."""
+
+    problem: Callable[[], Problem]
     model: Any
     how: str
-    factor: float
+    left: float
     n_unknowns: int
 
 
-def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
-    """Yield finer and finer ways."""
-    n_unknowns = int((~problem.loading.held).sum())
+def _finer(path: Path, model: Any) -> Iterator[_Finer]:
+    """Yield finer and finer ways to solve the problem of a path."""
+    problem, n_unknowns = path.problem, path.n_unknowns
     growth = 2**problem.mesh.dim
     better = model.second_order(problem) if hasattr(model, "second_order") else None
     if better is not None:
-        divided = simplex_problem(problem)
-        n_unknowns = _with_middles(divided.mesh, n_unknowns)
-        yield _Finer(divided, better, "second order", SECOND_ORDER, n_unknowns)
+        yield _Finer(partial(simplex_problem, problem), better, "second order", SECOND_ORDER, growth * n_unknowns)
         return
     if not hasattr(model, "potential"):
         raise ModelError(f"{getattr(model, 'label', model)} can be solved on its own mesh only")
     for halvings in range(1, _LEVELS + 1):
-        problem, n_unknowns = refined_problem(problem), growth * n_unknowns
-        yield _Finer(problem, model, "refined", 1 / (1 - 2 ** (-ORDER * halvings)), n_unknowns)
+        left = 2 ** (-ORDER * halvings)
+        make = partial(_halved, problem, halvings)
+        yield _Finer(make, model, "refined", left, growth**halvings * n_unknowns)
+
+
+def _halved(problem: Problem, times: int) -> Problem:
+    for _ in range(times):
+        problem = refined_problem(problem)
+    return problem
 
 
 def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
@@ -189,10 +204,6 @@ def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
         return simplex_problem(problem), model
     except MeshError:
         return None
-
-
-def _with_middles(mesh: Mesh, n_unknowns: int) -> int:
-    return round(n_unknowns * (1 + len(mesh.edges) / mesh.n_nodes))
 
 
 def refined_problem(problem: Problem) -> Problem:
@@ -261,17 +272,18 @@ def _by_groups(problem: Problem) -> Problem:
 
 def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Path:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
+    problem = finer.problem()
     if isinstance(solver, Newton):
         # From a state that is near, so that the path is not taken again, and on the same branch.
         nearby = Nearby(
             1, solver.tolerance, _MOST_ITERATIONS, method=solver.method, linear=solver.linear, start=_carrying(coarse)
         )
-        path = solve(finer.problem, finer.model, nearby)
+        path = solve(problem, finer.model, nearby)
         if _sound(path):
             return path
     if coarse.newton_iterations * finer.n_unknowns**_GROWTH > most_work:
         raise ModelError("other meshes cost too much")
-    path = solve(finer.problem, finer.model, solver)
+    path = solve(problem, finer.model, solver)
     if not _sound(path):
         raise ModelError("a finer mesh finds no stable equilibrium")
     return path

@@ -151,9 +151,13 @@ class Calibration:
                 "fitted to."
             )
         told = [f"{_off(one.both[1])} on {one.case.name} ({_off(one.both[0])} before)" for one in self.held_out]
-        against = list(dict.fromkeys(one.case.against for one in self.held_out))
+        cases = [one.case for one in self.held_out]
+        known = [
+            _with_own_error(name, [case for case in cases if case.against == name])
+            for name in dict.fromkeys(case.against for case in cases)
+        ]
         return (
-            f"On loads that took no part the calibrated springs are off by {_joined(told)}, against {_joined(against)}."
+            f"On loads that took no part the calibrated springs are off by {_joined(told)}, against {_joined(known)}."
         )
 
     @property
@@ -191,6 +195,14 @@ def _off(error: Decisive | None) -> str:
     if error is None or np.isnan(error.error):
         return _percent(None)
     return _percent(error.error) + ("" if error.quantity == "displacement" else f" in the {error.quantity}")
+
+
+def _with_own_error(name: str, cases: Sequence[LoadCase]) -> str:
+    """What a reference is called, and how far it is itself off, at most."""
+    known = [case.own_error for case in cases if case.own_error is not None]
+    if not known or len(known) < len(cases):
+        return name
+    return f"{name}, itself {'at most' if len(known) > 1 else 'about'} {_percent(max(known))} off"
 
 
 def _joined(parts: Sequence[str]) -> str:

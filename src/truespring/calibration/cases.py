@@ -63,7 +63,8 @@ class LoadCase:
         reference: a path solved on any mesh, or read from a file: of a body of cells full fields, else markers.
         curve: a measured force-displacement curve.
         solver: how equilibrium is found; the levels that are compared are among its load steps.
-        against: what the reference is, in words, and how far it is itself off; by default its label.
+        against: what the reference is, in words; by default its label.
+        own_error: how far the reference is itself off, relative, None where that is not known.
         field: full displacement fields on the nodes of the problem, None where the reference holds none.
 
     Raises ProblemError where nothing is known at any level of the solver.
@@ -75,6 +76,7 @@ class LoadCase:
     curve: Curve | None = None
     solver: Newton = field(default_factory=Newton)
     against: str = ""
+    own_error: float | None = None
 
     def __post_init__(self) -> None:
         if not self.against:

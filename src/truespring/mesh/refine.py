@@ -54,18 +54,6 @@ def refined(mesh: Mesh) -> Mesh:
     taken for straight, and a note says so.
     Raises MeshError for lines, and where a face of four corners lies on two triangles.
     """
-    refuse_halved(mesh)
-    try:
-        return _refined(mesh)
-    except MeshError:
-        if mesh.middles is None:
-            raise
-        note = "divided along straight edges: parts of the curved ones would be folded"
-        return _refined(replace(mesh, middles=None, notes=(*mesh.notes, note)))
-
-
-def refuse_halved(mesh: Mesh) -> None:
-    """Raise MeshError where a face of four corners lies on two triangles: its parts would not meet theirs."""
     if mesh.element == MIXED and mesh.dim == 3:
         facets, alone = mesh.facets_of(mesh.elements)
         if halved(facets[alone]).any():
@@ -73,6 +61,13 @@ def refuse_halved(mesh: Mesh) -> None:
                 "this mesh cannot be refined: faces of four corners lie on two triangles of other elements, which new "
                 "nodes would tear apart; put pyramids between them, or refine it where it was made"
             )
+    try:
+        return _refined(mesh)
+    except MeshError:
+        if mesh.middles is None:
+            raise
+        note = "divided along straight edges: parts of the curved ones would be folded"
+        return _refined(replace(mesh, middles=None, notes=(*mesh.notes, note)))
 
 
 def _refined(mesh: Mesh) -> Mesh:

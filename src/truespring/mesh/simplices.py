@@ -4,34 +4,31 @@ import numpy as np
 
 from truespring.arrays import Ints
 from truespring.errors import MeshError
-from truespring.mesh.facets import find_facets
-from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.mesh.merged import repeats
+from truespring.mesh.facets import find_facets, halved
+from truespring.mesh.kinds import ELEMENT_KINDS, MIXED
 from truespring.mesh.mesh import Mesh
-from truespring.mesh.refine import refuse_halved
 
 
 def in_simplices(mesh: Mesh) -> tuple[Mesh, Ints]:
     """Return a mesh of triangles or tetrahedra on the same nodes, and the element each one comes from, shape (n,).
 
     An element is a cone over its facets from its node of the smallest number, and a facet a fan from its own: so
-    neighbours divide what they share alike, two triangles a quadrilateral, six tetrahedra a hexahedron, three a
-    wedge, two a pyramid. Groups are carried over. Source: Dompierre, Labbe, Vallet, Camarero, How to subdivide
-    pyramids, prisms and hexahedra into tetrahedra, 8th International Meshing Roundtable (1999). Raises MeshError
-    where an element is so far from convex that a part of it would be inverted, where a face of four corners lies on
-    two triangles, and for lines.
+    neighbours divide what they share alike, two triangles a quadrilateral, six tetrahedra a hexahedron. Groups are
+    carried over. Source: Dompierre, Labbe, Vallet, Camarero, How to subdivide pyramids, prisms and hexahedra into
+    tetrahedra, 8th International Meshing Roundtable (1999). Raises MeshError where an element is so far from convex
+    that a part of it would be inverted, and for lines.
     """
     if mesh.element == "line":
         raise MeshError("a network of lines has no inside to be divided")
     kind = "triangle" if mesh.dim == 2 else "tetrahedron"
     if mesh.element == kind:
         return mesh, np.arange(len(mesh.elements))
-    refuse_halved(mesh)
-    found = [(numbers, *_cones(part.element, part.elements)) for numbers, part in mesh.blocks]
-    elements = np.concatenate([cones for _, cones, _ in found])
-    parents = np.concatenate([numbers[whose] for numbers, _, whose in found])
+    if mesh.dim == 3 and mesh.element == MIXED and halved(mesh.facets).any():
+        raise MeshError("a face of four corners lies on two triangles, which may divide it otherwise")
+    cones = [(numbers, *_cones(part.element, part.elements)) for numbers, part in mesh.blocks]
+    parents = np.concatenate([numbers[of] for numbers, _, of in cones])
     order = np.argsort(parents, kind="stable")
-    elements, parents = elements[order], parents[order]
+    elements, parents = np.concatenate([found for _, found, _ in cones])[order], parents[order]
     groups = {name: np.flatnonzero(np.isin(parents, of)) for name, of in mesh.element_groups.items()}
     facets = {
         name: find_facets(elements, kind, np.concatenate(_fanned(mesh.facet_nodes(of))))
@@ -48,7 +45,7 @@ def _cones(element: str, elements: Ints) -> tuple[Ints, Ints]:
     for top in range(kind.n_nodes):
         numbers = np.flatnonzero(tops == top)
         corners = elements[numbers]
-        for facet in (list(dict.fromkeys(facet)) for facet in kind.facets):  # a triangle may name a corner twice
+        for facet in kind.facets:
             if top in facet:
                 continue
             for base in _fanned(corners[:, facet]):
@@ -62,11 +59,12 @@ def _cones(element: str, elements: Ints) -> tuple[Ints, Ints]:
 def _fanned(facets: Ints) -> list[Ints]:
     """The edges or triangles of facets, shape (n, k): fans from the node of the smallest number.
 
-    Triangles that name their last corner twice are one.
+    A corner that is named twice makes a triangle of a quadrilateral.
     """
     if facets.shape[1] < 4:
         return [facets]
+    if (twice := facets[:, 2] == facets[:, 3]).any():
+        return [facets[twice][:, :3], *(_fanned(facets[~twice]) if not twice.all() else [])]
     first = facets.argmin(axis=1)[:, None]
     turned = np.take_along_axis(facets, (first + np.arange(facets.shape[1])) % facets.shape[1], axis=1)
-    fans = [turned[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]
-    return [fan[~repeats(fan)] for fan in fans]
+    return [turned[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]

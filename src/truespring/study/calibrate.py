@@ -24,7 +24,6 @@ from truespring.models import LAWS, Fem, Springs
 from truespring.problem import Problem
 from truespring.reference import read_result
 from truespring.refining import COST, in_second_order, own_error, work_of
-from truespring.report.quantity import percent
 from truespring.solvers import Newton
 from truespring.study.read import Study
 from truespring.study.run import follow
@@ -131,14 +130,14 @@ def _reference(study: Study, to: str | None) -> str:
 
 
 def _case(study: Study, reference: str) -> LoadCase:
-    path, against = _reference_path(study, study.problem, reference)
+    path, told = _reference_path(study, study.problem, reference)
     _refuse_short(study, reference, path)
     with _naming(study):
-        return LoadCase(study.stem, study.problem, path, solver=_newton(study), against=against)
+        return LoadCase(study.stem, study.problem, path, None, _newton(study), *told)
 
 
-def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Path, str]:
-    """The path that springs are to follow, and what it is in words.
+def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Path, tuple[str, float | None]]:
+    """The path that springs are to follow; what it is in words, and how far it is itself off.
 
     Finite elements whose kind the study leaves open are of second order on the nodes of the springs: those of first
     order, on a mesh that springs are made for, are often further off than springs fitted to them would be.
@@ -152,8 +151,7 @@ def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Pat
         path = follow(study, entry) if problem is study.problem else solve(problem, entry, study.solver)  # type: ignore[arg-type]
     own = own_error(path, entry, study.solver, COST * work_of(path))
     kind = " of second order on the same nodes" if better else ""
-    itself = "its own error is not known" if own.value is None else f"itself about {percent(own.value)} off"
-    return path, f"{path.label}{kind}, {itself}"
+    return path, (f"{path.label}{kind}", own.value)
 
 
 def _measured(study: Study, springs: str, markers: FilePath | None, curve: FilePath | None) -> LoadCase:
@@ -177,10 +175,10 @@ def _turned(study: Study, reference: str) -> Iterator[LoadCase]:
     problem = turned(study.problem, math.pi / 4)
     if problem is None or not isinstance(entry, Fem):
         return
-    path, against = _reference_path(study, problem, reference)
+    path, told = _reference_path(study, problem, reference)
     if path.complete:
         name = f"{study.stem}, its load turned by 45 degrees"
-        yield LoadCase(name, problem, path, solver=_newton(study), against=against)
+        yield LoadCase(name, problem, path, None, _newton(study), *told)
 
 
 def _refuse_short(study: Study, reference: str, path: Path) -> None:
