@@ -44,7 +44,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_what_is_written(out: Path) -> None:
     assert {file.name for file in out.iterdir()} == {
-        *("calibrated.toml", "calibrated.csv", "calibrate.json", "report.html", "figures")
+        *("calibrated.toml", "calibrated.csv", "calibrate.json", "report.html", "figures", ".truespring.json")
     }
     values = json.loads((out / "calibrate.json").read_text(encoding="utf-8"))
     held = next(one for one in values["cases"] if one["held_out"])

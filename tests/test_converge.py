@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from truespring.cli import main
 from truespring.errors import TruespringError
 from truespring.mesh import refined
 from truespring.settling import Attempt, refinement, settle
+from truespring.study.converge import _watched
 
 MESHES = {
     "squares": ts.rectangle((4.0, 3.0), (3, 2)),
@@ -227,3 +229,29 @@ def test_a_network_is_as_fine_as_it_is() -> None:
     with pytest.raises(TruespringError, match="cannot be refined"):
         list(ts.converge(examples / "truss.toml"))
     assert len(list(ts.converge(examples / "bending.toml", most=1))) == 1
+
+
+def test_an_energy_that_another_program_does_not_tell_is_not_watched() -> None:
+    problem = ts.Problem(
+        ts.rectangle((2.0, 1.0), (2, 1)),
+        ts.Material(1e3, 0.3),
+        ts.PlaneStress(1.0),
+        [ts.Fixed("left")],
+        [ts.Force("right", (1.0, 0.0))],
+    )
+    path = ts.solve(problem, ts.Fem("linear"))
+    told = [quantity for quantity, _, _ in _watched(path, 0)]
+    lost = replace(path, states=(*path.states[:-1], replace(path.states[-1], energy=float("nan"))))
+    assert "energy" in told
+    assert [quantity for quantity, _, _ in _watched(lost, 0)] == [one for one in told if one != "energy"]
+
+
+def test_a_model_whose_quantities_are_all_zero_is_told() -> None:
+    """Also where all quantities of the others have settled."""
+    attempts = [Attempt(name, 10 * 4**mesh, "converged", 1.0, "", True) for mesh in range(3) for name in ("a", "b")]
+    values = {
+        ("a", "energy", "J"): [(10 * 4**mesh, 1.0) for mesh in range(3)],
+        ("b", "energy", "J"): [(10 * 4**mesh, 0.0) for mesh in range(3)],
+    }
+    found = refinement(attempts, values, 0.01)
+    assert not found.settled and "all watched quantities of b are zero" in found.sentence

@@ -156,6 +156,16 @@ def test_axes_that_are_nearly_upright_are_taken_and_told(tmp_path: Path) -> None
         read_labels(sheared(tmp_path, 0.02))
 
 
+def test_more_lines_to_skip_than_there_are_are_refused_at_once(tmp_path: Path) -> None:
+    head = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 200 200 200\nencoding: raw\nline skip: {}\n\n"
+    file = tmp_path / "image.nrrd"
+    file.write_bytes(head.format(2).encode() + b"one\ntwo\n" + bytes(200**3))
+    assert read_labels(file).values.shape == (200, 200, 200)
+    file.write_bytes(head.format(100_000_000).encode() + b"one\ntwo\n" + bytes(200**3))
+    with pytest.raises(MeshError, match="'line skip' is 100000000, there are 2 lines"):
+        read_labels(file)
+
+
 SEGMENTS = (
     "Segment0_ID:=Segment_1\nSegment0_Name:=liver\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
     "Segment1_ID:=Segment_2\nSegment1_Name:=Tumour\nSegment1_LabelValue:=2\nSegment1_Layer:=0\n"

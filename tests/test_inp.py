@@ -384,7 +384,7 @@ def test_all_elements_of_a_cad_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("types", "message"),
     [
-        ({"D": 3, "MASS": 1}, r"there is no \*ELEMENT of a body: 1 D, 1 MASS are none; a body is made of C3D4"),
+        ({"D": 3, "MASS": 1}, r"there is no \*ELEMENT of a body: 1 D, 1 MASS make none; a body is made of C3D4"),
         ({"T3D2": 2}, "there are only 1 line: a body is made of"),
         ({"CAX4": 4}, r"line 27: \*ELEMENT: TYPE=CAX4 \(1 lines\), axisymmetric, is not read: mesh the body by C3D4"),
         ({"C3D8": 8, "C3D7": 7}, r"TYPE=C3D7 \(1 lines\) is not read: mesh the body by"),

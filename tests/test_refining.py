@@ -163,6 +163,18 @@ def test_division_into_simplices_keeps_the_body(mesh: ts.Mesh) -> None:
     assert len(found.facets) == (len(found.elements) * (mesh.dim + 1) + len(found.boundary)) // 2
 
 
+@pytest.mark.parametrize("element", ["wedge", "pyramid"])
+def test_wedges_and_pyramids_have_an_error_of_their_own(element: str) -> None:
+    """No further off than is said, by the deflection of tetrahedra of second order on a mesh halved once more."""
+    mesh = ts.box((0.16, 0.04, 0.04), (4, 1, 1), element)
+    load = ts.Force("right", (0.0, -0.03, 0.0))
+    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), supports=[ts.Fixed("left")], loads=[load])
+    found = ts.reference_error(problem, ts.Fem("linear"))
+    truth = compare(ts.solve(problem, ts.Fem("linear")), limit_of(problem, "linear", 1)).error
+    assert truth is not None and found.value is not None and truth > 0.05
+    assert truth <= found.value <= 1.15 * truth
+
+
 def test_a_coarser_mesh_tells_where_finer_ones_cost_too_much() -> None:
     problem, model, solver = cantilever((8, 2)), ts.Fem("neo-hookean"), ts.Newton(load_steps=3)
     path = ts.solve(problem, model, solver)

@@ -27,6 +27,7 @@ from truespring.mesh import (
 )
 from truespring.models import Model
 from truespring.models.bending import cell_counts
+from truespring.models.fem import SIMPLICES
 from truespring.potential import Potential
 from truespring.problem import Problem, Region
 from truespring.solvers import Nearby, Newton
@@ -193,12 +194,16 @@ def _halved(problem: Problem, times: int) -> Problem:
 def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
     """Return a problem on simplices of the same nodes, and the model of second order for it.
 
-    None where the model has no such elements, is of them already, or where its elements were chosen by name.
+    None where the model has no such elements, is of them already, where its elements were chosen by name, or where the
+    mesh cannot be divided into simplices.
     """
     chosen = getattr(model, "element", None) is not None or not hasattr(model, "element")
-    if chosen or problem.mesh.kind.n_nodes == problem.mesh.dim + 1:
+    if chosen or problem.mesh.element in SIMPLICES:
         return None
-    return simplex_problem(problem), model
+    try:
+        return simplex_problem(problem), model
+    except MeshError:
+        return None
 
 
 def refined_problem(problem: Problem) -> Problem:

@@ -45,15 +45,16 @@ def calibrated_values(found: Calibrated) -> dict[str, Any]:
 def write_calibrated(found: Calibrated, out: FilePath, command: str) -> tuple[FilePath, ...]:
     """Write calibrated.toml, its springs as CSV, calibrate.json, figures and report.html into out/STEM; return them."""
     with Output(out / found.study.stem, "calibrate.json") as output:
-        files = _write(found, output.staging, command)
+        files = _write(found, output, command)
         output.publish()
     return tuple(output.folder / file.name for file in files)
 
 
-def _write(found: Calibrated, folder: FilePath, command: str) -> tuple[FilePath, ...]:
+def _write(found: Calibrated, output: Output, command: str) -> tuple[FilePath, ...]:
+    folder = output.staging
     springs, volume, study = folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv", folder / f"{NAME}.toml"
     tables = write_given(found.calibration.model, springs, volume)
-    study.write_text(calibrated_study(found, folder, [file.name for file in tables]), encoding="utf-8")
+    study.write_text(calibrated_study(found, output.folder, [file.name for file in tables]), encoding="utf-8")
     values = folder / "calibrate.json"
     values.write_text(json.dumps(calibrated_values(found), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     drawings = draw_calibration(found.calibration)

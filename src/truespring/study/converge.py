@@ -69,7 +69,8 @@ def _watched(path: Equilibria, probe: int) -> Iterator[tuple[str, str, float]]:
     state = path.states[-1]
     for direction, value in zip(AXES, state.displacement[probe], strict=False):
         yield f"u{direction} of the probe", "m", float(value)
-    yield "energy", "J", state.energy
+    if np.isfinite(state.energy):  # another program may not tell it
+        yield "energy", "J", state.energy
     for one in path.support_forces(state):  # a resultant that vanishes is zero on every mesh
         yield f"force of {one.name}", "N", float(np.linalg.norm(one.force)) if one.has_force else 0.0
         yield f"torque of {one.name}", "N m", float(np.linalg.norm(one.torque)) if one.has_torque else 0.0
@@ -85,7 +86,7 @@ def write_settling(title: str, file: Path, found: Refinement, folder: Path, comm
                 for count, value in zip(one.n_nodes, one.values, strict=True):
                     table.writerow([one.model, one.quantity, one.unit, count, repr(value)])
         (output.staging / "converge.html").write_text(render_settling(title, file, found, command), encoding="utf-8")
-        values = [asdict(one) for one in found.quantities]
-        (output.staging / "converge.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+        text = json.dumps([asdict(one) for one in found.quantities], indent=1, allow_nan=False)
+        (output.staging / "converge.json").write_text(text + "\n", encoding="utf-8")
         output.publish()
     return folder / "converge.html"

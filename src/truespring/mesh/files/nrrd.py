@@ -153,9 +153,13 @@ def _stored(folder: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
 
 
 def _skipped(fields: Mapping[str, str], data: bytes) -> bytes:
-    for _ in range(min(counts(fields.get("line skip", "0"), 1, "line skip")[0], len(data))):
-        data = data[data.find(b"\n") + 1 :]
-    return data
+    begin, n_lines = 0, counts(fields.get("line skip", "0"), 1, "line skip")[0]
+    for number in range(n_lines):
+        end = data.find(b"\n", begin)
+        if end < 0:
+            raise MeshError(f"'line skip' is {n_lines}, there are {number} lines; {SAVE_ANEW}")
+        begin = end + 1
+    return data[begin:]
 
 
 def _values(fields: Mapping[str, str], data: bytes, dtype: np.dtype[Any], sizes: tuple[int, ...]) -> Values:

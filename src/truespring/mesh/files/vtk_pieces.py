@@ -117,10 +117,10 @@ def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
     n = len(points)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)))
     # A place where one piece has several points may be a crack: nobody knows which of them meet.
-    key = place.astype(np.int64) * (int(owner.max()) + 1) + owner
-    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+    n_pieces = int(owner.max()) + 1
+    key, inverse, counts = np.unique(place.astype(np.int64) * n_pieces + owner, return_inverse=True, return_counts=True)
     apart = np.unique(place[counts[inverse] > 1])
-    meets = apart[[len(np.unique(owner[place == one])) > 1 for one in apart]] if apart.size < 10_000 else apart
+    meets = apart[np.bincount(key // n_pieces)[apart] > 1]
     alone = np.isin(place, apart)
     place = np.where(alone, place.max() + 1 + np.arange(n), place)
     _, first, number = np.unique(place, return_index=True, return_inverse=True)
