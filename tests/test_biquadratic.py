@@ -28,8 +28,8 @@ def random_mesh(element: str, generator: np.random.Generator) -> ts.Mesh:
         case "tetrahedron":
             mesh = ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron")
         case _:
-            mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1))
-    jitter = 0.12 if element == "tetrahedron" else 0.17
+            mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1), element)
+    jitter = 0.12 if element in ("tetrahedron", "pyramid") else 0.17
     shaken = mesh.nodes * generator.uniform(0.6, 1.6, mesh.dim) + generator.uniform(-jitter, jitter, mesh.nodes.shape)
     turn = np.linalg.qr(generator.normal(size=(mesh.dim, mesh.dim)))[0]
     turn[0] *= np.sign(np.linalg.det(turn))
@@ -80,7 +80,7 @@ def test_energy_force_and_tangent_are_those_of_the_finite_element(
 
 
 def test_every_kind_of_element_is_tried() -> None:
-    assert len(CASES) == 6 and {element for element, _ in CASES} == set(RULES["biquadratic"].elements)
+    assert len(CASES) == 8 and {element for element, _ in CASES} == set(RULES["biquadratic"].elements)
 
 
 def test_another_poisson_ratio_is_noticed() -> None:
