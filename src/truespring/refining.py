@@ -162,10 +162,14 @@ def _finer(problem: Problem, model: Any) -> Iterator[_Finer]:
     growth = 2**problem.mesh.dim
     better = model.second_order(problem) if hasattr(model, "second_order") else None
     if better is not None:
-        divided = simplex_problem(problem)
-        n_unknowns = _with_middles(divided.mesh, n_unknowns)
-        yield _Finer(divided, better, "second order", SECOND_ORDER, n_unknowns)
-        return
+        try:
+            divided = simplex_problem(problem)
+        except MeshError:  # an element is too far from convex: halved it is as good
+            pass
+        else:
+            n_unknowns = _with_middles(divided.mesh, n_unknowns)
+            yield _Finer(divided, better, "second order", SECOND_ORDER, n_unknowns)
+            return
     if not hasattr(model, "potential"):
         raise ModelError(f"{getattr(model, 'label', model)} has one mesh")
     for halvings in range(1, _LEVELS + 1):
@@ -179,7 +183,7 @@ def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
     None where the model has no such elements, is of them already, or where its elements were chosen by name.
     """
     chosen = getattr(model, "element", None) is not None or not hasattr(model, "element")
-    if chosen or problem.mesh.kind.n_nodes == problem.mesh.dim + 1:
+    if chosen or problem.mesh.element in ("triangle", "tetrahedron"):
         return None
     return simplex_problem(problem), model
 
