@@ -85,7 +85,7 @@ def write_settling(title: str, file: Path, found: Refinement, folder: Path, comm
                 for count, value in zip(one.n_nodes, one.values, strict=True):
                     table.writerow([one.model, one.quantity, one.unit, count, repr(value)])
         (output.staging / "converge.html").write_text(render_settling(title, file, found, command), encoding="utf-8")
-        values = [asdict(one) for one in found.quantities]
-        (output.staging / "converge.json").write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        values = json.dumps([asdict(one) for one in found.quantities], indent=1, allow_nan=False)
+        (output.staging / "converge.json").write_text(values + "\n", encoding="utf-8")
         output.publish()
     return folder / "converge.html"
