@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -182,6 +183,13 @@ def test_only_sound_meshes_settle() -> None:
     assert "a is not-converged beyond load factor 0.4 on 40 nodes" in short.sentence
     nothing = refinement(attempts("not-converged"), {}, 0.01)
     assert nothing.ended and not nothing.settled
+
+
+def test_what_is_not_known_is_left_out() -> None:
+    """As the energy that another program does not tell: it settles nothing, and no table has a NaN."""
+    known = {("a", "uy", "m"): values(1.0, 1.001, 1.0015), ("a", "energy", "J"): values(math.nan, 1.0, 1.0)}
+    found = refinement(attempts(*["converged"] * 3), known, 0.01)
+    assert [one.quantity for one in found.quantities] == ["uy"] and found.settled
 
 
 def test_what_is_zero_neither_hinders_nor_settles() -> None:

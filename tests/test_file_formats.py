@@ -1,5 +1,6 @@
 """A file is read as what its content is, whatever it is called."""
 
+import gzip
 import re
 import shutil
 from pathlib import Path
@@ -55,6 +56,19 @@ def test_a_damaged_mesh_is_refused_as_what_its_content_is(tmp_path: Path) -> Non
     both = r"a mesh file ends in \.msh, .*, not in '\.obj', and what this one begins with is none of these"
     with pytest.raises(MeshError, match=both):
         read_mesh(tmp_path / "mesh.obj")
+
+
+@pytest.mark.parametrize("name", ["mesh.vtk", "mesh.msh", "mesh.inp", "mesh.stl"])
+def test_a_surface_or_a_packed_file_is_refused_with_the_way_to_a_mesh(name: str, tmp_path: Path) -> None:
+    surfaces = (
+        bytes(80) + (1).to_bytes(4, "little") + bytes(50),
+        b"solid box\n facet normal 0 0 1\n  outer loop\n",
+        b"ply\nformat ascii 1.0\n",
+    )
+    for data, way in (*((one, "mesher") for one in surfaces), (gzip.compress(b"$MeshFormat\n"), "unpack")):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(MeshError, match=way):
+            read_mesh(tmp_path / name)
 
 
 def test_comments_may_stand_before_what_tells_the_format(tmp_path: Path) -> None:

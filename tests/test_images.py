@@ -372,3 +372,11 @@ def test_a_header_names_files_beside_it_only_and_prints_none_of_their_bytes(
     with pytest.raises(MeshError, match=r"image\.\w+: it names '.*own folder or below") as error:
         ts.read_voxels(file, 1)
     assert not {"83", "69", "SECRET"} & set(str(error.value).replace(",", " ").split())
+
+
+def test_labels_may_be_floating_point_numbers_of_any_precision(tmp_path: Path) -> None:
+    values = np.zeros((4, 3, 3))
+    values[1:3, 1, 1] = 1
+    for precision in (np.float16, np.float32, np.float64):
+        np.save(tmp_path / "labels.npy", values.astype(precision))
+        assert len(ts.read_voxels(tmp_path / "labels.npy", label=1).elements) == 2

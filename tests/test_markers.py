@@ -81,6 +81,7 @@ SPELLINGS = {
     "Abaqus": table(("ID", "COORD1 [mm]", "COORD2 [mm]", "U1 [mm]", "U2 [mm]")),
     "DICe": table(("COORDINATE_X [mm]", "COORDINATE_Y [mm]", "DISPLACEMENT_X [mm]", "DISPLACEMENT_Y [mm]")),
     "byte order mark": "\ufeff" + table(PLAIN),
+    "Fortran's exponents": table(PLAIN).replace("160.0", "1.6D+02").replace("0.25", "0.025d1"),
 }
 
 

@@ -175,6 +175,57 @@ def test_wedges_and_pyramids_have_an_error_of_their_own(element: str) -> None:
     assert truth <= found.value <= 1.15 * truth
 
 
+def of_several_kinds(name: str) -> ts.Mesh:
+    """A brick of hexahedra whose last ones are wedges, pyramids or both, or quadrilaterals and triangles."""
+    if name == "triangles":
+        mesh = ts.rectangle((3.0, 1.0), (3, 1))
+        last = mesh.elements[-1]
+        cells = {"quadrilateral": mesh.elements[:-1], "triangle": np.array([last[[0, 1, 2]], last[[0, 2, 3]]])}
+        return ts.Mesh.of_kinds(mesh.nodes, cells, facet_groups={"one": [[0, 0]], "three": [[2, 0], [3, 1]]})
+    mesh = ts.box((3.0, 1.0, 1.0), (3, 1, 1))
+    last = mesh.elements[-1]
+    wedges = last[[[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]]
+    if name == "wedges":
+        wedges = np.concatenate([one[[[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]] for one in mesh.elements])
+        return ts.Mesh(mesh.nodes, wedges, "wedge", facet_groups={"one": [[4, 0], [4, 3]], "three": [[5, 0]]})
+    cells = {"hexahedron": mesh.elements[:-1], "wedge": wedges}
+    if name == "pyramids":  # from the middle of the last brick
+        of = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
+        middle = np.full((6, 1), mesh.n_nodes)
+        cells["pyramid"] = np.concatenate([last[of[:, ::-1]], middle], axis=1)
+        del cells["wedge"]
+        nodes = np.concatenate([mesh.nodes, mesh.nodes[last].mean(axis=0, keepdims=True)])
+        return ts.Mesh.of_kinds(nodes, cells, facet_groups={"one": [[2, 0]], "three": [[2, 0], [0, 1]]})
+    return ts.Mesh.of_kinds(mesh.nodes, cells, facet_groups={"one": [[2, 0], [0, 1]], "three": [[3, 0]]})
+
+
+@pytest.mark.parametrize("name", ["triangles", "wedges", "pyramids", "hexahedra and wedges"])
+def test_bodies_of_several_kinds_are_divided_and_their_facets_with_them(name: str) -> None:
+    mesh = of_several_kinds(name)
+    found, parents = in_simplices(mesh)
+    assert np.bincount(parents, found.measures) == pytest.approx(mesh.measures, rel=1e-12)
+    assert len(found.facets) == (len(found.elements) * (mesh.dim + 1) + len(found.boundary)) // 2
+    per_facet = {2: lambda nodes: 1, 3: lambda nodes: len(set(nodes)) - 2}[mesh.dim]
+    for group, facets in mesh.facet_groups.items():
+        nodes = mesh.facet_nodes(facets)
+        assert len(found.facet_groups[group]) == sum(per_facet(one) for one in nodes.tolist())
+        assert np.array_equal(np.unique(found.facet_nodes(found.facet_groups[group])), np.unique(nodes))
+
+
+@pytest.mark.parametrize("name", ["triangles", "wedges", "hexahedra and wedges"])
+def test_a_coarse_reference_of_several_kinds_is_called_so(name: str) -> None:
+    """A cantilever one element deep is by far too stiff, whatever its elements are."""
+    mesh = of_several_kinds(name)
+    down = (0.0, -1.0, 0.0)[: mesh.dim]
+    section = ts.PlaneStress(1.0) if mesh.dim == 2 else None
+    loads, supports = [ts.Force("right", down)], [ts.Fixed("left")]
+    problem = ts.Problem(mesh=mesh, material=ts.Material(1e5, 0.3), section=section, supports=supports, loads=loads)
+    found = ts.reference_error(problem, ts.Fem("linear"))
+    length, inertia = 3.0, 1 / 12
+    stiff = ts.solve(problem, ts.Fem("linear")).states[-1].displacement[:, 1].min() / (-(length**3) / 3e5 / inertia)
+    assert found.how == "second order" and found.value is not None and found.value > 0.7 * (1 - stiff) > 0.1
+
+
 def test_a_coarser_mesh_tells_where_finer_ones_cost_too_much() -> None:
     problem, model, solver = cantilever((8, 2)), ts.Fem("neo-hookean"), ts.Newton(load_steps=3)
     path = ts.solve(problem, model, solver)

@@ -125,11 +125,16 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
             cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
             if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
-            limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
+            try:
+                limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
+            except MeshError:  # an element is too far from convex to be divided into simplices: halved it is as good
+                continue
             spent += work_of(limit)
             against = compare(path, limit)
             value = None if against.error is None else _whole(against.error, finer.left)
             found = OwnError(value, finer.how, limit, against)
+            if finer.how == _SECOND:
+                break
     except (TruespringError, MemoryError):
         pass  # what was found before stands, else a coarser mesh tells
     if found is None:
@@ -159,6 +164,9 @@ def _whole(distance: float, left: float) -> float:
     return distance / (1 - left * max(1 - distance, 0.0))
 
 
+_SECOND = "second order"
+
+
 class _Finer(NamedTuple):
     """A finer way to solve a problem, made when it is wanted, and the share of the error that it still has."""
 
@@ -175,8 +183,7 @@ def _finer(path: Path, model: Any) -> Iterator[_Finer]:
     growth = 2**problem.mesh.dim
     better = model.second_order(problem) if hasattr(model, "second_order") else None
     if better is not None:
-        yield _Finer(partial(simplex_problem, problem), better, "second order", SECOND_ORDER, growth * n_unknowns)
-        return
+        yield _Finer(partial(simplex_problem, problem), better, _SECOND, SECOND_ORDER, growth * n_unknowns)
     if not hasattr(model, "potential"):
         raise ModelError(f"{getattr(model, 'label', model)} can be solved on its own mesh only")
     for halvings in range(1, _LEVELS + 1):

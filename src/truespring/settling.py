@@ -148,10 +148,13 @@ def refinement(
 ) -> Refinement:
     """Return what attempts on finer and finer meshes tell.
 
-    `values` are those of each quantity, by model, name and unit, with the number of nodes of their mesh.
+    `values` are those of each quantity, by model, name and unit, with the number of nodes of their mesh. One that is
+    not known on each mesh is left out, such as an energy that another program does not tell.
     """
     found = []
     for (model, quantity, unit), several in values.items():
+        if not all(math.isfinite(value) for _, value in several):
+            continue
         counts, numbers = [count for count, _ in several], [value for _, value in several]
         one = settle(model, quantity, unit, counts, numbers, tolerance)
         finest = [attempt for attempt in attempts if attempt.model == model][-_MESHES:]

@@ -21,6 +21,8 @@ Synonyms = Callable[[Sequence[str]], Mapping[str, str]]
 # How a unit may stand behind a name: "x [mm]", "x (mm)"; or glued: "x_mm", "x mm".
 _HEAD = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])])?\s*")
 _GLUED = re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\W\d_]+)")
+# A number as Fortran writes it, 1.0D-03.
+_FORTRAN = re.compile(r"([\d.])[dD]([+-]?\d+)$")
 # Lengths in a picture, which no unit of length tells.
 _PIXELS = ("px", "pix", "pixel", "pixels")
 # By the mark that a file of another coding begins with.
@@ -194,7 +196,11 @@ class Table:
 
     def numbers(self, name: str) -> Floats:
         """Return a column in SI units, shape (n_rows,)."""
-        convert = (lambda text: float(text.replace(",", "."))) if self._comma else float
+
+        def convert(text: str) -> float:
+            text = text.replace(",", ".") if self._comma else text
+            return float(_FORTRAN.sub(r"\1e\2", text))
+
         return self._scales[name] * np.array(
             [self._value(name, row, convert, "is no number") for row in range(self.n_rows)]
         )

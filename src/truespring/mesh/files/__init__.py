@@ -10,7 +10,7 @@ from typing import NamedTuple
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
-from truespring.mesh.files.heads import Recognises, format_by_head, is_inp, is_msh, listed_keys, read_as
+from truespring.mesh.files.heads import Recognises, foreign, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
@@ -86,12 +86,15 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     if key is None:
         raise MeshError(
             f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
-            "is none of these formats: convert it, for example: meshio convert FILE NEW.vtu"
+            f"is none of these formats: {foreign(data) or 'convert it, for example: meshio convert FILE NEW.vtu'}"
         )
     form = FORMATS[key]
     try:
         contents = form.read(data, file.parent)
     except MeshError as error:
+        other = "" if form.recognises(data) else foreign(data)
+        if other:
+            raise MeshError(f"{file}: this is no {key} file: {other}") from None
         others = "" if form.recognises(data) else f"it does not begin like {listed_keys(FORMATS, key)} either"
         raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
     try:

@@ -55,3 +55,16 @@ def is_vtk_xml(*kinds: str) -> Recognises:
     names = "|".join(kinds).encode()
     form = re.compile(before + rb"\btype\s*=\s*[\"'](?:" + names + rb")[\"']", re.DOTALL)
     return lambda head: bool(form.match(head))
+
+
+def foreign(data: bytes) -> str:
+    """Say what a file of no known format is, and the way from there to a mesh, where what it holds tells; else ""."""
+    if data.startswith((b"\x1f\x8b", b"PK\x03\x04")):
+        return "it is packed: unpack it (gunzip, unzip), and name what comes out"
+    is_stl = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+    if is_stl or re.match(rb"\s*(?:solid\b.*?\bfacet\s|ply\s|OFF\s)", data[:HEAD], re.DOTALL):
+        return (
+            "it holds a surface (as .stl, .ply and .off do), not a body: let a mesher such as gmsh or fTetWild fill it "
+            "with tetrahedra"
+        )
+    return ""

@@ -91,7 +91,8 @@ def checked(labels: Labels) -> Labels:
     if values.ndim not in (3, 4) or not values.size:
         raise MeshError(f"the image has shape {values.shape}: three axes are wanted, none of them empty")
     if values.dtype.kind == "f":
-        whole = np.isfinite(values).all() and (values == np.rint(values)).all() and (np.abs(values) < 2**53).all()
+        whole = np.isfinite(values).all() and (values == np.rint(values)).all()
+        whole = whole and float(np.abs(values).max()) < 2**53
         if not whole:
             raise MeshError("the image holds fractions, not labels: it was blurred or interpolated; segment it first")
         values = values.astype(np.int64)
