@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Path
+from truespring.equilibrium import Path, State
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
 from truespring.report.quantity import natural_scale, percent, quantity, times
@@ -81,8 +81,15 @@ def _levels(path: Path, budget: int) -> list[float]:
     return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
 
 
-def _force(force: float) -> str:
-    return quantity(force, "N") if np.isfinite(force) else "not known"
+# A resultant of reactions below this share of their sum is rounding.
+_ROUNDING = 1e-9
+
+
+def _force(along: float, state: State) -> str:
+    if not np.isfinite(along):
+        return "not known"
+    reactions = float(np.nansum(np.linalg.norm(state.reaction, axis=1)))
+    return quantity(0.0 if abs(along) < _ROUNDING * reactions else along, "N")
 
 
 def _path(
@@ -103,7 +110,7 @@ def _path(
         "beyond": beyond,
         "levels": [state.load_factor for state in states],
         "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
-        "force": [_force(to.along(path.applied_force(state))) for state in states],
+        "force": [_force(to.along(path.applied_force(state)), state) for state in states],
         "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
         "errors": [None if error is None or np.isnan(error) else percent(error) for error in errors],
         "surface": None,
