@@ -707,7 +707,7 @@ def test_a_count_of_cells_that_does_not_match(tmp_path: Path) -> None:
 def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "mesh.stl").write_text("solid a\nfacet normal 0 0 1\n")
     with pytest.raises(
-        MeshError, match=r"mesh\.stl: a mesh file ends in \.msh, .*, not in '\.stl', and .*meshio convert"
+        MeshError, match=r"mesh\.stl: a mesh file ends in \.msh, .*, not in '\.stl', and .*let a mesher such as"
     ):
         read_mesh(tmp_path / "mesh.stl")
     with pytest.raises(MeshError, match=r"none\.msh does not exist"):

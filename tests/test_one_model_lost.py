@@ -164,7 +164,7 @@ def test_springs_unstable_at_rest_have_a_report(tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("unbuffered", ["", pytest.param("1", marks=pytest.mark.verification)])
 def test_output_that_is_full(unbuffered: str) -> None:
     """Of output so short that only the end of the program writes it, and of output written at once."""
     with Path("/dev/full").open("w") as full:

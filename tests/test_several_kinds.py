@@ -388,7 +388,9 @@ references = ["fem"]
 """
 
 
-@pytest.mark.parametrize("name", ["plane of two kinds", "solid of four kinds"])
+@pytest.mark.parametrize(
+    "name", ["plane of two kinds", pytest.param("solid of four kinds", marks=pytest.mark.verification)]
+)
 def test_a_study_from_file_to_report(name: str, tmp_path: Path) -> None:
     mesh = BODIES[name]()
     meshio.Mesh(np.pad(mesh.nodes, ((0, 0), (0, 3 - mesh.dim))), list(mesh.cells.items())).write(tmp_path / "body.vtu")
