@@ -202,7 +202,8 @@ class _Stream:
         try:
             self.due()
         except OSError:
-            self.stream.write(data[: len(data) // 2])
+            whole = data if isinstance(data, str) else bytes(data)
+            self.stream.write(whole[: len(whole) // 2])
             raise
         return self.stream.write(data)
 
