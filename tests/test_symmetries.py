@@ -20,7 +20,7 @@ from truespring.cli import main
 from truespring.equilibrium import Path as Equilibria
 from truespring.equilibrium import Status
 from truespring.kernels.threads import set_threads
-from truespring.mesh.kinds import MIRRORED
+from truespring.mesh.merged import mirrored
 from truespring.models import LAWS, RULES, Model
 from truespring.potential import Refined
 
@@ -51,7 +51,7 @@ class Change:
         new_number = np.argsort(self.nodes)
         elements = new_number[mesh.elements[self.elements]]
         if np.linalg.det(self.matrix) < 0:
-            elements = elements[:, MIRRORED[mesh.element]]
+            elements = mirrored(elements, mesh.element, np.ones(len(elements), dtype=bool))
         section = problem.section
         if isinstance(section, ts.PlaneStress | ts.PlaneStrain):
             section = replace(section, thickness=self.scale * section.thickness)
