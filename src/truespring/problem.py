@@ -12,7 +12,9 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
 from truespring.loading import (
     Body,
+    DeadLoad,
     Fixed,
+    FollowingLoad,
     Force,
     Gravity,
     Held,
@@ -174,7 +176,7 @@ class Problem:
         """Return the dead loads over the cells of `body` that carry them; it may have more nodes than the mesh."""
         found = []
         for number, load in enumerate(self.loads):
-            if isinstance(load, Force | Traction | Gravity):
+            if isinstance(load, DeadLoad):
                 with _named(number):
                     found.append(load.spread(body))
         return tuple(found)
@@ -183,7 +185,7 @@ class Problem:
         """Return the loads that follow `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
         found: list[Potential] = []
         for number, load in enumerate(self.loads):
-            if isinstance(load, Pressure | Moment):
+            if isinstance(load, FollowingLoad):
                 with _named(number):
                     found.append(load.following(body, held))
         return tuple(found)
@@ -192,7 +194,7 @@ class Problem:
     def rims(self) -> Ints:
         """The edges around the surfaces that a pressure acts on, by their ends, shape (n, 2)."""
         none = np.zeros((0, 2), dtype=np.int64)
-        return np.concatenate([none, *(load.rim(self.mesh) for load in self.loads if isinstance(load, Pressure))])
+        return np.concatenate([none, *(load.rim(self.mesh) for load in self.loads if isinstance(load, FollowingLoad))])
 
     def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
         clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -81,6 +81,15 @@ def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
     for cells, measures, density in spreads:
         np.add.at(force, cells, measures[:, :, None] * density[:, None, :])
     return force
+
+
+@runtime_checkable
+class DeadLoad(Protocol):
+    """A load that keeps its direction."""
+
+    def spread(self, body: Body) -> Spread:
+        """Return the load over the cells of `body` that carry it."""
+        ...
 
 
 @dataclass(frozen=True)

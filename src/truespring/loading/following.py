@@ -6,7 +6,7 @@ or slides within planes, or there is none; of a moment, in the plane. Others are
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
@@ -18,13 +18,26 @@ from truespring.loading.dead import Body
 from truespring.loading.values import number
 from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
 from truespring.mesh.rows import ascending, distinct_rows
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import Pattern, Potential, SparseMatrix
 
 # Forces of a pressure are polynomials of second order along a straight way: two Gauss points give its work exactly.
 _GAUSS = ((0.5 - 0.5 / np.sqrt(3), 0.5), (0.5 + 0.5 / np.sqrt(3), 0.5))
 # The tangent of a load that has a potential is symmetric to this share of its size, at a state deformed by a
 # share of the body's size.
 _SYMMETRIC, _DEFORMED = 1e-9, 0.05
+
+
+@runtime_checkable
+class FollowingLoad(Protocol):
+    """A load that follows the body."""
+
+    def following(self, body: Body, held: Bools) -> Potential:
+        """Return the potential on `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
+        ...
+
+    def rim(self, mesh: Mesh) -> Ints:
+        """Return the edges around the surface in space, by their ends, shape (n, 2)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -81,6 +94,10 @@ class Moment:
             raise ProblemError("a moment turns a face: select at least two nodes")
         way = _way_to(mesh, nodes, held[: mesh.n_nodes])
         return FaceMoment(body.nodes, *body.shares(self.on), moment, way)
+
+    def rim(self, mesh: Mesh) -> Ints:
+        """Return no edges: a moment acts in the plane."""
+        return np.zeros((0, 2), dtype=np.int64)
 
 
 # The cell that a facet of so many nodes is, by dimensions of the body, and Gauss points along its axes: forces of a

@@ -8,6 +8,7 @@ from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprin
 from truespring.models.fem import ELEMENTS as ELEMENTS
 from truespring.models.fem import Fem as Fem
 from truespring.models.fem import FemPotential as FemPotential
+from truespring.models.fem import FiniteElements as FiniteElements
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge

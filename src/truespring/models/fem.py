@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import skfem
@@ -16,7 +16,7 @@ from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS, MIXED, Mesh, counted
 from truespring.models.laws import LAWS, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, voigt_places
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import Pattern, Potential, SparseMatrix
 from truespring.problem import Problem
 
 if TYPE_CHECKING:
@@ -277,6 +277,21 @@ class Points(NamedTuple):
     F: Floats
     frame: Floats
     constants: Constants
+
+
+@runtime_checkable
+class FiniteElements(Potential, Protocol):
+    """A potential of finite elements, which has a law and an interpolation."""
+
+    @property
+    def law(self) -> Law:
+        """The constitutive law."""
+        ...
+
+    @property
+    def interpolation(self) -> str:
+        """One of ELEMENTS."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

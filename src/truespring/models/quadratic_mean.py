@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,7 @@ class QuadraticMeanPotential(QuadraticPotential):
         if not self.law.logarithmic:
             own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
             mean = _mean(own, at)
-            flat: Callable[[], Floats] = lambda: np.zeros((len(strain), *strain.shape))  # noqa: E731
+            flat = partial(np.zeros, (len(strain), *strain.shape))
             return _Volume(lam / 2 * mean**2, lam * mean, lam + 0 * mean, eye, flat, np.ones_like(own))
         J = determinant(at.F)
         mean = _mean(J, at)

@@ -8,7 +8,7 @@ from typing import Any
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError
 from truespring.equilibrium import Path
-from truespring.models import FemPotential, Moduli, SummedElements
+from truespring.models import FiniteElements, Moduli
 from truespring.reactions import moved_supports
 from truespring.report.result import Result
 
@@ -47,7 +47,7 @@ def _model(path: Path, probe: int) -> dict[str, Any]:
         "warnings": list(path.warnings),
         "solver": None if path.cost is None else asdict(path.cost),
     }
-    if isinstance(path.potential, FemPotential | SummedElements):
+    if isinstance(path.potential, FiniteElements):
         values["element"] = path.potential.interpolation
     if path.moduli is not None:
         values["moduli"] = moduli_values(path.moduli)

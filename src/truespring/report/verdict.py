@@ -10,7 +10,7 @@ from truespring.comparison import Comparison, SupportError, decisive
 from truespring.equilibrium import Path, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, FemPotential, Moduli, SummedElements
+from truespring.models import Fem, FiniteElements, Moduli
 from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
@@ -47,7 +47,7 @@ def cause_sentence(result: Result) -> str | None:
     nonlinear = {
         name: one
         for name, one in result.comparisons.items()
-        if isinstance(one.reference.potential, FemPotential | SummedElements)
+        if isinstance(one.reference.potential, FiniteElements)
         and one.reference.potential.law.finite
         and one.load_factors.size > 1
         and one.rms_errors[-1] > _TOLD_APART
@@ -163,7 +163,7 @@ def mesh_sentence(result: Result) -> str | None:
     """
     known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
     potentials = [one.reference.potential for one in result.comparisons.values()]
-    used = {potential.interpolation for potential in potentials if isinstance(potential, FemPotential | SummedElements)}
+    used = {potential.interpolation for potential in potentials if isinstance(potential, FiniteElements)}
     if known is None or known.depth is None or drive(result).axis != 1:
         return None
     if Fem("linear").chosen_element(result.problem) not in used:
