@@ -3,6 +3,7 @@
 Every model of the tables on every element, as tests/test_potentials.py has them, solved at a large displacement.
 """
 
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -125,8 +126,6 @@ QUICK = _one_of_each()
 
 def looked_at(name: str, look: str, seed: int) -> None:
     """Solve a problem seen otherwise, and compare."""
-    if name in ON_AXES and look in ("mirrored", "turned by a right angle", "turned"):
-        return
     problem, path = loaded(name), solved(name)
     generator = np.random.default_rng(seed)
     dim, counts = problem.mesh.dim, (problem.mesh.n_nodes, len(problem.mesh.elements))
@@ -159,8 +158,14 @@ def test_results_do_not_depend_on_how_a_body_is_seen(name: str) -> None:
 
 
 @pytest.mark.verification
-@pytest.mark.parametrize("look", LOOKS)
-@pytest.mark.parametrize("name", SOLVED)
+@pytest.mark.parametrize(
+    ("name", "look"),
+    [
+        (name, look)
+        for name, look in itertools.product(SOLVED, LOOKS)
+        if not (name in ON_AXES and look in ("mirrored", "turned by a right angle", "turned"))
+    ],
+)
 def test_results_do_not_depend_on_any_look(name: str, look: str) -> None:
     looked_at(name, look, 18)
 
