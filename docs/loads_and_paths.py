@@ -46,7 +46,7 @@ def columns() -> Iterator[Found]:
         yield what, 1.2 * first.load_factor, wanted, "EI of the springs, closed form"
 
 
-def column(depth: int, slender: int) -> ts.Path:
+def column(depth: int, slender: int) -> ts.Solution:
     """A clamped column of Lloyd's springs, pressed along its axis by 1.2 times Euler's load of its material."""
     load = -1.2 * math.pi**2 / (4 * slender**2) / 12
     problem = ts.Problem(
@@ -78,7 +78,7 @@ def circles() -> Iterator[Found]:
         yield what, found, elastica_tip(alpha)[1], f"the elastica; Sze, Liu, Lo 2004 have {table / 10:.4f}"
 
 
-def circle(depth: int) -> tuple[ts.Problem, ts.Path]:
+def circle(depth: int) -> tuple[ts.Problem, ts.Solution]:
     """A strip of isotropic springs, L/H = 40, under M = 2 pi EI(n) / L at its end."""
     moment = 2 * math.pi * bending_factor(3 / 8, 3 / 8, depth) / 12 / 40
     problem = ts.Problem(

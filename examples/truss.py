@@ -5,7 +5,7 @@ import numpy as np
 import truespring as ts
 
 
-def main() -> ts.Path:
+def main() -> ts.Solution:
     nodes = np.array([[-1.0, 0.0], [0.0, 0.2], [1.0, 0.0]])
     network = ts.SpringNetwork(nodes, springs=[[0, 1], [1, 2]], stiffness=[1000 / np.hypot(1.0, 0.2)] * 2)
     problem = ts.Problem(network.mesh, supports=ts.Fixed(on=[0, 2]), loads=ts.Force(on=[1], total=(0.0, -4.0)))

@@ -212,7 +212,7 @@ def left_part(share: float, dim: int, scale: float = 1.0) -> ts.Box:
     return ts.Box((0.0,) * dim, (4 * share * scale, *(scale,) * (dim - 1)))
 
 
-def end(path: ts.Path, dim: int) -> Floats:
+def end(path: ts.Solution, dim: int) -> Floats:
     """The displacement of the end over the length, by the load's own weights."""
     problem = path.problem
     weight = problem.loading.external_force[:, 1] / problem.loading.external_force[:, 1].sum()

@@ -50,7 +50,7 @@ TWINS = {
 }
 
 
-def gap(theirs: ts.Path, ours: ts.Path) -> float:
+def gap(theirs: ts.Solution, ours: ts.Solution) -> float:
     """The largest rms distance over rms displacement of all levels; both have them all."""
     assert theirs.load_factors == pytest.approx(ours.load_factors) and len(ours.states) > 1
     errors = [

@@ -129,7 +129,7 @@ def test_a_combination_that_no_datum_sees_is_named() -> None:
 # --- Gradients --------------------------------------------------------------------------------------------------------
 
 
-def markers(problem: Problem, path: ts.Path) -> ts.Path:
+def markers(problem: Problem, path: ts.Solution) -> ts.Solution:
     """Where three points that are no nodes have gone, at the levels of a path."""
     points = np.array([[0.052, 0.013, 0.0], [0.107, 0.031, 0.0], [0.155, 0.008, 0.0]])
     at = path.whole.locate(points[:, :2])

@@ -28,23 +28,23 @@ def beam(rows: int = 4, element: str = "quadrilateral", dim: int = 2) -> ts.Prob
     )
 
 
-def solved(problem: ts.Problem, element: str | None = None) -> ts.Path:
+def solved(problem: ts.Problem, element: str | None = None) -> ts.Solution:
     return ts.solve(problem, ts.Fem("saint-venant-kirchhoff", element), ts.Newton(load_steps=4))
 
 
 @pytest.fixture(scope="module")
-def coarse() -> ts.Path:
+def coarse() -> ts.Solution:
     return solved(beam(4))
 
 
 @pytest.fixture(scope="module")
-def solid() -> ts.Path:
+def solid() -> ts.Solution:
     return solved(beam(2, "hexahedron", 3))
 
 
 def as_read(
-    path: ts.Path, moved: Floats | None = None, cells: dict[str, Ints] | None = None, unit: float = 1.0
-) -> ts.Path:
+    path: ts.Solution, moved: Floats | None = None, cells: dict[str, Ints] | None = None, unit: float = 1.0
+) -> ts.Solution:
     """A path as if it had been read from a file: without its problem, moved as a whole, in another unit."""
     mesh = path.problem.mesh
 
@@ -62,7 +62,7 @@ def as_read(
     return placed(record, Placing(), "file")
 
 
-def field(problem: ts.Problem, path: ts.Path) -> ts.Path:
+def field(problem: ts.Problem, path: ts.Solution) -> ts.Solution:
     """A smooth displacement, given at the nodes of a mesh: each state of a path with that instead."""
     at = problem.mesh.nodes / LENGTH
     moved = 0.1 * LENGTH * np.stack([np.sin(2 * at[:, 0] + at[:, 1]), at[:, 0] ** 2 * np.cos(3 * at[:, 1])], axis=1)
@@ -78,7 +78,7 @@ def field(problem: ts.Problem, path: ts.Path) -> ts.Path:
 # --- one mesh ---------------------------------------------------------------------------------
 
 
-def test_a_path_is_not_apart_from_itself_nor_from_what_was_read_of_it(coarse: ts.Path, solid: ts.Path) -> None:
+def test_a_path_is_not_apart_from_itself_nor_from_what_was_read_of_it(coarse: ts.Solution, solid: ts.Solution) -> None:
     for path in (coarse, solid):
         for other in (path, as_read(path)):
             for found in (ts.compare(path, other), ts.compare(other, path)):
@@ -89,7 +89,7 @@ def test_a_path_is_not_apart_from_itself_nor_from_what_was_read_of_it(coarse: ts
                 assert found.load_factors == pytest.approx([0.25, 0.5, 0.75, 1.0])
 
 
-def test_a_copy_moved_as_a_whole_is_apart_by_the_motion(solid: ts.Path) -> None:
+def test_a_copy_moved_as_a_whole_is_apart_by_the_motion(solid: ts.Solution) -> None:
     motion = np.array([0.003, -0.004, 0.012])
     found = ts.compare(as_read(solid, motion), solid)
     assert found.rms_distances == pytest.approx(np.linalg.norm(motion) * found.load_factors, rel=1e-12)
@@ -100,7 +100,7 @@ def test_a_copy_moved_as_a_whole_is_apart_by_the_motion(solid: ts.Path) -> None:
     assert found.hausdorff is not None and 0.9 * 0.013 < found.hausdorff.max <= 0.013 * (1 + 1e-12)
 
 
-def test_nodes_in_another_order_are_compared_node_by_node(coarse: ts.Path) -> None:
+def test_nodes_in_another_order_are_compared_node_by_node(coarse: ts.Solution) -> None:
     mesh = coarse.problem.mesh
     order = np.random.default_rng(0).permutation(mesh.n_nodes)
     place = np.argsort(order)
@@ -114,7 +114,7 @@ def test_nodes_in_another_order_are_compared_node_by_node(coarse: ts.Path) -> No
     assert found.model.problem.mesh.nodes[found.probe] == pytest.approx([LENGTH, HEIGHT / 2])
 
 
-def test_distances_in_metres_do_not_tell_model_from_reference(coarse: ts.Path) -> None:
+def test_distances_in_metres_do_not_tell_model_from_reference(coarse: ts.Solution) -> None:
     other = ts.solve(coarse.problem, ts.Springs("isotropic"), ts.Newton(load_steps=4))
     one, two = ts.compare(coarse, other), ts.compare(other, coarse)
     assert one.rms_distances == pytest.approx(two.rms_distances, rel=1e-14) and one.rms_distances[-1] > 1e-4
@@ -122,7 +122,7 @@ def test_distances_in_metres_do_not_tell_model_from_reference(coarse: ts.Path) -
     assert one.rms_error != pytest.approx(two.rms_error, rel=1e-3)
 
 
-def test_stored_energies_are_compared_where_both_are_told(coarse: ts.Path) -> None:
+def test_stored_energies_are_compared_where_both_are_told(coarse: ts.Solution) -> None:
     other = ts.solve(coarse.problem, ts.Springs("isotropic"), ts.Newton(load_steps=4))
     found = ts.compare(other, coarse)
     ours, theirs = other.states[-1].energy, coarse.states[-1].energy
@@ -134,7 +134,7 @@ def test_stored_energies_are_compared_where_both_are_told(coarse: ts.Path) -> No
 
 
 @pytest.mark.parametrize("element", ["quadrilateral", "triangle"])
-def test_one_field_on_finer_meshes_is_carried_at_the_order_of_the_elements(element: str, coarse: ts.Path) -> None:
+def test_one_field_on_finer_meshes_is_carried_at_the_order_of_the_elements(element: str, coarse: ts.Solution) -> None:
     """The reference is carried: its elements' interpolation is what errs, by h^2."""
     at = beam(23, element)
     fine = field(at, replace(coarse, problem=at, potential=None))
@@ -148,7 +148,7 @@ def test_one_field_on_finer_meshes_is_carried_at_the_order_of_the_elements(eleme
     assert (orders > 1.8).all() and (orders < 2.3).all(), orders
 
 
-def test_elements_of_second_order_are_carried_by_their_own_interpolation(coarse: ts.Path) -> None:
+def test_elements_of_second_order_are_carried_by_their_own_interpolation(coarse: ts.Solution) -> None:
     problem = beam(3, "triangle")
     quadratic = solved(problem, "quadratic")
     nodes = quadratic.whole.points
@@ -169,7 +169,7 @@ def test_elements_of_second_order_are_carried_by_their_own_interpolation(coarse:
     assert not found.node_by_node and found.rms_error is not None and found.rms_error < 1e-13
 
 
-def test_what_lies_outside_is_left_out_and_counted(coarse: ts.Path) -> None:
+def test_what_lies_outside_is_left_out_and_counted(coarse: ts.Solution) -> None:
     longer = beam(4)
     mesh = ts.rectangle((1.25 * LENGTH, HEIGHT), (20, 4))
     longer = replace(longer, mesh=mesh)
@@ -185,7 +185,9 @@ def test_what_lies_outside_is_left_out_and_counted(coarse: ts.Path) -> None:
         ts.compare(far, coarse)
 
 
-def test_a_solid_is_compared_with_a_plane_body_at_the_middle_of_its_depth(coarse: ts.Path, solid: ts.Path) -> None:
+def test_a_solid_is_compared_with_a_plane_body_at_the_middle_of_its_depth(
+    coarse: ts.Solution, solid: ts.Solution
+) -> None:
     for found in (ts.compare(solid, coarse), ts.compare(coarse, solid)):
         assert found.model.problem.mesh.dim == 2 and found.hausdorff is None
         assert found.n_outside == 0
@@ -196,7 +198,7 @@ def test_a_solid_is_compared_with_a_plane_body_at_the_middle_of_its_depth(coarse
         assert carried.displacement[place] == pytest.approx(moved[:2], abs=1e-12)
 
 
-def test_markers_are_compared_where_they_are(coarse: ts.Path, solid: ts.Path) -> None:
+def test_markers_are_compared_where_they_are(coarse: ts.Solution, solid: ts.Solution) -> None:
     """A body is carried to markers, whichever of both is the reference; they have no surface."""
     rng = np.random.default_rng(3)
     for path in (coarse, solid):
@@ -220,7 +222,7 @@ def test_markers_are_compared_where_they_are(coarse: ts.Path, solid: ts.Path) ->
 # --- units and axes that do not fit -----------------------------------------------------------
 
 
-def turned(path: ts.Path, axes: tuple[str, ...], factor: float = 1.0, shift: Floats | None = None) -> ts.Path:
+def turned(path: ts.Solution, axes: tuple[str, ...], factor: float = 1.0, shift: Floats | None = None) -> ts.Solution:
     """A solid as a file with other axes, unit and origin tells it."""
     mesh = path.problem.mesh
     placing = Placing(axes=axes)
@@ -231,7 +233,7 @@ def turned(path: ts.Path, axes: tuple[str, ...], factor: float = 1.0, shift: Flo
     return placed(record, Placing(), "file")
 
 
-def test_a_body_that_lies_right_has_no_misfit(coarse: ts.Path, solid: ts.Path) -> None:
+def test_a_body_that_lies_right_has_no_misfit(coarse: ts.Solution, solid: ts.Solution) -> None:
     for path in (coarse, solid):
         assert find_misfit(as_read(path), path) is None
         assert find_misfit(path, as_read(path)) is None
@@ -240,7 +242,7 @@ def test_a_body_that_lies_right_has_no_misfit(coarse: ts.Path, solid: ts.Path) -
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1e-2, 0.0254])
-def test_another_unit_is_noticed(factor: float, coarse: ts.Path, solid: ts.Path) -> None:
+def test_another_unit_is_noticed(factor: float, coarse: ts.Solution, solid: ts.Solution) -> None:
     for path in (coarse, solid):
         found = find_misfit(as_read(path, unit=factor), path)
         assert found == Misfit(factor=pytest.approx(factor))
@@ -248,7 +250,7 @@ def test_another_unit_is_noticed(factor: float, coarse: ts.Path, solid: ts.Path)
 
 @pytest.mark.parametrize("axes", [("x", "z", "-y"), ("z", "x", "y"), ("-y", "x", "z"), ("y", "x", "z")])
 def test_other_axes_are_noticed_and_told_from_the_motion_where_a_box_does_not(
-    axes: tuple[str, ...], solid: ts.Path
+    axes: tuple[str, ...], solid: ts.Solution
 ) -> None:
     """The beam is as deep as it is wide: boxes alone do not tell y from z."""
     found = find_misfit(turned(solid, axes), solid)
@@ -256,26 +258,26 @@ def test_other_axes_are_noticed_and_told_from_the_motion_where_a_box_does_not(
     assert find_misfit(placed_again(turned(solid, axes), found), solid) is None
 
 
-def placed_again(path: ts.Path, found: Misfit) -> ts.Path:
+def placed_again(path: ts.Solution, found: Misfit) -> ts.Solution:
     grid = path.whole
     levels = tuple(Level(s.load_factor, s.all_positions - grid.points) for s in path.states if s.load_factor)
     record = Record(FILE, "frd", found.factor * grid.points, dict(grid.cells), levels)
     return placed(record, Placing(axes=found.axes, shift=found.shift), "file")
 
 
-def test_unit_axes_and_origin_together_are_noticed(solid: ts.Path) -> None:
+def test_unit_axes_and_origin_together_are_noticed(solid: ts.Solution) -> None:
     shift = np.array([0.5, -0.1, 0.2])
     found = find_misfit(turned(solid, ("x", "z", "-y"), 1e-3, shift), solid)
     assert found is not None and found.factor == pytest.approx(1e-3) and found.axes == ("x", "z", "-y")
     assert found.shift == pytest.approx(shift, abs=1e-6)
 
 
-def test_another_body_has_no_misfit_that_would_mend_it(coarse: ts.Path) -> None:
+def test_another_body_has_no_misfit_that_would_mend_it(coarse: ts.Solution) -> None:
     other = solved(replace(beam(4), mesh=ts.rectangle((0.05, 0.045), (4, 4))))
     assert find_misfit(other, coarse) is None
 
 
-def test_a_body_that_lies_right_but_moves_along_other_axes_is_noticed(solid: ts.Path) -> None:
+def test_a_body_that_lies_right_but_moves_along_other_axes_is_noticed(solid: ts.Solution) -> None:
     """A mirror about its own middle leaves the box in place: only the motion tells."""
     mesh = solid.problem.mesh
     levels = tuple(Level(s.load_factor, s.displacement[:, [0, 2, 1]]) for s in solid.states if s.load_factor)
@@ -288,7 +290,7 @@ def test_a_body_that_lies_right_but_moves_along_other_axes_is_noticed(solid: ts.
     assert found is not None and found.factor == pytest.approx(1e-3)
 
 
-def test_points_of_which_nothing_is_told_are_left_out_with_their_cells(coarse: ts.Path) -> None:
+def test_points_of_which_nothing_is_told_are_left_out_with_their_cells(coarse: ts.Solution) -> None:
     """As a .dat file of CalculiX that prints a set of nodes only."""
     mesh = coarse.problem.mesh
     pad = ((0, 0), (0, 1))
@@ -302,7 +304,7 @@ def test_points_of_which_nothing_is_told_are_left_out_with_their_cells(coarse: t
     assert ts.compare(coarse, path).n_outside == 25
 
 
-def test_energies_in_a_files_own_units_are_told_with_its_unit_of_force(coarse: ts.Path) -> None:
+def test_energies_in_a_files_own_units_are_told_with_its_unit_of_force(coarse: ts.Solution) -> None:
     mesh, state = coarse.problem.mesh, coarse.states[-1]
     pad = ((0, 0), (0, 1))
     level = Level(1.0, 1e3 * np.pad(state.displacement, pad), energy=1e6 * state.energy)  # mm, mN

@@ -18,7 +18,7 @@ def truss(rise: float, force: float) -> tuple[ts.Problem, ts.SpringNetwork]:
     return ts.Problem(network.mesh, supports=supports, loads=load), network
 
 
-def critical(path: ts.Path, kind: str) -> list[ts.State]:
+def critical(path: ts.Solution, kind: str) -> list[ts.State]:
     return [state for state in path.states if state.critical == kind]
 
 

@@ -565,7 +565,7 @@ def test_a_load_that_follows_the_body_is_not_carried_from_nowhere() -> None:
         target_files(unfinished, ["json"])
 
 
-def stopped(one: Exported) -> ts.Path:
+def stopped(one: Exported) -> ts.Solution:
     from dataclasses import replace
 
     return replace(one.path, states=one.path.states[:-1], status=ts.Status.NOT_CONVERGED)

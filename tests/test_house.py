@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import truespring
 
 SOURCE = Path(truespring.__file__).parent
@@ -225,3 +227,9 @@ def test_the_command_line_loads_nothing_heavy_to_answer() -> None:
     loaded = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout.split()
     assert "truespring.cli" in loaded
     assert not {name.split(".")[0] for name in loaded} & {*HEAVY, "numpy", "scipy", "skfem", "pydantic"}
+
+
+@pytest.mark.parametrize(("former", "name"), truespring._RENAMED.items())
+def test_a_former_name_warns_and_works(former: str, name: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"use truespring.{name}"):
+        assert getattr(truespring, former) is getattr(truespring, name)

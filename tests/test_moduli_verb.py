@@ -263,7 +263,7 @@ def test_what_rules_follow_is_found_out() -> None:
 
 
 def said_of(problem: ts.Problem, springs: ts.Springs) -> str:
-    path = ts.Path(problem, springs.label, "springs", (), ts.Status.CONVERGED, moduli=ts.moduli(problem, springs))
+    path = ts.Solution(problem, springs.label, "springs", (), ts.Status.CONVERGED, moduli=ts.moduli(problem, springs))
     sentence = moduli_sentence(path)
     assert sentence is not None
     return sentence

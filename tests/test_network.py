@@ -12,7 +12,7 @@ import truespring as ts
 from tests.closed_forms import shallow_truss_force, shallow_truss_limit
 
 
-def two_springs(load: tuple[float, float] = (5.0, 5.0)) -> ts.Path:
+def two_springs(load: tuple[float, float] = (5.0, 5.0)) -> ts.Solution:
     """Ansys verification manual VM9: springs of 1 and 8 N/m, 10 m each, large deflection."""
     network = ts.SpringNetwork(
         nodes=[[0.0, 10.0], [0.0, 0.0], [0.0, -10.0]],
@@ -72,7 +72,7 @@ def shallow_truss(rise: float) -> ts.SpringNetwork:
     return ts.SpringNetwork([[-1.0, 0.0], [0.0, rise], [1.0, 0.0]], [[0, 1], [1, 2]], [1 / math.hypot(1.0, rise)] * 2)
 
 
-def pushed(rise: float, force: float) -> ts.Path:
+def pushed(rise: float, force: float) -> ts.Solution:
     network = shallow_truss(rise)
     problem = ts.Problem(network.mesh, supports=[ts.Fixed(on=[0, 2])], loads=[ts.Force(on=[1], total=(0.0, -force))])
     return ts.solve(problem, network, ts.Newton(load_steps=4, tolerance=1e-13))

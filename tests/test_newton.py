@@ -109,7 +109,7 @@ def test_an_unstable_equilibrium_is_never_passed_in_silence() -> None:
 # --- Scale -----------------------------------------------------------------------------------------------------------
 
 
-def bent(model: str, stress: float, length: float, depth: float, load: float = 1.0) -> ts.Path:
+def bent(model: str, stress: float, length: float, depth: float, load: float = 1.0) -> ts.Solution:
     """A cantilever of 8 by 2 squares with every stress, length and thickness multiplied, bent by a third of itself."""
     problem = ts.Problem(
         ts.rectangle((4 * length, length), (8, 2)),
@@ -122,7 +122,7 @@ def bent(model: str, stress: float, length: float, depth: float, load: float = 1
 
 
 @cache
-def bent_in_units(model: str) -> ts.Path:
+def bent_in_units(model: str) -> ts.Solution:
     return bent(model, 1.0, 1.0, 1.0)
 
 
@@ -414,7 +414,7 @@ def test_a_motion_is_told_from_one_that_drowns_in_rounding() -> None:
     """Of a body moved as a whole all forces are rounding: no harm, unless its coordinates do not hold the motion."""
     mesh, material = ts.rectangle((0.1, 0.05), (4, 2)), ts.Material(1e9, 0.3)
 
-    def moved(left: float, right: float) -> ts.Path:
+    def moved(left: float, right: float) -> ts.Solution:
         ends = [ts.Fixed(on, displacement=(way, 0.0)) for on, way in (("left", left), ("right", right))]
         return ts.solve(ts.Problem(mesh, material, ts.PlaneStress(0.01), ends), ts.Springs("lloyd"), ts.Newton(2))
 

@@ -39,7 +39,7 @@ def block(*supports: ts.Fixed, loads: Any = (), elements: tuple[int, int, int] =
     return ts.Problem(mesh, ts.Material(20e3, 0.3), None, supports, loads)
 
 
-def result(model: ts.Path, reference: ts.Path) -> Result:
+def result(model: ts.Solution, reference: ts.Solution) -> Result:
     probe = ts.nearest_node(model.problem.mesh, [LENGTH / 3, SIDE / 2, SIDE / 2][: model.problem.mesh.dim])
     compared = {"neo": ts.compare(model, reference, probe)}
     paths = {"springs": model, "neo": reference}
@@ -94,7 +94,7 @@ WORKING = {
 def test_forces_and_torques_do_the_work_that_is_stored(name: str, model: ts.Springs | ts.Fem) -> None:
     """F . u + M . theta over all supports is the derivative of the stored energy by the share of the motion."""
 
-    def scaled(share: float) -> ts.Path:
+    def scaled(share: float) -> ts.Solution:
         several = [
             replace(
                 one,
@@ -250,7 +250,7 @@ def test_dictated_nodes_are_left_out() -> None:
     assert told.error == told.force_error > 0.01 and told.decided_by == "force"
 
 
-def with_forces(path: ts.Path, factors: Mapping[float, float]) -> ts.Path:
+def with_forces(path: ts.Solution, factors: Mapping[float, float]) -> ts.Solution:
     """The path with other reactions at some levels."""
     states = [replace(one, reaction=one.reaction * factors.get(round(one.level, 3), 1.0)) for one in path.states]
     return replace(path, states=tuple(states))
@@ -380,7 +380,7 @@ def test_nothing_was_made_worse_where_the_force_improved() -> None:
     reference = ts.solve(problem, RUBBER, Newton(2))
     case = ts.LoadCase("pull", problem, reference, solver=Newton(2))
 
-    def off(force: float, displacement: float) -> ts.Path:
+    def off(force: float, displacement: float) -> ts.Solution:
         states = []
         for state in reference.states:
             moved = state.displacement * (1 + displacement * ~problem.loading.held)

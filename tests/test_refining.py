@@ -30,7 +30,7 @@ def cantilever(
     return ts.Problem(mesh, ts.Material(10e3, poisson), section, [ts.Fixed("left")], [load])
 
 
-def limit_of(problem: ts.Problem, law: str, halvings: int = 2) -> ts.Path:
+def limit_of(problem: ts.Problem, law: str, halvings: int = 2) -> ts.Solution:
     """The same law by second-order triangles on a mesh so many times halved."""
     mesh, _ = in_simplices(problem.mesh)
     for _ in range(halvings):

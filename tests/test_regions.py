@@ -64,7 +64,7 @@ def in_series(mesh: ts.Mesh, stress: float, poisson: tuple[float, float]) -> ts.
     return body(mesh, supports, half(mesh, 0), poisson, (load,))
 
 
-def stretches_in_series(path: ts.Path) -> tuple[float, float]:
+def stretches_in_series(path: ts.Solution) -> tuple[float, float]:
     """The stretches of both halves, in which plane sections stay plane."""
     mesh, displacement = path.problem.mesh, path.states[-1].displacement
     assert path.load_factor == 1.0

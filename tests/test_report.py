@@ -60,7 +60,7 @@ def path(
     factors: Sequence[float] = (1,) * 5,
     levels: Sequence[float] = (0.0, *LEVELS),
     **more: Any,
-) -> ts.Path:
+) -> ts.Solution:
     """A path that moves every node in proportion to its x, at each loaded level by `factors` times the level."""
     loaded = dict(zip(LEVELS, factors, strict=True))
     nodes = problem.mesh.nodes
@@ -87,12 +87,12 @@ def path(
             )
         )
     values = {"label": "linear FEM", "kind": "fem", "status": ts.Status.CONVERGED, **more}
-    return ts.Path(problem=problem, states=tuple(states), **values)
+    return ts.Solution(problem=problem, states=tuple(states), **values)
 
 
 def result(
-    model: ts.Path,
-    references: Mapping[str, ts.Path],
+    model: ts.Solution,
+    references: Mapping[str, ts.Solution],
     title: str = "A strip",
     stem: str = "strip",
     name: str = "springs",
@@ -270,7 +270,7 @@ def test_a_surface_from_a_file_is_measured_by_its_outline() -> None:
     springs = path(problem, kind="springs", label="springs (lloyd)")
     moved = springs.states[-1].positions + np.array([0.0, 0.001])
     triangles = problem.mesh.elements[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-    read = ts.Path(problem, "deformed.stl", "stl", (), ts.Status.CONVERGED, surface=Surface(moved, triangles))
+    read = ts.Solution(problem, "deformed.stl", "stl", (), ts.Status.CONVERGED, surface=Surface(moved, triangles))
     found = result(springs, {"ansys": read})
     assert verdict(found).startswith("The outline lies ")
     assert verdict(found).endswith("at most 1.0 mm off that of deformed.stl at full load.")
@@ -525,7 +525,7 @@ def test_the_right_margin_holds_the_longest_name() -> None:
         assert figure.areas[0].width >= 3.1
 
 
-def moved_by(problem: ts.Problem, distance: float, **more: Any) -> ts.Path:
+def moved_by(problem: ts.Problem, distance: float, **more: Any) -> ts.Solution:
     """A path whose right end moves upwards by `distance` [m], every other node in proportion to its x."""
     whole = path(problem, **more)
     nodes = problem.mesh.nodes
@@ -570,7 +570,7 @@ def test_a_surface_is_magnified_only_where_its_displacement_is_known(page_of: Ca
     tiny = moved_by(problem, 8e-5, kind="springs", label="springs")
     triangles = problem.mesh.elements[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     surface = Surface(tiny.states[-1].positions, triangles)
-    alone = ts.Path(problem, "deformed.stl", "stl", (), ts.Status.CONVERGED, surface=surface)
+    alone = ts.Solution(problem, "deformed.stl", "stl", (), ts.Status.CONVERGED, surface=surface)
     known = replace(alone, states=tiny.states[-1:])
     for read, factor in ((alone, 1), (known, 100)):
         found = result(tiny, {"ansys": read})

@@ -54,7 +54,7 @@ def network(mesh: Mesh) -> ts.SpringNetwork:
     return ts.SpringNetwork(mesh.nodes, springs, np.ones(len(springs)))
 
 
-def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5, 1.0), **more: Any) -> ts.Path:
+def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5, 1.0), **more: Any) -> ts.Solution:
     """A path whose nodes sink with the square of x, at full load by `share` of 40 mm at the right end."""
     nodes = problem.mesh.nodes
     shape = np.outer((nodes[:, 0] / SIZE[0]) ** 2, [0.0, -0.04, 0.0])
@@ -78,10 +78,10 @@ def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5,
         for level in levels
     )
     values = {"label": "linear FEM", "kind": "fem", "status": ts.Status.CONVERGED, **more}
-    return ts.Path(problem=problem, states=states, **values)
+    return ts.Solution(problem=problem, states=states, **values)
 
 
-def result(problem: ts.Problem, share: float = 1.1, references: Mapping[str, ts.Path] | None = None) -> Result:
+def result(problem: ts.Problem, share: float = 1.1, references: Mapping[str, ts.Solution] | None = None) -> Result:
     """Springs that sink by `share` beside a reference that sinks by 1."""
     springs = path(problem, share, kind="springs", label="springs (own)", potential=network(problem.mesh))
     others = {"linear": path(problem, 1.0)} if references is None else references

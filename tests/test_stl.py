@@ -33,7 +33,7 @@ def bending(elements: tuple[int, int] = (8, 2)) -> ts.Problem:
 
 
 @pytest.fixture(scope="module")
-def bent() -> ts.Path:
+def bent() -> ts.Solution:
     path = ts.solve(bending(), ts.Springs(rule="lloyd"), ts.Newton(load_steps=2))
     assert np.abs(path.states[-1].displacement).max() > 0.25 * SIZE[0]
     return path
@@ -111,7 +111,7 @@ WRITERS = {
 @pytest.mark.parametrize("shape", [flat, solid])
 @pytest.mark.parametrize("writer", WRITERS)
 def test_what_was_solved_comes_back(
-    bent: ts.Path, tmp_path: Path, shape: Callable[[ts.Mesh, Floats], Floats], writer: str
+    bent: ts.Solution, tmp_path: Path, shape: Callable[[ts.Mesh, Floats], Floats], writer: str
 ) -> None:
     write, precision = WRITERS[writer]
     mesh, state = bent.problem.mesh, bent.states[-1]
@@ -140,7 +140,7 @@ def test_what_was_solved_comes_back(
 
 @pytest.mark.parametrize("shape", [flat, solid])
 def test_without_the_body_at_rest_there_is_an_outline_only(
-    bent: ts.Path, tmp_path: Path, shape: Callable[[ts.Mesh, Floats], Floats]
+    bent: ts.Solution, tmp_path: Path, shape: Callable[[ts.Mesh, Floats], Floats]
 ) -> None:
     mesh, state = bent.problem.mesh, bent.states[-1]
     path = read_stl(bent.problem, binary(tmp_path / "a.stl", shape(mesh, state.positions)))
@@ -151,7 +151,7 @@ def test_without_the_body_at_rest_there_is_an_outline_only(
     assert comparison.rms_error is None and comparison.agrees_up_to_load_factor is None
 
 
-def test_load_factor_and_unit(bent: ts.Path, tmp_path: Path) -> None:
+def test_load_factor_and_unit(bent: ts.Solution, tmp_path: Path) -> None:
     mesh, state = bent.problem.mesh, bent.states[1]
     deformed = ascii_own(tmp_path / "a.stl", flat(mesh, 1e3 * state.positions))
     rest = ascii_own(tmp_path / "b.stl", flat(mesh, 1e3 * mesh.nodes))
@@ -162,7 +162,7 @@ def test_load_factor_and_unit(bent: ts.Path, tmp_path: Path) -> None:
     assert comparison.load_factors.tolist() == [0.5] and comparison.rms_errors[0] < 1e-13
 
 
-def test_the_face_is_chosen_at_rest(bent: ts.Path, tmp_path: Path) -> None:
+def test_the_face_is_chosen_at_rest(bent: ts.Solution, tmp_path: Path) -> None:
     """Lifted towards the right, the lower face there lies above the middle and the upper face on the left below."""
     mesh, state = bent.problem.mesh, bent.states[-1]
     lifted = solid(mesh, state.positions)
@@ -172,7 +172,7 @@ def test_the_face_is_chosen_at_rest(bent: ts.Path, tmp_path: Path) -> None:
     assert read.displacement == pytest.approx(state.displacement, abs=SINGLE * SIZE[0])
 
 
-def test_six_digits_are_enough_to_join_the_facets(bent: ts.Path, tmp_path: Path) -> None:
+def test_six_digits_are_enough_to_join_the_facets(bent: ts.Solution, tmp_path: Path) -> None:
     mesh, positions = bent.problem.mesh, bent.states[-1].positions
     (tmp_path / "a.stl").write_text(ascii_text(flat(mesh, positions), ".6e"), encoding="ascii")
     # The same vertex may also differ by its last digit from facet to facet.
@@ -187,7 +187,7 @@ def test_six_digits_are_enough_to_join_the_facets(bent: ts.Path, tmp_path: Path)
 @pytest.mark.parametrize(
     "name", ["vertex facet 1 2 3", "endsolid", "normal of a solid", "b\N{LATIN SMALL LETTER O WITH DIAERESIS}dy", ""]
 )
-def test_any_name_of_a_solid(bent: ts.Path, tmp_path: Path, name: str) -> None:
+def test_any_name_of_a_solid(bent: ts.Solution, tmp_path: Path, name: str) -> None:
     mesh = bent.problem.mesh
     facets = flat(mesh, mesh.nodes)
     text = ascii_text(facets[:20], name=name) + ascii_text(facets[20:], name=name)  # two solids
@@ -198,7 +198,7 @@ def test_any_name_of_a_solid(bent: ts.Path, tmp_path: Path, name: str) -> None:
         assert surface.points[surface.triangles].reshape(-1, 2) == pytest.approx(facets[:, :, :2].reshape(-1, 2))
 
 
-def test_a_shell_with_both_its_sides_is_one_face(bent: ts.Path, tmp_path: Path) -> None:
+def test_a_shell_with_both_its_sides_is_one_face(bent: ts.Solution, tmp_path: Path) -> None:
     mesh = bent.problem.mesh
     quads = np.pad(bent.states[-1].positions, ((0, 0), (0, 1)))[mesh.elements]
     back = quads[:, [[1, 0, 3], [1, 3, 2]]].reshape(-1, 3, 3)  # split along the other diagonal
@@ -237,7 +237,7 @@ def test_the_library_that_parses_is_imported_only_to_read() -> None:
 # --- warnings -------------------------------------------------------------------------------------
 
 
-def test_another_unit_is_warned_of_or_refused(bent: ts.Path, tmp_path: Path) -> None:
+def test_another_unit_is_warned_of_or_refused(bent: ts.Solution, tmp_path: Path) -> None:
     mesh = bent.problem.mesh
     deformed = binary(tmp_path / "a.stl", flat(mesh, 1e3 * bent.states[-1].positions))
     rest = binary(tmp_path / "b.stl", flat(mesh, 1e3 * mesh.nodes))
@@ -250,7 +250,7 @@ def test_another_unit_is_warned_of_or_refused(bent: ts.Path, tmp_path: Path) -> 
         read_stl(bent.problem, deformed, undeformed=rest, unit="um")
 
 
-def test_other_supports_and_another_body_are_warned_of(bent: ts.Path, tmp_path: Path) -> None:
+def test_other_supports_and_another_body_are_warned_of(bent: ts.Solution, tmp_path: Path) -> None:
     mesh = bent.problem.mesh
     rest = binary(tmp_path / "rest.stl", flat(mesh, mesh.nodes))
     moved = binary(tmp_path / "moved.stl", flat(mesh, bent.states[-1].positions + np.array([0.01, 0.0])))
@@ -277,7 +277,7 @@ def test_prescribed_motion_is_no_other_support(tmp_path: Path) -> None:
     assert "another load_factor" in read_stl(pulled, half, 1.0, rest).warnings[1]
 
 
-def test_an_inverted_body_has_not_converged(bent: ts.Path, tmp_path: Path) -> None:
+def test_an_inverted_body_has_not_converged(bent: ts.Solution, tmp_path: Path) -> None:
     mesh = bent.problem.mesh
     rest = binary(tmp_path / "rest.stl", flat(mesh, mesh.nodes))
     mirrored = binary(tmp_path / "mirrored.stl", flat(mesh, mesh.nodes * [1.0, -1.0]))
@@ -329,7 +329,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("fault", BROKEN)
-def test_a_broken_file_is_refused(bent: ts.Path, tmp_path: Path, fault: str) -> None:
+def test_a_broken_file_is_refused(bent: ts.Solution, tmp_path: Path, fault: str) -> None:
     content, words = BROKEN[fault]
     file = tmp_path / "broken.stl"
     file.write_bytes(content)
@@ -338,7 +338,7 @@ def test_a_broken_file_is_refused(bent: ts.Path, tmp_path: Path, fault: str) -> 
     assert "export" in str(refusal.value)  # the way out
 
 
-def test_any_cut_is_noticed(bent: ts.Path, tmp_path: Path) -> None:
+def test_any_cut_is_noticed(bent: ts.Solution, tmp_path: Path) -> None:
     mesh = bent.problem.mesh
     facets = flat(mesh, mesh.nodes)[:2]
     whole = [binary(tmp_path / "b.stl", facets).read_bytes(), ascii_text(facets, ".3g").rstrip().encode()]
@@ -351,7 +351,7 @@ def test_any_cut_is_noticed(bent: ts.Path, tmp_path: Path) -> None:
                 read_stl(bent.problem, tmp_path / "cut.stl")
 
 
-def test_a_missing_file_and_a_folder_are_refused(bent: ts.Path, tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_refused(bent: ts.Solution, tmp_path: Path) -> None:
     with pytest.raises(ReferenceFileError, match=r"none\.stl does not exist: check the path"):
         read_stl(bent.problem, tmp_path / "none.stl")
     with pytest.raises(ReferenceFileError, match="is a folder: give the STL file"):
@@ -362,13 +362,13 @@ def test_a_missing_file_and_a_folder_are_refused(bent: ts.Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("unit", ["", "metre square", "kPa", "furlongs2", "0 m", "5", "m/s"])
-def test_a_unit_of_no_length_is_refused(bent: ts.Path, tmp_path: Path, unit: str) -> None:
+def test_a_unit_of_no_length_is_refused(bent: ts.Solution, tmp_path: Path, unit: str) -> None:
     with pytest.raises(ReferenceFileError, match=r"a\.stl: unit = '.*' is no unit of length"):
         read_stl(bent.problem, tmp_path / "a.stl", unit=unit)
 
 
 @pytest.mark.parametrize("load_factor", [0.0, -1.0, 1.5, float("nan")])
-def test_a_load_factor_beyond_the_path_is_refused(bent: ts.Path, tmp_path: Path, load_factor: float) -> None:
+def test_a_load_factor_beyond_the_path_is_refused(bent: ts.Solution, tmp_path: Path, load_factor: float) -> None:
     with pytest.raises(ReferenceFileError, match=r"load_factor = .* not above 0"):
         read_stl(bent.problem, tmp_path / "a.stl", load_factor)
 
@@ -380,13 +380,13 @@ def test_a_network_has_no_outline(tmp_path: Path) -> None:
         read_stl(problem, tmp_path / "a.stl")
 
 
-def test_a_thin_solid_lying_on_its_side_is_refused(bent: ts.Path, tmp_path: Path) -> None:
+def test_a_thin_solid_lying_on_its_side_is_refused(bent: ts.Solution, tmp_path: Path) -> None:
     facets = solid(bent.problem.mesh, bent.problem.mesh.nodes)[:, :, [0, 2, 1]]
     with pytest.raises(ReferenceFileError, match=r"thinnest along y.*z is its thickness"):
         read_stl(bent.problem, binary(tmp_path / "a.stl", facets))
 
 
-def test_a_solid_without_its_lower_face_is_refused(bent: ts.Path, tmp_path: Path) -> None:
+def test_a_solid_without_its_lower_face_is_refused(bent: ts.Solution, tmp_path: Path) -> None:
     facets = solid(bent.problem.mesh, bent.problem.mesh.nodes)
     open_below = facets[~(facets[:, :, 2] < -0.001).all(axis=1)]
     assert len(open_below) == len(facets) - 2 * len(bent.problem.mesh.elements)
@@ -394,7 +394,7 @@ def test_a_solid_without_its_lower_face_is_refused(bent: ts.Path, tmp_path: Path
         read_stl(bent.problem, binary(tmp_path / "a.stl", open_below))
 
 
-def test_files_that_do_not_belong_together_are_refused(bent: ts.Path, tmp_path: Path) -> None:
+def test_files_that_do_not_belong_together_are_refused(bent: ts.Solution, tmp_path: Path) -> None:
     mesh, positions = bent.problem.mesh, bent.states[-1].positions
     rest = binary(tmp_path / "rest.stl", flat(mesh, mesh.nodes))
     with pytest.raises(ReferenceFileError, match=r"a\.stl has 31 facets, .*rest\.stl has 32"):
@@ -406,7 +406,7 @@ def test_files_that_do_not_belong_together_are_refused(bent: ts.Path, tmp_path: 
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.permutations(range(32)), st.integers(0, 31), st.integers(1, 2))
 def test_facets_in_another_order_are_refused(
-    bent: ts.Path, tmp_path_factory: pytest.TempPathFactory, order: list[int], facet: int, turn: int
+    bent: ts.Solution, tmp_path_factory: pytest.TempPathFactory, order: list[int], facet: int, turn: int
 ) -> None:
     mesh, positions = bent.problem.mesh, bent.states[-1].positions
     folder = tmp_path_factory.mktemp("stl")
@@ -421,7 +421,7 @@ def test_facets_in_another_order_are_refused(
 
 
 @pytest.mark.parametrize("off", [0.02, 0.0003])
-def test_a_node_outside_of_the_body_is_named(bent: ts.Path, tmp_path: Path, off: float) -> None:
+def test_a_node_outside_of_the_body_is_named(bent: ts.Solution, tmp_path: Path, off: float) -> None:
     mesh, positions = bent.problem.mesh, bent.states[-1].positions
     shift = np.array([off, 0.0])
     rest = binary(tmp_path / "rest.stl", flat(mesh, mesh.nodes + shift))
@@ -430,7 +430,7 @@ def test_a_node_outside_of_the_body_is_named(bent: ts.Path, tmp_path: Path, off:
         read_stl(bent.problem, deformed, undeformed=rest)
 
 
-def test_a_node_hardly_outside_belongs_to_the_body(bent: ts.Path, tmp_path: Path) -> None:
+def test_a_node_hardly_outside_belongs_to_the_body(bent: ts.Solution, tmp_path: Path) -> None:
     """Off by less than a thousandth of the body: its displacement goes on linearly."""
     mesh = bent.problem.mesh
     smaller = mesh.nodes * [1 - 5e-4, 1.0]

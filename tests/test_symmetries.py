@@ -18,8 +18,7 @@ from tests.studies import changed, written
 from tests.test_potentials import CASES, SOLVED, turn
 from truespring.arrays import Floats, Ints
 from truespring.cli import main
-from truespring.equilibrium import Path as Equilibria
-from truespring.equilibrium import Status
+from truespring.equilibrium import Solution, Status
 from truespring.kernels.threads import set_threads
 from truespring.mesh.merged import mirrored
 from truespring.models import LAWS, RULES, Model
@@ -85,7 +84,7 @@ def loaded(name: str) -> ts.Problem:
 
 
 @cache
-def solved(name: str) -> Equilibria:
+def solved(name: str) -> Solution:
     path = ts.solve(loaded(name), CASES[name].model, NEWTON)
     assert path.status is Status.CONVERGED, path.warnings
     return path
@@ -170,7 +169,7 @@ def test_results_do_not_depend_on_any_look(name: str, look: str) -> None:
     looked_at(name, look, 18)
 
 
-def dead_load(path: Equilibria) -> Floats:
+def dead_load(path: Solution) -> Floats:
     """The forces on all nodes of what was solved [N]: mid-side nodes of quadratic elements have a share."""
     loading = path.potential.loading if isinstance(path.potential, Refined) else path.problem.loading
     assert loading.external_force.any() and not loading.following

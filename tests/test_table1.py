@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from truespring.equilibrium import Path as Equilibria
+from truespring.equilibrium import Solution
 from truespring.table1 import measures, page
 from truespring.table1.bodies import DEPTH, LENGTH, SMALL, Size, cantilever, end_displacement
 from truespring.table1.entries import CRITERIA, ENTRIES, METHODS, PRINTED, Entry
@@ -31,9 +31,9 @@ def errors(one: Entry, dim: int) -> list[float]:
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """References on coarser meshes, and shorter paths: the same code in less time."""
-    known: dict[tuple[int, bool], Equilibria] = {}
+    known: dict[tuple[int, bool], Solution] = {}
 
-    def reference(dim: int, large: bool) -> Equilibria:
+    def reference(dim: int, large: bool) -> Solution:
         if (dim, large) not in known:
             law, load = ("neo-hookean", 0.02) if large else ("linear", SMALL)
             problem = cantilever(Size(dim, 8), "triangle", load)

@@ -1,9 +1,23 @@
 """truespring: mass-spring bodies true to their material, beside FEM.
 
-problem  x  model  x  solver  ->  path of equilibria  ->  comparison  ->  report
+problem  x  model  x  solver  ->  path of equilibria (a Solution)  ->  comparison  ->  report
 """
+
+import warnings
+from typing import Any
 
 import lazy_loader
 
-# The names stand in __init__.pyi, each once, and are imported when they are used: the command line answers at once.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+# The names are listed in __init__.pyi, each once, and imported on first use: the command line starts at once.
+_attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+# Names of earlier releases and their successors; removed in the next release.
+_RENAMED = {"Path": "Solution"}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _RENAMED:
+        successor = _RENAMED[name]
+        warnings.warn(f"truespring.{name} is deprecated, use truespring.{successor}", DeprecationWarning, stacklevel=2)
+        return _attribute(successor)
+    return _attribute(name)

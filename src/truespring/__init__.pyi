@@ -6,7 +6,7 @@ from .calibration import calibrate as calibrate
 from .calibration import read_curve as read_curve
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
-from .equilibrium import Path as Path
+from .equilibrium import Solution as Solution
 from .equilibrium import State as State
 from .equilibrium import Status as Status
 from .equilibrium import solve as solve

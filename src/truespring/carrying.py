@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.errors import ProblemError
 from truespring.mesh import Grid, Interpolation
 from truespring.problem import Problem
@@ -26,12 +26,12 @@ class Carried:
         node_by_node: whether the nodes are the same, so that nothing was interpolated.
     """
 
-    path: Path
+    path: Solution
     outside: Bools
     node_by_node: bool
 
 
-def carried(path: Path, problem: Problem) -> Carried:
+def carried(path: Solution, problem: Problem) -> Carried:
     """Return `path` on the nodes of `problem`, by the own interpolation of its elements.
 
     A solid is carried to a plane body at the middle of its depth. Raises ProblemError where the nodes are others and
@@ -92,12 +92,12 @@ def _picked(numbers: Ints, n_points: int) -> "sparse.csr_array":
     return sparse.csr_array((np.ones(len(rows)), (rows, numbers)), shape=(len(rows), n_points))
 
 
-def _with_own_supports(path: Path, state: State) -> State:
+def _with_own_supports(path: Solution, state: State) -> State:
     """A state with what the supports of its own problem do, not those of the problem that it is carried to."""
     return replace(state, supports=path.support_forces(state)) if path.problem.stated else state
 
 
-def _on(path: Path, problem: Problem, grid: Grid, found: Interpolation, same: Ints | None) -> Path:
+def _on(path: Solution, problem: Problem, grid: Grid, found: Interpolation, same: Ints | None) -> Solution:
     mesh = problem.mesh
     as_many = mesh.dim == path.problem.mesh.dim
 

@@ -21,7 +21,7 @@ from truespring.errors import TruespringError, one_line
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from truespring.equilibrium import Path as Equilibria
+    from truespring.equilibrium import Solution
     from truespring.outputs import Output
     from truespring.report.result import Result
     from truespring.study import Known, Realised, Refinement, Study
@@ -367,7 +367,7 @@ def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
     with _writing(out):
         opened = output(study, out)
 
-    def known(name: str, path: "Equilibria") -> None:
+    def known(name: str, path: "Solution") -> None:
         with _writing(out):
             write_model(path, opened, name)
 

@@ -1,4 +1,4 @@
-"""Path against path: how far a model may be trusted, level by level and in a sentence."""
+"""Solution against path: how far a model may be trusted, level by level and in a sentence."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.carrying import carried, matching_points
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.errors import ProblemError
 from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point, nearest_node, surface_distance
 from truespring.problem import Problem
@@ -110,8 +110,8 @@ class Comparison:
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
     """
 
-    model: Path
-    reference: Path
+    model: Solution
+    reference: Solution
     probe: int
     tolerance: float
     load_factors: Floats
@@ -120,7 +120,7 @@ class Comparison:
     probe_errors: Floats
     rms_distances: Floats
     max_distances: Floats
-    known_on: tuple[Path, Path]
+    known_on: tuple[Solution, Solution]
     outside: Bools
     compared: Bools
     support_errors: tuple[tuple[SupportError, ...], ...] = ()
@@ -252,8 +252,8 @@ class Comparison:
 
 
 def compare(
-    model: Path,
-    reference: Path,
+    model: Solution,
+    reference: Solution,
     probe: int | str | Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Comparison:
@@ -300,13 +300,13 @@ def compare(
     )
 
 
-def _dictated(mine: Path, theirs: Path) -> Bools:
+def _dictated(mine: Solution, theirs: Solution) -> Bools:
     """The nodes that supports move or hold in all directions, in both paths where both tell, shape (n_nodes,)."""
     told = [one for one in (mine.dictated, theirs.dictated) if one is not None]
     return np.logical_and.reduce(told) if told else np.zeros(mine.problem.mesh.n_nodes, dtype=bool)
 
 
-def _support_errors(mine: Path, theirs: Path, one: State, other: State) -> Iterator[SupportError]:
+def _support_errors(mine: Solution, theirs: Solution, one: State, other: State) -> Iterator[SupportError]:
     """Yield the errors of the supports that both paths know, by their numbers."""
     wanted = {found.support: found for found in theirs.support_forces(other)}
     load = _total_load(mine, one)
@@ -315,7 +315,7 @@ def _support_errors(mine: Path, theirs: Path, one: State, other: State) -> Itera
             yield SupportError(found, wanted[found.support], load)
 
 
-def _total_load(path: Path, state: State) -> float | None:
+def _total_load(path: Solution, state: State) -> float | None:
     """The length of the total load at a state [N]; None where none acts beside the motion, or it has no total."""
     if not path.problem.stated or path.problem.loading.driven_by_motion:
         return None
@@ -328,7 +328,7 @@ def _total_load(path: Path, state: State) -> float | None:
 _NO_TOTAL = 1e-9
 
 
-def _common_problem(model: Path, reference: Path) -> Problem:
+def _common_problem(model: Solution, reference: Solution) -> Problem:
     """The problem on whose nodes two paths are compared: the model's but where those of the reference tell more."""
     mine, theirs = model.problem, reference.problem
     if mine.mesh.dim != theirs.mesh.dim:
@@ -341,7 +341,7 @@ def _common_problem(model: Path, reference: Path) -> Problem:
     return mine
 
 
-def _watched(on: Path, inside: Ints, model: Path, probe: int | str | Sequence[float] | None) -> int:
+def _watched(on: Solution, inside: Ints, model: Solution, probe: int | str | Sequence[float] | None) -> int:
     """The node to watch, by its number where the paths are compared."""
     mesh = on.problem.mesh
     if isinstance(probe, str):
@@ -361,7 +361,7 @@ def closest(comparisons: Mapping[str, Comparison]) -> str | None:
     return min(order, key=lambda name: order[name]) if order else None
 
 
-def most_moved(path: Path, among: Ints | None = None) -> int:
+def most_moved(path: Solution, among: Ints | None = None) -> int:
     """Return the node that moves most at the last level, of all or `among` some; of several, by smaller coordinates."""
     if not path.states:
         return 0
@@ -415,7 +415,7 @@ def _or_nan(error: float | None) -> float:
     return np.nan if error is None else error
 
 
-def _facets(path: Path, level: float) -> Floats | None:
+def _facets(path: Solution, level: float) -> Floats | None:
     """The deformed surface by its segments or triangles [m], shape (n, 2, 2) or (n, 3, 3); None where there is none."""
     if not path.states:
         known = path.surface or path.shell
@@ -439,7 +439,7 @@ def _triangles(facets: Ints) -> Ints:
     return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])
 
 
-def _surface_distance(model: Path, reference: Path) -> SurfaceDistance | None:
+def _surface_distance(model: Solution, reference: Solution) -> SurfaceDistance | None:
     if reference.surface is None or model.problem.mesh.dim != 2:
         return None
     state = model.at(reference.surface.load_factor)

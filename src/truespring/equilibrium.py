@@ -1,4 +1,4 @@
-"""solve(problem, model, solver) -> Path: the equilibria of a body and where they should not be trusted."""
+"""solve(problem, model, solver) -> Solution: the equilibria of a body and where they should not be trusted."""
 
 import math
 import time
@@ -88,7 +88,7 @@ class State:
         area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
         stretch: smallest and largest length over rest length of the springs, None without springs.
         supports: force and torque of each moved support where they were told with the state (read from a file, or
-            known on another mesh), None where the reactions tell them: see Path.support_forces.
+            known on another mesh), None where the reactions tell them: see Solution.support_forces.
         reason: why no balance was looked for beyond it, in words, where it was not.
     """
 
@@ -120,7 +120,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path:
+class Solution:
     """The equilibria of one model of one problem, by load level.
 
     Attributes:
@@ -158,7 +158,9 @@ class Path:
     held: Bools | None = None
 
     def __repr__(self) -> str:
-        return f"Path({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
+        return (
+            f"Solution({self.label}, {self.status}, {len(self.states)} states up to load factor {self.load_factor:g})"
+        )
 
     @cached_property
     def load_factors(self) -> Floats:
@@ -250,13 +252,13 @@ def solve(
     model: Model | Potential,
     solver: Solver | None = None,
     report: Reporter | None = None,
-) -> Path:
+) -> Solution:
     """Follow the equilibria of `problem` under `model` from no load to the full one.
 
     `solver` is Newton, which takes the load up in steps and keeps to stable states, or DisplacementControl or
     ArcLength, which go on past limit points, through unstable states too.
     `model` is Springs, Fem, or a potential such as a SpringNetwork, which is taken as it is (the
-    problem then needs no material). A failure is not an exception: see Path.status and Path.best;
+    problem then needs no material). A failure is not an exception: see Solution.status and Solution.best;
     what a library raises on the way ends the path, and so does a TimeoutError that `report` raises.
     Raises ModelError where the model does not fit the problem.
     """
@@ -271,7 +273,7 @@ def solve(
         return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=realised)
 
 
-def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: Reporter | None) -> Path:
+def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: Reporter | None) -> Solution:
     potential = model if isinstance(model, Potential) else model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
@@ -302,7 +304,7 @@ def _solve(problem: Problem, model: Model | Potential, solver: Solver, report: R
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     known = () if isinstance(model, Potential) else model_warnings(problem, model)
     label, kind = _named(model)
-    return Path(
+    return Solution(
         problem=problem,
         label=label,
         kind=kind,
@@ -380,7 +382,7 @@ def _named(model: object) -> tuple[str, str]:
     return getattr(model, "label", type(model).__name__), getattr(model, "kind", "potential")
 
 
-def unsolved(problem: Problem, model: object, error: BaseException) -> Path:
+def unsolved(problem: Problem, model: object, error: BaseException) -> Solution:
     """Return the path of a model that an exception ended before anything was known: the body at rest, and why."""
     label, kind = _named(model)
     nodes = problem.mesh.nodes
@@ -402,7 +404,7 @@ def unsolved(problem: Problem, model: object, error: BaseException) -> Path:
         stretch=None,
         level=0.0,
     )
-    return Path(
+    return Solution(
         problem=problem,
         label=label,
         kind=kind,

@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.comparison import Comparison
-from truespring.equilibrium import Path
+from truespring.equilibrium import Solution
 
 # Boxes whose corners are this near, as a share of their diagonal, are of one body; those of deformed ones less so.
 _SAME_BOX = 0.02
@@ -55,7 +55,7 @@ class _Box:
         return float(np.linalg.norm(np.nan_to_num(self.upper - self.lower)))
 
 
-def find_misfit(path: Path, reference: Path, factors: Sequence[float] = _FACTORS) -> Misfit | None:
+def find_misfit(path: Solution, reference: Solution, factors: Sequence[float] = _FACTORS) -> Misfit | None:
     """Return what would make a body lie where the reference lies; None where it does, or where nothing would.
 
     `factors` are what its lengths may be multiplied by: sizes of units over that which was taken.
@@ -79,12 +79,12 @@ def _changes(one: Misfit) -> int:
     return (one.factor != 1) + (one.axes != ("x", "y", "z")) + any(one.shift)
 
 
-def same_place(path: Path, reference: Path) -> bool:
+def same_place(path: Solution, reference: Solution) -> bool:
     """Tell whether two bodies lie in one place, as far as their boxes tell."""
     return _fits(*_boxes(path, reference))
 
 
-def _boxes(path: Path, reference: Path) -> "tuple[_Box, _Box, float]":
+def _boxes(path: Solution, reference: Solution) -> "tuple[_Box, _Box, float]":
     """The boxes of both, and how much they may differ as a share of their diagonal."""
     if path.states and reference.states:
         return _box(path), _box(reference), _SAME_BOX
@@ -111,7 +111,7 @@ def displacement_misfit(comparison: Comparison) -> Misfit | None:
     return told[best][1] if errors[best] < _BETTER * _sampled_error(model, reference, plain) else None
 
 
-def _box(path: Path, level: float | None = None) -> _Box:
+def _box(path: Solution, level: float | None = None) -> _Box:
     if path.states:
         state = None if level is None else path.at(level)
         points = path.whole.points if state is None else state.all_positions
@@ -184,7 +184,7 @@ def _shifted(several: list[Misfit], mine: _Box, theirs: _Box, tolerance: float) 
             yield moved
 
 
-def _sampled_error(path: Path, reference: Path, places: Misfit, motion: Misfit | None = None) -> float:
+def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: Misfit | None = None) -> float:
     """The relative rms error of a body's displacement at some of its points, were it told otherwise; 0 if not known.
 
     The `motion` is told otherwise as places are where nothing else is given.

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, compare
-from truespring.equilibrium import Path, Solver, solve
+from truespring.equilibrium import Solution, Solver, solve
 from truespring.errors import MeshError, ModelError, TruespringError
 from truespring.mesh import (
     Box,
@@ -64,7 +64,7 @@ class OwnError:
 
     value: float | None
     how: str
-    limit: Path | None = None
+    limit: Solution | None = None
     comparison: Comparison | None = None
     work: float = 0.0
 
@@ -88,13 +88,13 @@ class Standing:
     refined_error: float | None = None
 
 
-def standing(model: Path, found: OwnError) -> Standing:
+def standing(model: Solution, found: OwnError) -> Standing:
     """Return how a reference stands whose own error was found, and `model` to its limit."""
     against = None if found.limit is None else compare(model, found.limit).error
     return Standing(found.value, found.how, against)
 
 
-def work_of(path: Path) -> float:
+def work_of(path: Solution) -> float:
     """Return what solving a path took: Newton iterations times unknowns to the power of their growth, no times."""
     return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
 
@@ -107,7 +107,7 @@ def reference_error(
     return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
-def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
+def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> OwnError:
     """Return how far the path of a model is from its own limit at full load.
 
     A model of first order whose law has elements of second order is held against these, on simplices of the same
@@ -142,7 +142,7 @@ def own_error(path: Path, model: Any, solver: Solver, most_work: float) -> OwnEr
     return replace(found, work=spent + found.work)
 
 
-def _from_coarser(path: Path, model: Any, solver: Solver, most_work: float) -> OwnError:
+def _from_coarser(path: Solution, model: Any, solver: Solver, most_work: float) -> OwnError:
     """How far a path is from its limit by the distance of a mesh of twice the size."""
     try:
         problem = coarser_problem(path.problem)
@@ -177,7 +177,7 @@ class _Finer(NamedTuple):
     n_unknowns: int
 
 
-def _finer(path: Path, model: Any) -> Iterator[_Finer]:
+def _finer(path: Solution, model: Any) -> Iterator[_Finer]:
     """Yield finer and finer ways to solve the problem of a path."""
     problem, n_unknowns = path.problem, path.n_unknowns
     growth = 2**problem.mesh.dim
@@ -277,7 +277,7 @@ def _by_groups(problem: Problem) -> Problem:
     return replace(problem, mesh=mesh, supports=supports, loads=loads, regions=regions)
 
 
-def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Path:
+def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float) -> Solution:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
     problem = finer.problem()
     if isinstance(solver, Newton):
@@ -296,12 +296,12 @@ def _solve(finer: _Finer, coarse: Path, solver: Solver, most_work: float) -> Pat
     return path
 
 
-def _sound(path: Path) -> bool:
+def _sound(path: Solution) -> bool:
     """Whether a path reached full load and is stable there."""
     return path.complete and not path.states[-1].negative_eigenvalues
 
 
-def _carrying(coarse: Path) -> Callable[[Potential], Floats]:
+def _carrying(coarse: Solution) -> Callable[[Potential], Floats]:
     """What gives the nodes of a finer potential the displacement of a coarse state, by its elements' interpolation."""
 
     def start(potential: Potential) -> Floats:

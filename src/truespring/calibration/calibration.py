@@ -15,7 +15,7 @@ from truespring.calibration.objective import Objective, relative_errors
 from truespring.calibration.partial import GAUSS_NEWTON, fit_equilibria
 from truespring.calibration.unknowns import Unknowns, make_unknowns
 from truespring.comparison import Decisive, compare, largest
-from truespring.equilibrium import Path, Status, solve
+from truespring.equilibrium import Solution, Status, solve
 from truespring.errors import ModelError, ProblemError
 from truespring.models import GivenSprings, Springs
 
@@ -41,19 +41,19 @@ class CaseResult:
 
     case: LoadCase
     held_out: bool
-    before: Path
-    after: Path
+    before: Solution
+    after: Solution
 
-    def errors(self, path: Path, quantity: str = "displacement") -> dict[float, float]:
+    def errors(self, path: Solution, quantity: str = "displacement") -> dict[float, float]:
         """Return the relative errors of a path by load factor: the rms distance over the rms displacement known."""
         return relative_errors(self.case, path, quantity)
 
-    def error(self, path: Path, quantity: str = "displacement") -> float | None:
+    def error(self, path: Solution, quantity: str = "displacement") -> float | None:
         """Return the relative error at the last level that is known; None where the path does not reach it."""
         known = [one.level for one in self.case.observations if one.quantity == quantity]
         return self.errors(path, quantity).get(max(known)) if known else None
 
-    def deciding(self, path: Path) -> dict[float, Decisive]:
+    def deciding(self, path: Solution) -> dict[float, Decisive]:
         """Return the error of a path that decides, by load factor, at levels that are known and that it reaches.
 
         As of a comparison: the larger of the rms error and that of a moved support's force or torque.
@@ -71,7 +71,7 @@ class CaseResult:
         }
         return {level: largest(several) for level, several in errors.items() if several}
 
-    def decisive(self, path: Path) -> Decisive | None:
+    def decisive(self, path: Solution) -> Decisive | None:
         """Return the error of a path that decides at the last level that is known; None where it does not get there."""
         return self.deciding(path).get(max(one.level for one in self.case.observations))
 
@@ -293,7 +293,7 @@ def _results(
             yield CaseResult(case, held_out, before, after)
 
 
-def _labelled(path: Path, label: str) -> Path:
+def _labelled(path: Solution, label: str) -> Solution:
     return replace(path, label=label, kind="springs")
 
 

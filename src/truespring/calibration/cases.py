@@ -11,7 +11,7 @@ from scipy import sparse
 from truespring.arrays import Floats, Ints
 from truespring.calibration.curve import Curve
 from truespring.carrying import carried
-from truespring.equilibrium import Path
+from truespring.equilibrium import Solution
 from truespring.errors import ProblemError
 from truespring.mesh import Grid
 from truespring.problem import Problem
@@ -72,7 +72,7 @@ class LoadCase:
 
     name: str
     problem: Problem
-    reference: Path | None = None
+    reference: Solution | None = None
     curve: Curve | None = None
     solver: Newton = field(default_factory=Newton)
     against: str = ""
@@ -99,7 +99,7 @@ class LoadCase:
         return np.arange(1, self.solver.load_steps + 1) / self.solver.load_steps
 
     @cached_property
-    def field(self) -> "tuple[Path, Ints] | None":
+    def field(self) -> "tuple[Solution, Ints] | None":
         """The reference on the nodes of the problem, and the nodes that it covers; None where it is no full field."""
         if self.reference is None or not self.reference.states:
             return None

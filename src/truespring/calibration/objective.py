@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.calibration.cases import LoadCase, Observation
 from truespring.calibration.unknowns import Unknowns
-from truespring.equilibrium import Path, State, Status, solve
+from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ModelError
 from truespring.linear.choice import Tangent, choose
 from truespring.linear.direct import SingularMatrixError
@@ -44,20 +44,20 @@ class Objective:
     regularisation: float
     excused: Container[str] = ()
     solves: int = 0
-    _last: tuple[Floats, list[Path] | None] | None = field(default=None, repr=False)
+    _last: tuple[Floats, list[Solution] | None] | None = field(default=None, repr=False)
 
     @property
     def _weights(self) -> float:
         """What each relative error is multiplied by, so that their squares sum to the mean."""
         return 1 / math.sqrt(sum(len(case.observations) for case in self.cases))
 
-    def paths(self, values: Floats) -> list[Path] | None:
+    def paths(self, values: Floats) -> list[Solution] | None:
         """Return the springs' path of each case; None where one does not reach full load."""
         if self._last is None or not np.array_equal(self._last[0], values):
             self._last = np.array(values), self._solved(values)
         return self._last[1]
 
-    def _solved(self, values: Floats) -> list[Path] | None:
+    def _solved(self, values: Floats) -> list[Solution] | None:
         found = []
         for case in self.cases:
             try:
@@ -203,7 +203,7 @@ class _At:
         return found
 
 
-def relative_errors(case: LoadCase, path: Path, quantity: str = "displacement") -> dict[float, float]:
+def relative_errors(case: LoadCase, path: Solution, quantity: str = "displacement") -> dict[float, float]:
     """Return, by load factor, the relative error of a path: distance over size of what is known there.
 
     Of displacements that is what a comparison calls the rms error, of forces and torques the largest of all supports.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from types import MappingProxyType
 
 from truespring.equilibrium import Solver
@@ -77,11 +77,11 @@ def export(
     problem: Problem,
     model: SpringModel,
     target: str,
-    folder: str | FilePath,
+    folder: str | Path,
     solver: Solver | None = None,
     title: str = "Springs",
     probe: int | None = None,
-) -> tuple[FilePath, ...]:
+) -> tuple[Path, ...]:
     """Solve springs and write them for another simulator into `folder`; return the files written.
 
     `target` is a key of TARGETS. Files tell units, supports, loads, and what our equilibrium is at full load at the
@@ -91,7 +91,7 @@ def export(
     known_targets([target])
     check_targets([target], problem, model)
     exported = solve_springs(problem, model, solver, title, probe)
-    return write_files(target_files(exported, [target])[target], FilePath(folder))
+    return write_files(target_files(exported, [target])[target], Path(folder))
 
 
 def known_targets(names: Iterable[str]) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]
     return {name: TARGETS[name].files(exported) for name in names}
 
 
-def write_files(files: Files, folder: FilePath) -> tuple[FilePath, ...]:
+def write_files(files: Files, folder: Path) -> tuple[Path, ...]:
     """Write files into a folder, which is made where it is not there; return them."""
     with Output(folder, next(iter(files))) as output:
         for file, content in files.items():

@@ -8,7 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.equilibrium import Path, Solver, State, Status, solve
+from truespring.equilibrium import Solution, Solver, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import PlaneStrain, PlaneStress
@@ -37,7 +37,7 @@ class Exported:
 
     title: str
     problem: Problem
-    path: Path
+    path: Solution
     probe: int
     load_steps: int
     remarks: tuple[str, ...] = ()

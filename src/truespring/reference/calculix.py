@@ -4,13 +4,13 @@ import math
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Path, Solver, State, Status
+from truespring.equilibrium import Solution, Solver, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside, second_order, usual_element
@@ -47,7 +47,7 @@ class Program(Protocol):
 
     def run(
         self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
-    ) -> Path:
+    ) -> Solution:
         """Follow the equilibria at the load levels that the solver asks for, for `timeout` seconds at most."""
         ...
 
@@ -113,7 +113,7 @@ class CalculiX:
 
     def run(
         self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
-    ) -> Path:
+    ) -> Solution:
         """Run ccx in a folder of its own and return the states that it reached, those at rest first.
 
         A run that does not converge is not an exception, nor is one that takes longer than `timeout` seconds, by
@@ -139,7 +139,7 @@ class CalculiX:
                 report(last + share * (levels[place] - last), 0, math.nan)
 
         with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
-            file = FilePath(folder) / "model.inp"
+            file = Path(folder) / "model.inp"
             file.write_text(deck, encoding="utf-8")
             finished = run_ccx(file, reached=reached, timeout=timeout)
             try:
@@ -160,7 +160,7 @@ class CalculiX:
         levels: list[float],
         finished: Finished,
         finer: QuadraticPotential | None,
-    ) -> Path:
+    ) -> Solution:
         status, warnings = Status.CONVERGED, []
         if any(state.area_ratio <= 0 for state in states) and not self._linear:
             status = Status.INVERTED
@@ -190,7 +190,7 @@ class CalculiX:
                 "strain has no such difference"
             )
         warnings.append("stability not proven: CalculiX does not tell it")
-        return Path(
+        return Solution(
             problem=problem,
             label=self.label_on(problem),
             kind=self.kind,
@@ -247,7 +247,7 @@ def _said(finished: Finished) -> str:
     return f"nothing (exit code {finished.code}); are its equations singular at rest, a part of the body free to move?"
 
 
-def _results(file: FilePath, n_nodes: int) -> list[tuple[Level, Floats]]:
+def _results(file: Path, n_nodes: int) -> list[tuple[Level, Floats]]:
     """The levels of a .dat file and the forces in all nodes at each [N], zero where they are not printed."""
     if not file.is_file() or not file.stat().st_size:  # no step was done
         return []
@@ -257,7 +257,7 @@ def _results(file: FilePath, n_nodes: int) -> list[tuple[Level, Floats]]:
     return list(zip(levels, _forces(file, n_nodes), strict=False))  # of a level cut off there are no forces
 
 
-def _forces(file: FilePath, n_nodes: int) -> Iterator[Floats]:
+def _forces(file: Path, n_nodes: int) -> Iterator[Floats]:
     """The tables of forces, which include loads; see *NODE PRINT, RF in CalculiX's manual [N], shape (n_nodes, 3)."""
     with scanning(file, None) as scan:
         while line := scan.line():

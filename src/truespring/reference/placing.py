@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.equilibrium import Path, State, Status
+from truespring.equilibrium import Solution, State, Status
 from truespring.errors import MeshError, ReferenceFileError, TruespringError
 from truespring.mesh import Grid, Mesh, corner_mesh
 from truespring.mesh.selections import AXES
@@ -98,7 +98,7 @@ def _unit(text: str, dimension: Literal["length", "force"]) -> float | None:
     return size if size > 0 else None
 
 
-def placed(record: Record, placing: Placing, label: str) -> Path:
+def placed(record: Record, placing: Placing, label: str) -> Solution:
     """Return a record as a path, its body a mesh of the corners of its cells; see mesh.corner_mesh.
 
     Stability, convergence, loads and supports are not known of it. Raises ReferenceFileError where its cells are no
@@ -126,7 +126,7 @@ def placed(record: Record, placing: Placing, label: str) -> Path:
     ]
     if len(states) > 1 and factors[0] > 0:
         states.insert(0, told_state(mesh, grid.points, np.zeros(grid.points.shape), 0.0, energy=0.0))
-    return Path(
+    return Solution(
         problem=Problem(mesh, stated=False),
         label=label,
         kind=record.kind,

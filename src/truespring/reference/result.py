@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from truespring.equilibrium import Path as Equilibria
+from truespring.equilibrium import Solution
 from truespring.errors import ReferenceFileError, nearest
 from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
 from truespring.mesh.files.vtk_file import VTK_FORMATS
@@ -80,7 +80,7 @@ def read_result(
     undeformed: str | Path | None = None,
     mesh: str | Path | None = None,
     reading: Reading | None = None,
-) -> Equilibria:
+) -> Solution:
     """Read a result that another program wrote as a path that can be compared with others.
 
     Args:

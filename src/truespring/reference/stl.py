@@ -1,14 +1,14 @@
 """Deformed bodies that another program wrote as STL: triangles without connectivity and without a unit."""
 
 import io
-import pathlib
 import re
 import warnings as python_warnings
+from pathlib import Path
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.equilibrium import Path, State, Status
+from truespring.equilibrium import Solution, State, Status
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
 from truespring.mesh.joining import merged as merged_within
@@ -33,13 +33,13 @@ _EXPORT_AGAIN = "export the body again as STL, ASCII or binary"
 
 def read_stl(
     problem: Problem,
-    file: pathlib.Path,
+    file: Path,
     load_factor: float = 1.0,
-    undeformed: pathlib.Path | None = None,
+    undeformed: Path | None = None,
     unit: str = "m",
     axes: tuple[str, ...] = tuple(AXES),
     shift: tuple[float, ...] = (0.0, 0.0, 0.0),
-) -> Path:
+) -> Solution:
     """Read the deformed body of `problem` from an STL file, ASCII or binary.
 
     The body lies in a plane of constant z, or is a solid that is thin along z, of which the upper face is taken.
@@ -56,7 +56,7 @@ def read_stl(
     Returns a path of kind "stl" with a surface, and with one state where `undeformed` is given.
     Raises ReferenceFileError where a file cannot be read, is no such body, or does not fit the problem.
     """
-    file = pathlib.Path(file)
+    file = Path(file)
     mesh = problem.mesh
     if mesh.dim != 2 or mesh.kind.dim != 2:
         raise ReferenceFileError(f"{file}: an STL file stands beside a plane body of elements, not beside this mesh")
@@ -71,13 +71,13 @@ def read_stl(
         states: tuple[State, ...] = ()
         warnings += _unit_warnings(mesh, surface, unit)
     else:
-        undeformed = pathlib.Path(undeformed)
+        undeformed = Path(undeformed)
         rest, surface = _matched(read_facets(undeformed, placing), deformed, load_factor, undeformed, file)
         state = _state(problem, rest, surface, undeformed, unit)
         states = (state,)
         warnings += _state_warnings(problem, rest, state, undeformed)
     inverted = bool(states) and states[0].area_ratio <= 0
-    return Path(
+    return Solution(
         problem=problem,
         label=file.name,
         kind="stl",
@@ -88,7 +88,7 @@ def read_stl(
     )
 
 
-def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> Path:
+def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution:
     """Read a deformed surface in space from an STL file, ASCII or binary, beside a body or alone.
 
     Returns a path of kind "stl" with a shell and no states; of the problem `beside`, else of a mesh of its edges.
@@ -101,7 +101,7 @@ def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> 
     triangles = triangles[(a != b) & (b != c) & (c != a)]
     problem = Problem(corner_mesh(Grid(points, {"triangle": triangles}))[0], stated=False) if beside is None else beside
     factor = 1.0 if placing.load_factor is None else placing.load_factor
-    return Path(
+    return Solution(
         problem=problem,
         label=file.name,
         kind="stl",
@@ -115,7 +115,7 @@ def read_shell(file: pathlib.Path, placing: Placing, beside: Problem | None) -> 
 # --- the file -------------------------------------------------------------------------------------
 
 
-def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
+def read_facets(file: Path, placing: Placing) -> Floats:
     """Return the vertices of every facet in the file's order [m], shape (n_facets, 3, 3)."""
     facets = placing.places(_parse(_bytes(file), file).reshape(-1, 3)).reshape(-1, 3, 3)
     bad = np.flatnonzero(~np.isfinite(facets).all(axis=(1, 2)))
@@ -131,7 +131,7 @@ def read_facets(file: pathlib.Path, placing: Placing) -> Floats:
     return np.asarray(facets)
 
 
-def _bytes(file: pathlib.Path) -> bytes:
+def _bytes(file: Path) -> bytes:
     if file.is_dir():
         raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
     data = read_file(file, ReferenceFileError)
@@ -140,7 +140,7 @@ def _bytes(file: pathlib.Path) -> bytes:
     return data
 
 
-def _parse(data: bytes, file: pathlib.Path) -> Floats:
+def _parse(data: bytes, file: Path) -> Floats:
     """Check that the file is whole, for the parser is lenient there, and parse it."""
     from trimesh.exchange.stl import load_stl  # a second: only where an STL file is read
 
@@ -156,7 +156,7 @@ def _parse(data: bytes, file: pathlib.Path) -> Floats:
     return np.concatenate([np.asarray(solid["vertices"], dtype=np.float64) for solid in solids]).reshape(-1, 3, 3)
 
 
-def _is_binary(data: bytes, file: pathlib.Path) -> bool:
+def _is_binary(data: bytes, file: Path) -> bool:
     """Tell binary from text by the length, since a binary header may begin with "solid" as well."""
     count = int.from_bytes(data[80:_BINARY_HEADER], "little")
     wanted = _BINARY_HEADER + _BINARY_FACET * count
@@ -175,7 +175,7 @@ def _is_binary(data: bytes, file: pathlib.Path) -> bool:
     )
 
 
-def _checked_text(data: bytes, file: pathlib.Path) -> bytes:
+def _checked_text(data: bytes, file: Path) -> bytes:
     """Return an ASCII file without the names of its solids, which may hold any word; raise where it is not whole."""
     if not re.match(rb"\s*solid\b", data, re.IGNORECASE):
         raise ReferenceFileError(f"{file} is no STL file: it does not begin with 'solid': {_EXPORT_AGAIN}")
@@ -202,7 +202,7 @@ def _checked_text(data: bytes, file: pathlib.Path) -> bytes:
 # --- from facets to a surface ---------------------------------------------------------------------
 
 
-def _face(facets: Floats, file: pathlib.Path) -> Bools:
+def _face(facets: Floats, file: Path) -> Bools:
     """Choose the facets of the face that lies in x and y, shape (n_facets,): all of a plane body, else the upper."""
     lower, upper = facets.min(axis=(0, 1)), facets.max(axis=(0, 1))
     size = upper - lower
@@ -223,7 +223,7 @@ def _face(facets: Floats, file: pathlib.Path) -> Bools:
     return np.asarray(lies & above)
 
 
-def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: pathlib.Path) -> None:
+def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: Path) -> None:
     """Raise where upper and lower face do not lie over each other: a tilted or warped sheet, a solid not closed."""
     if top.any() and bottom.any():
         boxes = [(facets[side, :, :2].min(axis=(0, 1)), facets[side, :, :2].max(axis=(0, 1))) for side in (top, bottom)]
@@ -235,14 +235,14 @@ def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: pathlib.Pa
     )
 
 
-def _surface(facets: Floats, load_factor: float, file: pathlib.Path) -> Surface:
+def _surface(facets: Floats, load_factor: float, file: Path) -> Surface:
     """Join the facets, shape (n_facets, 3, 2), at their common vertices."""
     first, numbers = merged(facets.reshape(-1, 2))
     return _triangulated(facets.reshape(-1, 2)[first], numbers.reshape(-1, 3), load_factor, file)
 
 
 def _matched(
-    rest: Floats, deformed: Floats, load_factor: float, rest_file: pathlib.Path, file: pathlib.Path
+    rest: Floats, deformed: Floats, load_factor: float, rest_file: Path, file: Path
 ) -> tuple[Surface, Surface]:
     """Return the body at rest and deformed, point for point and triangle for triangle."""
     if len(rest) != len(deformed):
@@ -275,7 +275,7 @@ def merged(places: Floats) -> tuple[Ints, Ints]:
     return merged_within(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
 
 
-def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: pathlib.Path) -> Surface:
+def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: Path) -> Surface:
     """Return the surface without the triangles that merging closed; raise where nothing or no outline is left."""
     a, b, c = triangles.T
     try:
@@ -287,7 +287,7 @@ def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: pat
 # --- from surfaces to a state ---------------------------------------------------------------------
 
 
-def _state(problem: Problem, rest: Surface, surface: Surface, file: pathlib.Path, unit: str) -> State:
+def _state(problem: Problem, rest: Surface, surface: Surface, file: Path, unit: str) -> State:
     """Return the state at the nodes, by linear interpolation of the vertices' displacement."""
     mesh = problem.mesh
     ratio = rest.diameter / mesh.diameter
@@ -313,7 +313,7 @@ def _unit_warnings(mesh: Mesh, surface: Surface, unit: str) -> list[str]:
     return [f"the deformed body, read in {unit}, {_boxes(surface, mesh)}: check unit"]
 
 
-def _state_warnings(problem: Problem, rest: Surface, state: State, file: pathlib.Path) -> list[str]:
+def _state_warnings(problem: Problem, rest: Surface, state: State, file: Path) -> list[str]:
     mesh, loading = problem.mesh, problem.loading
     warnings = []
     if max(np.abs(rest.lower - mesh.lower).max(), np.abs(rest.upper - mesh.upper).max()) > _SAME_BODY * mesh.diameter:

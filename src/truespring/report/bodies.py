@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
 from truespring.potential import Visible
 from truespring.report.bar import BAR, Bar, bar_of, draw_error_bar
@@ -25,18 +25,18 @@ from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
 
 
-def spring_lines(path: Path) -> Ints | None:
+def spring_lines(path: Solution) -> Ints | None:
     """Return the pairs of nodes that the springs of a path join, shape (n, 2); None where it has none."""
     springs: Ints | None = getattr(path.potential, "springs", None)
     return springs
 
 
-def spring_word(path: Path) -> str:
+def spring_word(path: Solution) -> str:
     """Return what these are called."""
     return "links" if path.kind == "heml" else "springs"
 
 
-def path_lines(path: Path) -> Ints:
+def path_lines(path: Solution) -> Ints:
     """Return the pairs of nodes that a path is drawn by, shape (n, 2).
 
     Its springs, with the edges of elements that have none beside them; of a path without springs those of all elements,
@@ -169,14 +169,14 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
     return area.sheet
 
 
-def _drawn_on(comparison: Comparison, side: int) -> Path:
+def _drawn_on(comparison: Comparison, side: int) -> Solution:
     """The model (0) or the reference (1) as it is drawn: on its own mesh, where that lies in the plane."""
     known = comparison.known_on[side]
     carried = (comparison.model, comparison.reference)[side]
     return known if known.problem.mesh.dim == 2 and not comparison.node_by_node else carried
 
 
-def _magnified(path: Path, state: State, factor: float) -> Floats:
+def _magnified(path: Solution, state: State, factor: float) -> Floats:
     return np.asarray(path.problem.mesh.nodes + factor * state.displacement)
 
 

@@ -1,7 +1,7 @@
 """curves.csv: displacement of the probe against force; reactions.csv: what supports that move need."""
 
 import csv
-from pathlib import Path as FilePath
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from truespring.reactions import torque_axes
 from truespring.report.result import Result
 
 
-def write_curves(result: Result, file: FilePath) -> None:
+def write_curves(result: Result, file: Path) -> None:
     """Write columns model, load_factor, ux, uy[, uz] [m], fx, fy[, fz] [N], a row per model and level.
 
     Where a path goes through unstable states a last column, state, tells them: stable, unstable, or the kind of
@@ -39,7 +39,7 @@ def write_curves(result: Result, file: FilePath) -> None:
                 )
 
 
-def write_reactions(result: Result, file: FilePath) -> None:
+def write_reactions(result: Result, file: Path) -> None:
     """Write columns model, load_factor, support, on, ux, uy[, uz] [m], fx, fy[, fz] [N], [mx, my,] mz [N m], compared.
 
     A row per model, level and support that is moved or turned, supports counted from 1 and called by what they are on:

@@ -6,7 +6,7 @@ Matplotlib is imported where it is needed, and only through its objects: no wind
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from truespring.report.bodies import distance_figure, over_figure, undeformed_figure
@@ -53,7 +53,7 @@ def render_figures(result: Result) -> dict[str, Drawing]:
     return _DRAWN[result]
 
 
-def save_figures(result: Result, folder: FilePath) -> dict[str, Drawing]:
+def save_figures(result: Result, folder: Path) -> dict[str, Drawing]:
     """Write every figure as PNG and SVG into `folder`, made where it is not there; return what was written."""
     drawings = render_figures(result)
     folder.mkdir(parents=True, exist_ok=True)

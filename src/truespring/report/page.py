@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
 
 from truespring.comparison import Comparison
-from truespring.equilibrium import Path, Status
+from truespring.equilibrium import Solution, Status
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.mesh import Box, select_elements
 from truespring.models import FiniteElements, Moduli
@@ -52,7 +52,7 @@ _BUDGET = 400_000
 _LARGEST_SVG = 180_000
 
 
-def write_page(results: Sequence[Result], file: FilePath, command: str) -> None:
+def write_page(results: Sequence[Result], file: Path, command: str) -> None:
     """Write one page over `results`; `command` is what runs them again."""
     file.write_text(render_page(results, command), encoding="utf-8")
 
@@ -282,7 +282,7 @@ def _share(error: float | None) -> str:
     return "–" if error is None else percent(error)
 
 
-def _model_row(name: str, path: Path) -> dict[str, Any]:
+def _model_row(name: str, path: Solution) -> dict[str, Any]:
     """What a path cost and how sound it is; a dash where it was read, not solved."""
     solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
@@ -307,7 +307,7 @@ def _model_row(name: str, path: Path) -> dict[str, Any]:
     }
 
 
-def _effort(path: Path) -> str | None:
+def _effort(path: Solution) -> str | None:
     """By which choices a path was solved, what they cost, and where a first choice was given up."""
     cost = path.cost
     if cost is None:
@@ -322,7 +322,7 @@ def _counted(count: int, thing: str) -> str:
     return f"{count} {thing}{'s' * (count != 1)}"
 
 
-def _stability(path: Path) -> str:
+def _stability(path: Solution) -> str:
     counts = [state.negative_eigenvalues for state in path.states]
     if any(counts):
         first = next(state.load_factor for state in path.states if state.negative_eigenvalues)

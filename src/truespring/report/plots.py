@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
@@ -85,7 +85,7 @@ def _is_balanced(result: Result) -> bool:
     return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
 
 
-def _of_leading(path: Path, state: State) -> SupportForce | None:
+def _of_leading(path: Solution, state: State) -> SupportForce | None:
     """Force and torque of the support that moves most, None where they are not known."""
     number = leading_support(path.problem) if path.problem.stated else None
     return next((one for one in path.support_forces(state) if one.support == number), None)

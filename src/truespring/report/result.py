@@ -4,10 +4,10 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path as FilePath
+from pathlib import Path
 
 from truespring.comparison import Comparison, closest
-from truespring.equilibrium import Path, Status
+from truespring.equilibrium import Solution, Status
 from truespring.models import Fitness
 from truespring.problem import Problem
 from truespring.refining import Standing
@@ -40,9 +40,9 @@ class Result:
     """
 
     title: str
-    file: FilePath
+    file: Path
     problem: Problem
-    paths: Mapping[str, Path]
+    paths: Mapping[str, Solution]
     probe: int
     model: str | None
     comparisons: Mapping[str, Comparison]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Ints
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
 from truespring.report.bodies import path_lines, spring_lines
 from truespring.report.packing import Packing
@@ -30,7 +30,7 @@ def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
     return np.flatnonzero(kept)
 
 
-def _lines(path: Path) -> tuple[Ints, Ints]:
+def _lines(path: Solution) -> tuple[Ints, Ints]:
     """The lines that a path is drawn by on its surface, and inside it; of a body without surface, all and none."""
     facets, lines = facets_of(path.problem.mesh), path_lines(path)
     none = np.zeros((0, 2), dtype=np.int64)

@@ -1,7 +1,7 @@
 """Deformed bodies as files: a VTU series for ParaView and an STL of the last state."""
 
 from itertools import pairwise
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh, Surface
 from truespring.potential import Visible
 from truespring.report.surfaces import facets_of, triangles_of
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     import meshio
 
 
-def write_series(path: Path, folder: FilePath, name: str) -> None:
+def write_series(path: Solution, folder: Path, name: str) -> None:
     """Write NAME.pvd and, in the folder NAME beside it, one .vtu a state; SI units.
 
     Points stand where they were at rest, as is the custom: ParaView's "Warp By Vector" moves them.
     They carry displacement and reaction; cells what their potential tells: tension, stretch,
     stiffness and strain energy of springs, stress and strain energy of elements. Of a path that is
-    no more than a surface, the surface. A state that is no equilibrium (Path.best) is left out.
+    no more than a surface, the surface. A state that is no equilibrium (Solution.best) is left out.
     """
     levels = folder / name
     levels.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,7 @@ def write_series(path: Path, folder: FilePath, name: str) -> None:
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")
 
 
-def write_mesh(mesh: Mesh, file: FilePath, held: Bools | None = None) -> None:
+def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:
     """Write the body at rest by its elements as VTU [m]; with the directions of nodes that supports hold as 1."""
     import meshio
 
@@ -53,7 +53,7 @@ def write_mesh(mesh: Mesh, file: FilePath, held: Bools | None = None) -> None:
     meshio.Mesh(_in_space(mesh.nodes), list(mesh.cells.items()), point_data=fields).write(file, file_format="vtu")
 
 
-def _state_mesh(path: Path, state: State) -> "meshio.Mesh":
+def _state_mesh(path: Solution, state: State) -> "meshio.Mesh":
     import meshio
 
     mesh = path.problem.mesh
@@ -79,7 +79,7 @@ def _triangle_mesh(points: Floats, triangles: Ints) -> "meshio.Mesh":
     return meshio.Mesh(_in_space(points), [("triangle", triangles)])
 
 
-def write_stl(path: Path, file: FilePath) -> None:
+def write_stl(path: Solution, file: Path) -> None:
     """Write the body of the last state as binary STL [m]; nothing where there is no body.
 
     Of a plane body its elements, in the plane z = 0, of one in 3D its surface, seen from outside
@@ -96,7 +96,7 @@ def write_stl(path: Path, file: FilePath) -> None:
     drawn.write(file, file_format="stl", binary=True)
 
 
-def write_difference(comparison: Comparison, file: FilePath) -> None:
+def write_difference(comparison: Comparison, file: Path) -> None:
     """Write the nodes at which two paths are compared as VTU: both displacements, their distance, what lies outside.
 
     At the last level that both have; nothing where there is none.

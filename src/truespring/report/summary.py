@@ -7,7 +7,7 @@ from typing import Any
 
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError
-from truespring.equilibrium import Path
+from truespring.equilibrium import Solution
 from truespring.models import FiniteElements, Moduli
 from truespring.reactions import moved_supports
 from truespring.report.result import Result
@@ -26,7 +26,7 @@ def summary(result: Result) -> dict[str, Any]:
     }
 
 
-def _model(path: Path, probe: int) -> dict[str, Any]:
+def _model(path: Solution, probe: int) -> dict[str, Any]:
     last = path.states[-1] if path.states else None
     values = {
         "kind": path.kind,

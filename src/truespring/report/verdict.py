@@ -7,7 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError, decisive
-from truespring.equilibrium import Path, State, Status
+from truespring.equilibrium import Solution, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
 from truespring.models import Fem, FiniteElements, Moduli
@@ -201,7 +201,7 @@ def material_name(result: Result) -> str:
     return "material in plane strain" if isinstance(result.problem.section, PlaneStrain) else "material"
 
 
-def linear_fem(path: Path) -> str:
+def linear_fem(path: Solution) -> str:
     """Return what finite elements of first order on the mesh of a path are called."""
     corners = {
         "quadrilateral": "four-node ",
@@ -226,7 +226,7 @@ def deep(depth: int) -> str:
     return f"{depth} element{'' if depth == 1 else 's'} deep"
 
 
-def moduli_sentence(path: Path) -> str | None:
+def moduli_sentence(path: Solution) -> str | None:
     """Return what the springs of a path realise against the material; None where it has no moduli."""
     moduli = path.moduli
     if moduli is None:
@@ -398,7 +398,7 @@ def _alone(result: Result) -> Iterator[str]:
         yield f"At {at} the probe has moved by {quantity(moved, 'm')}."
 
 
-def _way(path: Path) -> str:
+def _way(path: Solution) -> str:
     """What a path went through."""
     critical = [state for state in path.states if state.critical]
     if not critical:
@@ -550,7 +550,7 @@ def _full(result: Result) -> str:
     return "full motion" if _driven_by_motion(result) else "full load"
 
 
-def _first(path: Path, troubled: Callable[[State], bool]) -> str:
+def _first(path: Solution, troubled: Callable[[State], bool]) -> str:
     """The first load level with trouble, as the end of a sentence."""
     levels = [state.load_factor for state in path.states if troubled(state)]
     return f", first at load factor {levels[0]:.4g}" if levels else ""

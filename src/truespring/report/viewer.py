@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Path, State
+from truespring.equilibrium import Solution, State
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
 from truespring.report.quantity import natural_scale, percent, quantity, times
@@ -63,18 +63,18 @@ def _shown(result: Result) -> list[str]:
     return shown if shown and shown[0] == names[0] else []
 
 
-def _only_surface(path: Path) -> bool:
+def _only_surface(path: Solution) -> bool:
     """Whether a path was read from a file that does not tell where each node went."""
     return path.surface is not None and not path.states
 
 
-def _cloud(path: Path, factor: float) -> Floats:
+def _cloud(path: Solution, factor: float) -> Floats:
     """Every place [m] that the viewer draws of a path, shape (n, dim)."""
     clouds = [path.problem.mesh.nodes + factor * state.displacement for state in path.states]
     return np.concatenate(clouds + ([path.surface.points] if path.surface is not None and factor == 1 else []))
 
 
-def _levels(path: Path, budget: int) -> list[float]:
+def _levels(path: Solution, budget: int) -> list[float]:
     """The load levels to keep so that no more than `budget` states are: every n-th, first and last always."""
     levels = path.load_factors.tolist()
     step = max(1, -(-len(levels) // max(budget - 1, 1)))

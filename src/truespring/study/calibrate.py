@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 
 from truespring.calibration import (
     REGULARISATION,
@@ -18,7 +18,7 @@ from truespring.calibration import (
 )
 from truespring.calibration.calibration import Progress
 from truespring.comparison import most_moved
-from truespring.equilibrium import Path, solve
+from truespring.equilibrium import Solution, solve
 from truespring.errors import StudyError, TruespringError, nearest
 from truespring.models import LAWS, Fem, Springs
 from truespring.problem import Problem
@@ -52,8 +52,8 @@ def calibrate_study(
     held_out: Sequence[Study] = (),
     unknowns: str = "class",
     to: str | None = None,
-    markers: FilePath | None = None,
-    curve: FilePath | None = None,
+    markers: Path | None = None,
+    curve: Path | None = None,
     regularisation: float = REGULARISATION,
     progress: Progress | None = None,
 ) -> Calibrated:
@@ -136,7 +136,7 @@ def _case(study: Study, reference: str) -> LoadCase:
         return LoadCase(study.stem, study.problem, path, None, _newton(study), *told)
 
 
-def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Path, tuple[str, float | None]]:
+def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Solution, tuple[str, float | None]]:
     """The path that springs are to follow; what it is in words, and how far it is itself off.
 
     Finite elements whose kind the study leaves open are of second order on the nodes of the springs: those of first
@@ -154,7 +154,7 @@ def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Pat
     return path, (f"{path.label}{kind}", own.value)
 
 
-def _measured(study: Study, springs: str, markers: FilePath | None, curve: FilePath | None) -> LoadCase:
+def _measured(study: Study, springs: str, markers: Path | None, curve: Path | None) -> LoadCase:
     """The study's own load with what was measured under it."""
     seen = None if markers is None else read_result(markers)
     told = None
@@ -181,7 +181,7 @@ def _turned(study: Study, reference: str) -> Iterator[LoadCase]:
         yield LoadCase(name, problem, path, None, _newton(study), *told)
 
 
-def _refuse_short(study: Study, reference: str, path: Path) -> None:
+def _refuse_short(study: Study, reference: str, path: Solution) -> None:
     if not path.complete:
         raise StudyError(
             f"{study.file}: reference '{reference}' is {path.status} and ends at load factor {path.load_factor:.6g}: "

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from truespring.errors import StudyError
@@ -42,7 +42,7 @@ def calibrated_values(found: Calibrated) -> dict[str, Any]:
     }
 
 
-def write_calibrated(found: Calibrated, out: FilePath, command: str) -> tuple[FilePath, ...]:
+def write_calibrated(found: Calibrated, out: Path, command: str) -> tuple[Path, ...]:
     """Write calibrated.toml, its springs as CSV, calibrate.json, figures and report.html into out/STEM; return them."""
     with Output(out / found.study.stem, "calibrate.json") as output:
         files = _write(found, output, command)
@@ -50,7 +50,7 @@ def write_calibrated(found: Calibrated, out: FilePath, command: str) -> tuple[Fi
     return tuple(output.folder / file.name for file in files)
 
 
-def _write(found: Calibrated, output: Output, command: str) -> tuple[FilePath, ...]:
+def _write(found: Calibrated, output: Output, command: str) -> tuple[Path, ...]:
     folder = output.staging
     springs, volume, study = folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv", folder / f"{NAME}.toml"
     tables = write_given(found.calibration.model, springs, volume)
@@ -80,7 +80,7 @@ def what_was_fitted(found: Calibrated) -> str:
     )
 
 
-def calibrated_study(found: Calibrated, folder: FilePath, tables: list[str]) -> str:
+def calibrated_study(found: Calibrated, folder: Path, tables: list[str]) -> str:
     """Return the text of the study with its calibrated springs beside those of the rule, to stand in `folder`.
 
     The comments at its head tell the errors: they are shown with its results, and stand in what it is exported to.
@@ -136,9 +136,9 @@ def _free_name(models: Mapping[str, Any]) -> str:
     return next(f"{NAME}{number}" for number in numbers if f"{NAME}{number}" not in taken)
 
 
-def _move(table: dict[str, Any], keys: tuple[str, ...], before: FilePath, now: FilePath) -> None:
+def _move(table: dict[str, Any], keys: tuple[str, ...], before: Path, now: Path) -> None:
     """Keep what a table calls its files true where the study moves to another folder."""
     for key in keys:
         name = table.get(key)
         if isinstance(name, str) and not re.match(r"\w\w+:", name):
-            table[key] = FilePath(os.path.relpath((before / name).resolve(), now.resolve())).as_posix()
+            table[key] = Path(os.path.relpath((before / name).resolve(), now.resolve())).as_posix()

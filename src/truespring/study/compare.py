@@ -5,12 +5,12 @@ import re
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path as FilePath
+from pathlib import Path
 
 import numpy as np
 
 from truespring.comparison import TOLERANCE, Comparison, compare
-from truespring.equilibrium import Path
+from truespring.equilibrium import Solution
 from truespring.errors import StudyError, TruespringError
 from truespring.misfit import displacement_misfit, same_place
 from truespring.outputs import Output, write_whole
@@ -53,7 +53,7 @@ def compare_sources(
         yield _result(name, model, first, found, source.is_file or sources[0].is_file)
 
 
-def _laid_over(model: Path, reference: Path, place: Probe, tolerance: float) -> Comparison:
+def _laid_over(model: Solution, reference: Solution, place: Probe, tolerance: float) -> Comparison:
     """Compare two paths; a surface alone has no levels to draw, so the body is drawn over it, whichever is which."""
     turned = not model.states and bool(reference.states)
     return compare(reference, model, place, tolerance) if turned else compare(model, reference, place, tolerance)
@@ -81,22 +81,22 @@ def _named(source: Source, folders: int) -> str:
     return f"{path}:{source.model}" if source.model else path
 
 
-def _opened(sources: Sequence[Source], progress: Progress | None, timeout: float | None) -> list[Path]:
+def _opened(sources: Sequence[Source], progress: Progress | None, timeout: float | None) -> list[Solution]:
     """The paths of all sources; STL files last, which are read beside the first other body."""
-    opened: dict[int, Path] = {}
+    opened: dict[int, Solution] = {}
     for number, source in sorted(enumerate(sources), key=lambda one: one[1].is_stl):
         beside = opened[min(opened)].problem if opened and source.is_stl else None
         opened[number] = open_source(source, beside, progress, timeout)
     return [opened[number] for number in range(len(sources))]
 
 
-def _result(name: str, model: Path, first: str, found: Comparison, from_file: bool) -> Result:
+def _result(name: str, model: Solution, first: str, found: Comparison, from_file: bool) -> Result:
     drawn, other = (name, first) if found.known_on[0] is model else (first, name)
     paths = {drawn: found.model, other: found.reference}
     paths[name] = replace(paths[name], warnings=(*paths[name].warnings, *_notes(first, found, from_file)))
     return Result(
         title=f"{name} against {first}",
-        file=FilePath(re.sub(r"[^\w.-]+", "-", name)),
+        file=Path(re.sub(r"[^\w.-]+", "-", name)),
         problem=found.model.problem,
         paths={name: paths[name], first: paths[first]},
         probe=found.probe,
@@ -161,7 +161,7 @@ def read_probe(text: str | None) -> Probe:
         raise StudyError(f"--probe {text}: {error}") from None
 
 
-def write_comparisons(results: Sequence[Result], out: FilePath, texts: Sequence[str], given: Given) -> FilePath:
+def write_comparisons(results: Sequence[Result], out: Path, texts: Sequence[str], given: Given) -> Path:
     """Write what each result leaves behind into out, or where there are several into folders of it; return the report.
 
     `texts` and `given` are what was compared and what was told of it; they make the command that the report names.
@@ -178,7 +178,7 @@ def write_comparisons(results: Sequence[Result], out: FilePath, texts: Sequence[
     return report
 
 
-def write_comparison(result: Result, folder: FilePath, command: str) -> None:
+def write_comparison(result: Result, folder: Path, command: str) -> None:
     """Write comparison.json, curves.csv, difference.vtu, figures and the report of two results into a folder."""
     from truespring.report.figures import save_figures
     from truespring.report.page import write_page

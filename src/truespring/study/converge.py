@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.comparison import most_moved
-from truespring.equilibrium import Path as Equilibria
+from truespring.equilibrium import Solution
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
@@ -39,7 +39,7 @@ def converge(
     place = None
     for halvings in range(most):
         study = given.finer(halvings) if halvings else given
-        models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Equilibria)}
+        models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Solution)}
         if not models:
             raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")
         mesh = study.problem.mesh
@@ -60,12 +60,12 @@ def converge(
             return
 
 
-def _attempt(name: str, path: Equilibria) -> Attempt:
+def _attempt(name: str, path: Solution) -> Attempt:
     n_nodes = path.problem.mesh.n_nodes
     return Attempt(name, n_nodes, str(path.status), path.load_factor, path.status.advice, path.complete)
 
 
-def _watched(path: Equilibria, probe: int) -> Iterator[tuple[str, str, float]]:
+def _watched(path: Solution, probe: int) -> Iterator[tuple[str, str, float]]:
     state = path.states[-1]
     for direction, value in zip(AXES, state.displacement[probe], strict=False):
         yield f"u{direction} of the probe", "m", float(value)

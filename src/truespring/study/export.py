@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from truespring.comparison import most_moved
@@ -30,7 +30,7 @@ class Exports:
     target: str
     model: str
     exported: Exported
-    files: tuple[FilePath, ...]
+    files: tuple[Path, ...]
 
     @property
     def converged(self) -> bool:
@@ -92,7 +92,7 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
 
 
 def export_study(
-    study: Study, targets: Collection[str], out: FilePath, name: str | None = None, progress: Progress | None = None
+    study: Study, targets: Collection[str], out: Path, name: str | None = None, progress: Progress | None = None
 ) -> list[Exports]:
     """Solve the springs of a study and write them for each target into out/STEM; return what was written.
 

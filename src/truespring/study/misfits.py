@@ -1,6 +1,6 @@
 """Bodies that do not lie where they should, told with the options that would make them."""
 
-from truespring.equilibrium import Path
+from truespring.equilibrium import Solution
 from truespring.errors import ReferenceFileError
 from truespring.mesh.selections import AXES
 from truespring.misfit import Misfit, find_misfit
@@ -10,7 +10,7 @@ from truespring.study.sources import Source
 _UNITS = {1e-6: "um", 1e-3: "mm", 1e-2: "cm", 0.0254: "inch", 0.3048: "ft", 1.0: "m", 1e3: "km"}
 
 
-def refuse_misfit(source: Source, model: Path, first: Source, reference: Path) -> None:
+def refuse_misfit(source: Source, model: Solution, first: Source, reference: Solution) -> None:
     """Raise ReferenceFileError where a body would lie where the other lies if it were told otherwise.
 
     A file is to be mended: what is ours is in metres. Of two files that of which something is told already, else that
@@ -51,7 +51,7 @@ def _options(file: str, found: Misfit, scale: float) -> str:
     return " ".join(options)
 
 
-def box_words(path: Path) -> str:
+def box_words(path: Solution) -> str:
     """Return where a body lies, in words that follow its name."""
     only = path.surface or path.shell
     points = path.whole.points if path.states or only is None else only.points

@@ -6,12 +6,12 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.equilibrium import Path, Solver, refuse_control
+from truespring.equilibrium import Solution, Solver, refuse_control
 from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest, one_line, shown
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
@@ -54,7 +54,7 @@ from truespring.study.network import read_network
 from truespring.units import to_si
 
 #: What an entry of [models] is: a model that is solved, a program that solves it, or a path that was read.
-Entry = Model | SpringNetwork | Program | Path
+Entry = Model | SpringNetwork | Program | Solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Study:
     refine: bool = True
 
     @property
-    def file(self) -> FilePath:
+    def file(self) -> Path:
         """The study's file, as it was named."""
         return self.text.file
 
@@ -117,7 +117,7 @@ class StudyText:
         tables: the text as TOML has it, and what was changed in it, not yet checked.
     """
 
-    file: FilePath
+    file: Path
     source: str
     tables: Mapping[str, Any]
 
@@ -151,9 +151,9 @@ def _finer(table: schema.StudyTable, halvings: int) -> schema.StudyTable:
     return table.model_copy(update={"mesh": mesh.model_copy(update={"elements": elements})})
 
 
-def read_text(file: str | FilePath) -> StudyText:
+def read_text(file: str | Path) -> StudyText:
     """Read a study file; raise StudyError where it cannot be read or is no TOML."""
-    place = FilePath(file)
+    place = Path(file)
     try:
         source = io.StringIO(read_file(place, StudyError).decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError:
@@ -171,7 +171,7 @@ def read_text(file: str | FilePath) -> StudyText:
     return StudyText(place, source, tables)
 
 
-def _value_error(file: FilePath, source: str, error: ValueError) -> str:
+def _value_error(file: Path, source: str, error: ValueError) -> str:
     """Say of an integer that Python refuses to read, of thousands of digits, where it stands."""
     for number, line in enumerate(source.splitlines(), 1):
         if re.search(r"\d[\d_]{999}", line):
@@ -190,13 +190,13 @@ _TOO_DEEP = f"lists and tables are nested more than {_DEEPEST} deep: no key of a
 _MOST_DOTS = 100
 
 
-def _refuse_long_keys(file: FilePath, source: str) -> None:
+def _refuse_long_keys(file: Path, source: str) -> None:
     for number, line in enumerate(source.splitlines(), 1):
         if any(part.count(".") > _MOST_DOTS for part in line.split("=")):
             raise StudyError(f"{file}:{number}: more than {_MOST_DOTS} dots: no key and no list of a study is so long")
 
 
-def _refuse_deep(file: FilePath, tables: Mapping[str, Any]) -> None:
+def _refuse_deep(file: Path, tables: Mapping[str, Any]) -> None:
     """Raise StudyError where lists and tables are nested deeper than any key takes; what follows may then recurse."""
     held: list[Any] = [tables]
     for _ in range(_DEEPEST):
@@ -210,7 +210,7 @@ def _refuse_deep(file: FilePath, tables: Mapping[str, Any]) -> None:
         raise StudyError(f"{file}: {_TOO_DEEP}")
 
 
-def read_study(file: str | FilePath, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
+def read_study(file: str | Path, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
     """Read and check a study file; raise StudyError with file, key, value and what is allowed.
 
     With `halvings` its mesh is that many times finer: elements of half the size, each time. With `changes` some keys
@@ -385,7 +385,7 @@ class _Builder:
                 case schema.StlTable():
                     beside = self.file.parent
                     undeformed = None if table.undeformed is None else beside / table.undeformed
-                    read: Path = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
+                    read: Solution = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
                     return read
                 case schema.NetworkTable():
                     if self.network is None:
@@ -498,7 +498,7 @@ def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None
     return named_point(mesh, probe) if isinstance(probe, str) else nearest_node(mesh, probe)
 
 
-def _messages(file: FilePath, error: ValidationError, lines: Mapping[tuple[str | int, ...], int]) -> list[str]:
+def _messages(file: Path, error: ValidationError, lines: Mapping[tuple[str | int, ...], int]) -> list[str]:
     """One line a fault; a missing key is not told where an unknown one beside it is its misspelling."""
     faults = error.errors()
     meant: set[tuple[str | int, ...]] = set()
@@ -510,7 +510,7 @@ def _messages(file: FilePath, error: ValidationError, lines: Mapping[tuple[str |
     return [_message(file, fault, lines) for fault in told]
 
 
-def _message(file: FilePath, error: Any, lines: Mapping[tuple[str | int, ...], int]) -> str:
+def _message(file: Path, error: Any, lines: Mapping[tuple[str | int, ...], int]) -> str:
     """One line for one fault that pydantic found."""
     key = _without_tag(error["loc"])
     place = _place(file, key, lines)
@@ -575,7 +575,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
     return list((schema.MODEL_KINDS[str(loc[2])] if loc[0] == "models" else tables[loc[0]]).model_fields)
 
 
-def _place(file: FilePath, key: tuple[str | int, ...], lines: Mapping[tuple[str | int, ...], int]) -> str:
+def _place(file: Path, key: tuple[str | int, ...], lines: Mapping[tuple[str | int, ...], int]) -> str:
     """File, line of the key or of the nearest table around it, and the key; lists count from 1."""
     known = next((lines[key[:n]] for n in range(len(key), 0, -1) if key[:n] in lines), None)
     dotted = one_line(".".join(str(part + 1) if isinstance(part, int) else part for part in key), 200)

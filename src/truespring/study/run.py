@@ -6,13 +6,13 @@ import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from truespring.comparison import compare, most_moved
-from truespring.equilibrium import Path, solve, unsolved
+from truespring.equilibrium import Solution, solve, unsolved
 from truespring.errors import StudyError
 from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
@@ -46,16 +46,16 @@ from truespring.study.standings import standings
 Progress = Callable[[str, str, float], None]
 
 #: Called with the name of a model and its path as soon as that is known.
-Known = Callable[[str, Path], None]
+Known = Callable[[str, Solution], None]
 
 
-def read_studies(files: Sequence[str | FilePath]) -> list[Study]:
+def read_studies(files: Sequence[str | Path]) -> list[Study]:
     """Read and check all studies before any is solved; raise StudyError with the faults of all of them."""
     studies: list[Study] = []
     faults: list[str] = []
-    seen: dict[str, str | FilePath] = {}
+    seen: dict[str, str | Path] = {}
     for file in files:
-        stem = FilePath(file).stem.casefold()
+        stem = Path(file).stem.casefold()
         if stem in seen:
             faults.append(f"{file} and {seen[stem]} have one stem, '{stem}': their outputs would share a folder")
         seen[stem] = file
@@ -82,7 +82,7 @@ def run(
     `known` is told each path before the next model is solved. With `refining`, unless the study leaves it out,
     references are refined to tell how far they are themselves off.
     """
-    paths: dict[str, Path] = {}
+    paths: dict[str, Solution] = {}
     for name, entry in study.entries.items():
 
         def report(load_factor: float, iteration: int, residual: float, name: str = name) -> None:
@@ -90,7 +90,7 @@ def run(
                 progress(study.stem, name, load_factor)
 
         paths[name] = follow(study, entry, report, timeout)
-        if progress and not isinstance(entry, Path):
+        if progress and not isinstance(entry, Solution):
             progress(study.stem, name, 1.0)
         if known:
             known(name, paths[name])
@@ -118,12 +118,12 @@ def run(
     )
 
 
-def follow(study: Study, entry: Entry, report: Reporter | None = None, timeout: float | None = None) -> Path:
+def follow(study: Study, entry: Entry, report: Reporter | None = None, timeout: float | None = None) -> Solution:
     """Return the path of an entry of a study: solved here, solved by another program, or as it was read.
 
     Whatever is raised on the way is this model's own: its path is at rest then, and tells why.
     """
-    if isinstance(entry, Path):
+    if isinstance(entry, Solution):
         return entry
     try:
         if isinstance(entry, Program):
@@ -211,7 +211,7 @@ def _material(material: Material) -> dict[str, float]:
     return {"young": material.young, "poisson": material.poisson}
 
 
-def write_moduli(study: Study, realised: Sequence[Realised], out: FilePath) -> FilePath | None:
+def write_moduli(study: Study, realised: Sequence[Realised], out: Path) -> Path | None:
     """Write moduli.json and a picture of Young's modulus by direction into out/STEM; return the picture, if any."""
     with Output(out / study.stem, "moduli.json") as output:
         values = {one.name: realised_values(one) for one in realised}
@@ -222,7 +222,7 @@ def write_moduli(study: Study, realised: Sequence[Realised], out: FilePath) -> F
     return None if picture is None else out / study.stem / "figures" / picture.name
 
 
-def _draw_moduli(study: Study, realised: Sequence[Realised], folder: FilePath) -> FilePath:
+def _draw_moduli(study: Study, realised: Sequence[Realised], folder: Path) -> Path:
     from truespring.report.young import save_young
 
     labels = [one.springs.label for one in realised]
@@ -250,12 +250,12 @@ def rule_values() -> dict[str, dict[str, Any]]:
     }
 
 
-def output(study: Study | Result, out: FilePath) -> Output:
+def output(study: Study | Result, out: Path) -> Output:
     """Return the output of a study, in out/STEM."""
     return Output(out / study.stem, "summary.json")
 
 
-def write(result: Result, out: FilePath, report: bool = True) -> None:
+def write(result: Result, out: Path, report: bool = True) -> None:
     """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures and a page too."""
     with output(result, out) as own:
         for name, path in result.paths.items():
@@ -263,7 +263,7 @@ def write(result: Result, out: FilePath, report: bool = True) -> None:
         write_rest(result, own, verify_command([result], out) if report else None)
 
 
-def write_model(path: Path, output: Output, name: str) -> None:
+def write_model(path: Solution, output: Output, name: str) -> None:
     """Write what a model alone leaves, its VTU series and STL, as soon as it is solved."""
     write_series(path, output.staging, name)
     write_stl(path, output.staging / f"deformed_{name}.stl")
@@ -288,7 +288,7 @@ def write_rest(result: Result, output: Output, command: str | None) -> None:
     output.publish()
 
 
-def write_overview(results: Sequence[Result], out: FilePath) -> None:
+def write_overview(results: Sequence[Result], out: Path) -> None:
     """Write out/report.html over all studies, each written before; over one alone, its own page once more."""
     from truespring.report.page import render_page
 
@@ -299,7 +299,7 @@ def write_overview(results: Sequence[Result], out: FilePath) -> None:
     write_whole(out / "report.html", page)
 
 
-def verify_command(studies: Sequence[Study | Result], out: FilePath) -> str:
+def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
     """Return the command line that verifies studies."""
     return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])
 
@@ -344,7 +344,7 @@ def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
     if isinstance(entry, Program):
         return {"kind": entry.kind, "label": entry.label_on(study.problem), "warnings": []}
     if not isinstance(entry, Springs):
-        known = entry.warnings if isinstance(entry, Path) else model_warnings(study.problem, entry)
+        known = entry.warnings if isinstance(entry, Solution) else model_warnings(study.problem, entry)
         law = {"law": entry.law} if isinstance(entry, Fem | Heml | MassTensor) else {}
         law |= {"element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
         return {"kind": entry.kind, "label": entry.label, **law, "warnings": list(known)}

@@ -7,13 +7,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.equilibrium import Path, State, Status
+from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
 from truespring.opening import read_file
@@ -42,7 +42,7 @@ class Source:
     """
 
     text: str
-    file: FilePath
+    file: Path
     model: str | None
     options: FileOptions
     study: Study | None = None
@@ -88,11 +88,11 @@ def find_sources(texts: Sequence[str], given: Given) -> list[Source]:
 
 def find_source(text: str, options: FileOptions) -> Source:
     """Return what FILE, FOLDER[:MODEL] or STUDY[:MODEL] names; raise StudyError for what is not there."""
-    file, model = FilePath(text), None
+    file, model = Path(text), None
     if not file.exists() and ":" in text:
         name, _, given = text.rpartition(":")
-        if FilePath(name).exists():
-            file, model = FilePath(name), given
+        if Path(name).exists():
+            file, model = Path(name), given
     if not file.exists():
         raise StudyError(f"{text}: there is no such file or folder")
     study = read_study(file) if file.suffix.lower() == ".toml" else None
@@ -112,7 +112,7 @@ def find_source(text: str, options: FileOptions) -> Source:
 
 def open_source(
     source: Source, beside: Problem | None, progress: Progress | None, timeout: float | None = None
-) -> Path:
+) -> Solution:
     """Read or solve a source; an STL file is read beside the body of `beside`, where there is one in the plane."""
 
     def report(share: float) -> None:
@@ -137,7 +137,7 @@ def open_source(
     return path
 
 
-def _record(file: FilePath, options: FileOptions, report: Callable[[float], None]) -> Any:
+def _record(file: Path, options: FileOptions, report: Callable[[float], None]) -> Any:
     return read_record(file, field=options.field, undeformed=options.undeformed, mesh=options.mesh, reading=report)
 
 
@@ -147,7 +147,7 @@ def _known(text: str, model: str, names: Sequence[str]) -> str:
     return model
 
 
-def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
+def _of_folder(source: Source, report: Callable[[float], None]) -> Solution:
     """A path that truespring wrote: its VTU series with what summary and curves tell of it."""
     folder, name = source.file, str(source.model)
     told = _json(folder / "summary.json")["models"][name]
@@ -171,7 +171,7 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Path:
     )
 
 
-def _held(path: Path, body: FilePath) -> Bools | None:
+def _held(path: Solution, body: Path) -> Bools | None:
     """The directions of nodes that supports held, as mesh.vtu tells them; None where it does not, or of other nodes."""
     import meshio
 
@@ -182,7 +182,7 @@ def _held(path: Path, body: FilePath) -> Bools | None:
     return np.asarray(held[:, : nodes.shape[1]] > 0)
 
 
-def _folder(text: str, file: FilePath) -> FilePath:
+def _folder(text: str, file: Path) -> Path:
     """The folder of a study, or the only one in a folder of several."""
     if (file / "summary.json").is_file():
         return file
@@ -195,7 +195,7 @@ def _folder(text: str, file: FilePath) -> FilePath:
     return inner[0]
 
 
-def _json(file: FilePath) -> dict[str, Any]:
+def _json(file: Path) -> dict[str, Any]:
     try:
         read = json.loads(read_file(file, ReferenceFileError))
         models = read["models"]
@@ -211,7 +211,7 @@ def _json(file: FilePath) -> dict[str, Any]:
     return dict(read)
 
 
-def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[State, ...]:
+def _with_forces(path: Solution, curves: Path, name: str) -> tuple[State, ...]:
     """The states of a path with the forces that curves.csv tells at their levels."""
     axes = "xyz"[: path.problem.mesh.dim]
     try:
@@ -221,7 +221,7 @@ def _with_forces(path: Path, curves: FilePath, name: str) -> tuple[State, ...]:
     return tuple(replace(one, applied_force=_near(forces, one, one.applied_force)) for one in path.states)
 
 
-def _with_supports(states: Sequence[State], reactions: FilePath, name: str) -> tuple[State, ...]:
+def _with_supports(states: Sequence[State], reactions: Path, name: str) -> tuple[State, ...]:
     """The states with force and torque of each moved support that reactions.csv tells at their levels."""
     if not states or not reactions.is_file():
         return tuple(states)
@@ -249,7 +249,7 @@ def _support(row: Mapping[str, str], dim: int) -> SupportForce:
 _DAMAGED = (ReferenceFileError, ValueError, KeyError, TypeError, AttributeError)
 
 
-def _rows(table: FilePath, name: str) -> list[tuple[float, list[dict[str, str]]]]:
+def _rows(table: Path, name: str) -> list[tuple[float, list[dict[str, str]]]]:
     """The rows of a model in a table, by load factor."""
     text = read_file(table, ReferenceFileError).decode("utf-8")
     rows = [row for row in csv.DictReader(io.StringIO(text, newline="")) if row.get("model") == name]

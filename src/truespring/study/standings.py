@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from truespring.equilibrium import Path, error_words
+from truespring.equilibrium import Solution, error_words
 from truespring.refining import COST, Standing, own_error, standing, work_of
 from truespring.study.read import Study
 
 
-def standings(study: Study, paths: Mapping[str, Path], names: Sequence[str]) -> dict[str, Standing]:
+def standings(study: Study, paths: Mapping[str, Solution], names: Sequence[str]) -> dict[str, Standing]:
     """Return how each reference stands to its own limit; empty where the study leaves refinement out.
 
     All of it takes at most COST times the work of the study's own paths.

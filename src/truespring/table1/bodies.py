@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Path, State, solve
+from truespring.equilibrium import Solution, State, solve
 from truespring.loading import Fixed, Force
 from truespring.material import Material, PlaneStress
 from truespring.mesh import Mesh, box, rectangle
@@ -65,7 +65,7 @@ def cantilever(size: Size, element: str, load: float, poisson: float | None = No
     )
 
 
-def end_displacement(path: Path, state: State) -> Floats:
+def end_displacement(path: Solution, state: State) -> Floats:
     """Return the displacement of the end that does work with the load [m], shape (dim,): a mean with its weights."""
     potential = path.potential
     refined = isinstance(potential, Refined)
@@ -77,7 +77,7 @@ def end_displacement(path: Path, state: State) -> Floats:
 
 
 @cache
-def reference(dim: int, large: bool) -> Path:
+def reference(dim: int, large: bool) -> Solution:
     """Return the path of finite elements of second order that all are measured against.
 
     Linear at the small load; neo-Hookean up to the largest load. Of as many nodes as 256 x 64 elements in the plane,

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ _BETWEEN = 0.001
 
 
 def map_validity(
-    study: str | FilePath | Study,
+    study: str | Path | Study,
     *,
     law: str = "neo-hookean",
     loads: Sequence[str] | None = None,

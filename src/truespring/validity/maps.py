@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from truespring.arrays import Floats
@@ -124,8 +124,8 @@ class Validity:
         with figure_style():
             return dict(figures(self))
 
-    def write(self, out: str | FilePath) -> dict[str, FilePath]:
+    def write(self, out: str | Path) -> dict[str, Path]:
         """Write validity.json, validity.csv, figures and report.html into out/STEM; return where each is."""
         from truespring.validity.writing import write_validity
 
-        return write_validity(self, FilePath(out))
+        return write_validity(self, Path(out))

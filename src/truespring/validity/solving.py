@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Path, State, solve
+from truespring.equilibrium import Solution, State, solve
 from truespring.models import Model
 from truespring.potential import Loading, Potential, Refined
 from truespring.problem import Problem
@@ -55,8 +55,8 @@ class Task:
 class Solved:
     """The path of a task, and that to the share SMALL of its load; `seconds` are of both."""
 
-    path: Path
-    small: Path
+    path: Solution
+    small: Solution
     seconds: float
 
     @property
@@ -100,13 +100,13 @@ def run_task(task: Task) -> Solved:
     return Solved(_alone(path), _alone(small), time.perf_counter() - started)
 
 
-def _alone(path: Path) -> Path:
+def _alone(path: Solution) -> Solution:
     """The path without what it was solved with, which is large."""
     grid = path.whole if isinstance(path.potential, Refined) else None
     return replace(path, potential=None, grid=grid, best=None)
 
 
-def conjugate_force(path: Path, states: tuple[State, ...], levels: Floats) -> Floats:
+def conjugate_force(path: Solution, states: tuple[State, ...], levels: Floats) -> Floats:
     """Return the force that supports do work with as the level rises, at each state [N m], shape (n_states,).
 
     The reactions times the derivative of the prescribed motion by the level: of a turn its moment times the angle.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from importlib.resources import files
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ COLUMNS = (
 )
 
 
-def write_validity(validity: Validity, out: FilePath, command: str | None = None) -> dict[str, FilePath]:
+def write_validity(validity: Validity, out: Path, command: str | None = None) -> dict[str, Path]:
     """Write validity.json, validity.csv, figures/ and report.html into out/STEM; return where each is.
 
     `command` is what does it again, where it was a command line.
@@ -57,7 +57,7 @@ def write_validity(validity: Validity, out: FilePath, command: str | None = None
     return {name: output.folder / name for name in ("validity.json", "validity.csv", "figures", "report.html")}
 
 
-def _write(validity: Validity, folder: FilePath, command: str | None) -> None:
+def _write(validity: Validity, folder: Path, command: str | None) -> None:
     (folder / "figures").mkdir()
     text = json.dumps(validity_values(validity), indent=1, allow_nan=False)
     (folder / "validity.json").write_text(text + "\n", encoding="utf-8")
