@@ -399,7 +399,7 @@ the limits against CalculiX are held by tests.
 The gap between springs and FEM is a measurement, not a test: it is in the last tables. What is tested is that
 the springs do what a lattice of springs must, and the finite elements what their law says. Where a figure is of finite
 elements the last column is their own error: their distance from the limit of finer and finer meshes, root mean square
-over the nodes ([what that is](study.md#how-far-a-reference-is-itself-off)).
+over the nodes ([definition](study.md#error-of-a-reference)).
 """
 
 
