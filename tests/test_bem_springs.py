@@ -11,7 +11,6 @@ import truespring as ts
 from tests.studies import changed, written
 from truespring.arrays import Floats
 from truespring.errors import StudyError
-from truespring.models import model_warnings
 from truespring.models.bem_springs import BlockSprings
 from truespring.models.block import Block, make_block
 from truespring.models.boundary import Influence, Kelvin
@@ -479,7 +478,7 @@ def test_a_faulty_study_is_refused(change: tuple[str, str], said: str, tmp_path:
 
 def test_its_springs_are_judged_before_the_solve() -> None:
     problem = cantilever((8, 2), 1e-4)
-    assert any("0.882353 Pa" in text for text in model_warnings(problem, ts.BemSprings(HALF, "lloyd")))
+    assert any("0.882353 Pa" in text for text in ts.BemSprings(HALF, "lloyd").warnings(problem))
 
 
 def test_hooke_is_what_uniform_strain_is_compared_with() -> None:

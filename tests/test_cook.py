@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from truespring.models import model_warnings
 
 # The converged deflection at the middle of the loaded side, in plane stress, nu = 1/3 and E = t = F = 1.
 CONVERGED = 23.97
@@ -60,7 +59,7 @@ def test_springs_on_triangles_are_wrong_and_flagged(rule: str, diagonal: str) ->
     assert abs(WRONG[rule, diagonal] / CONVERGED - 1) > 0.2
     told = ts.moduli(problem, springs)
     assert told.patch_score > 1e-3 and not told.lattice
-    said = model_warnings(problem, springs)
+    said = springs.warnings(problem)
     assert any("Young's modulus" in text for text in said)
     assert any("patch test" in text and "biquadratic" in text for text in said)
 
@@ -78,7 +77,7 @@ def test_coupled_springs_are_the_finite_elements(diagonal: str) -> None:
     problem, springs = cook(16, "triangle", diagonal), ts.Springs("biquadratic")
     linear = deflection(problem, ts.Fem("linear", "linear"))
     assert deflection(problem, springs) == pytest.approx(linear, rel=1e-5)
-    assert model_warnings(problem, springs) == ()
+    assert springs.warnings(problem) == ()
 
 
 def test_coupled_springs_converge() -> None:

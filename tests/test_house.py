@@ -64,6 +64,8 @@ ALLOWED = {
         "material",
         "table",
         "units",
+        "potential",
+        "program",
     },
     "report": {
         "calibration",
@@ -110,9 +112,13 @@ ALLOWED = {
         "material",
         "table",
         "units",
+        "program",
     },
     "exports": {"outputs", "equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
-    "equilibrium": {"reactions", "models", "solvers", "potential", "problem", "mesh", "material"},
+    "equilibrium": {"program", "soundness", "solution", "models", "solvers", "potential", "problem", "mesh"},
+    "program": {"solution", "models", "solvers", "problem"},
+    "soundness": {"solution", "mesh"},
+    "solution": {"reactions", "models", "solvers", "potential", "problem", "mesh"},
     "reactions": {"problem", "loading"},
     "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
     "solvers": {"linear", "potential"},
@@ -129,10 +135,11 @@ ALLOWED = {
     "kernels": set(),
     "errors": set(),
     "arrays": set(),
+    "completing": set(),
     "memory": set(),
     "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "errors", "memory", "opening", "kernels"}
+OPEN_TO_ALL = {"arrays", "completing", "errors", "memory", "opening", "kernels"}
 HEAVY = {
     "matplotlib",
     "pyvista",

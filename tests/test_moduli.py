@@ -13,7 +13,6 @@ from scipy.spatial import Delaunay
 import truespring as ts
 from tests.closed_forms import periodic_elasticity, square_moduli, tensile_test, young_extremes
 from truespring.arrays import Floats
-from truespring.models import model_warnings
 
 THIRD = 1 / 3
 LLOYD, BULK, FULL = (5 / 16, 7 / 16), (3 / 8, 3 / 8), (17 / 56, 23 / 56)
@@ -429,7 +428,7 @@ def test_a_small_irregular_mesh_is_no_lattice(element: str, counts: tuple[int, i
     told = ts.moduli(problem, springs)
     assert not told.lattice
     assert told.patch_score > 1e-3
-    assert any("patch test" in said for said in model_warnings(problem, springs))
+    assert any("patch test" in said for said in springs.warnings(problem))
 
 
 def patch_error(mesh: ts.Mesh, model: ts.Springs | ts.Fem, poisson: float) -> float:

@@ -87,6 +87,7 @@ def path(
             )
         )
     values = {"label": "linear FEM", "kind": "fem", "status": ts.Status.CONVERGED, **more}
+    values |= {"has_springs": values["kind"] == "springs", "element": "linear" if values["kind"] == "fem" else None}
     return ts.Solution(problem=problem, states=tuple(states), **values)
 
 

@@ -78,6 +78,7 @@ def path(problem: ts.Problem, share: float, levels: Sequence[float] = (0.0, 0.5,
         for level in levels
     )
     values = {"label": "linear FEM", "kind": "fem", "status": ts.Status.CONVERGED, **more}
+    values |= {"has_springs": values["kind"] == "springs", "element": "linear" if values["kind"] == "fem" else None}
     return ts.Solution(problem=problem, states=states, **values)
 
 

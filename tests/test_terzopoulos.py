@@ -9,7 +9,6 @@ import truespring as ts
 from tests.studies import changed, written
 from truespring.arrays import Floats
 from truespring.errors import StudyError
-from truespring.models import model_warnings
 from truespring.study import read_study, run
 from truespring.study.run import plan
 
@@ -76,9 +75,9 @@ def test_the_boundary_of_the_paper_has_its_factor(counts: tuple[int, ...], facto
     mesh = ts.rectangle((1.0, 1.0), counts) if len(counts) == 2 else ts.box((1.0, 1.0, 1.0), counts)
     problem = body(mesh)
     assert ts.Terzopoulos().elasticity(problem)[0, 0] / YOUNG == pytest.approx(factor, rel=1e-13)
-    told = [text for text in model_warnings(problem, ts.Terzopoulos()) if "boundary" in text]
+    told = [text for text in ts.Terzopoulos().warnings(problem) if "boundary" in text]
     assert len(told) == 1 and f"{factor:.4g} along x, {factor:.4g} along y" in told[0]
-    assert not [text for text in model_warnings(problem, ts.Terzopoulos("trapezoid")) if "boundary" in text]
+    assert not [text for text in ts.Terzopoulos("trapezoid").warnings(problem) if "boundary" in text]
 
 
 @pytest.mark.parametrize("mesh", [ts.rectangle((3.6, 2.0), (3, 2)), ts.box((2.0, 1.1, 0.9), (2, 2, 1))])
@@ -92,15 +91,15 @@ def test_without_lateral_contraction_it_is_saint_venant_kirchhoff(mesh: ts.Mesh)
             for model in (ts.Terzopoulos("trapezoid"), ts.Fem("saint-venant-kirchhoff"))
         ]
         assert (abs(energies[0] / energies[1] - 1) < 1e-12) == same
-    assert not model_warnings(body(mesh, 0.0), ts.Terzopoulos("trapezoid"))
+    assert not ts.Terzopoulos("trapezoid").warnings(body(mesh, 0.0))
 
 
 def test_it_says_what_it_cannot_realise() -> None:
-    (told,) = model_warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 1 / 3), ts.Terzopoulos("trapezoid"))
+    (told,) = ts.Terzopoulos("trapezoid").warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 1 / 3))
     assert "Poisson's ratio is 0 where the material has 0.3333" in told
     # (C11 - 2 C66) / (C11 + 2 C66) of C11 = E, C66 = 3/8 E, and E at 45 degrees 4 / (2 / E + 8 / (3 E))
     assert f"{6 * YOUNG / 7:.6g} Pa and {1 / 7:.4g}" in told
-    (told,) = model_warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 0.3, SECTIONS[1]), ts.Terzopoulos("trapezoid"))
+    (told,) = ts.Terzopoulos("trapezoid").warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 0.3, SECTIONS[1]))
     assert f"the material has {0.3 / 0.7:.4g} in plane strain" in told
 
 

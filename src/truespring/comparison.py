@@ -276,7 +276,7 @@ def compare(
             f"no node of {model.label} lies within {reference.label}: are unit, axes and origin the same?"
         )
     watched = _watched(mine.path, inside, model, probe)
-    pairs = [(state, theirs.path.at(state.level)) for state in mine.path.states if state.level > 0]
+    pairs = [(state, theirs.path.at(state.level)) for state in mine.path.states if state.loaded]
     both = [(one, other) for one, other in pairs if other is not None]
     compared = ~outside & ~_dictated(mine.path, theirs.path)
     found = [_Distances.between(one, other, compared) for one, other in both]
@@ -357,7 +357,8 @@ def closest(comparisons: Mapping[str, Comparison]) -> str | None:
     errors = {name: one.rms_error for name, one in comparisons.items()}
     known = {name: error for name, error in errors.items() if error is not None}
     # Errors that differ by rounding are equal; finite elements come first among equals.
-    order = {name: (float(f"{error:.9g}"), comparisons[name].reference.kind != "fem") for name, error in known.items()}
+    is_fem = {name: comparisons[name].reference.element is not None for name in known}
+    order = {name: (float(f"{error:.9g}"), not is_fem[name]) for name, error in known.items()}
     return min(order, key=lambda name: order[name]) if order else None
 
 

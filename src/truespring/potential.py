@@ -83,7 +83,12 @@ class Stressed(Potential, Protocol):
 
 @runtime_checkable
 class Stretched(Potential, Protocol):
-    """A potential of springs, which can tell how far they are stretched."""
+    """A potential of springs: which nodes they join, and how far they are stretched."""
+
+    @property
+    def springs(self) -> Ints:
+        """The two nodes of each spring, shape (n_springs, 2)."""
+        ...
 
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length, shape (n_springs,)."""

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, compare
-from truespring.equilibrium import Solution, Solver, solve
+from truespring.equilibrium import Solution, solve
 from truespring.errors import MeshError, ModelError, TruespringError
 from truespring.mesh import (
     Box,
@@ -25,12 +25,12 @@ from truespring.mesh import (
     refuse_too_large,
     select_elements,
 )
-from truespring.models import Model
+from truespring.models import Model, as_model
 from truespring.models.bending import cell_counts
-from truespring.models.fem import SIMPLICES
+from truespring.models.interpolation import SIMPLICES
 from truespring.potential import Potential
 from truespring.problem import Problem, Region
-from truespring.solvers import Nearby, Newton
+from truespring.solvers import Newton, Solver, as_solver
 
 #: The order of convergence that refinement is taken to have: the lowest that is met, at clamps and corners. Bodies
 #: without these have twice that or more, and their error is overestimated: by half, and twofold at most.
@@ -103,7 +103,7 @@ def reference_error(
     problem: Problem, model: Model, solver: Solver | None = None, most_work: float = math.inf
 ) -> OwnError:
     """Solve a problem and return how far the solution is from its own limit, whatever that costs; see `own_error`."""
-    solver = solver or Newton()
+    solver = Newton() if solver is None else as_solver(solver)
     return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
@@ -119,6 +119,7 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> O
     """
     if not path.complete or not path.solved:
         return OwnError(None, "it was not solved to full load here")
+    model = as_model(model)
     found, spent = None, 0.0
     try:
         for finer in _finer(path, model):
@@ -142,15 +143,17 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> O
     return replace(found, work=spent + found.work)
 
 
-def _from_coarser(path: Solution, model: Any, solver: Solver, most_work: float) -> OwnError:
+def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float) -> OwnError:
     """How far a path is from its limit by the distance of a mesh of twice the size."""
+    if not model.any_mesh:
+        return OwnError(None, _OWN_MESH.format(model.label))
     try:
         problem = coarser_problem(path.problem)
         if path.newton_iterations * int((~problem.loading.held).sum()) ** _GROWTH > most_work:
             return OwnError(None, "other meshes cost too much")
         coarse = solve(problem, model, solver)
         against = compare(coarse, path)
-    except (TruespringError, AttributeError) as error:
+    except TruespringError as error:
         return OwnError(None, str(error))
     return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
 
@@ -165,27 +168,28 @@ def _whole(distance: float, left: float) -> float:
 
 
 _SECOND = "second order"
+_OWN_MESH = "{} can be solved on its own mesh only"
 
 
 class _Finer(NamedTuple):
     """A finer way to solve a problem, made when it is wanted, and the share of the error that it still has."""
 
     problem: Callable[[], Problem]
-    model: Any
+    model: Model
     how: str
     left: float
     n_unknowns: int
 
 
-def _finer(path: Solution, model: Any) -> Iterator[_Finer]:
+def _finer(path: Solution, model: Model) -> Iterator[_Finer]:
     """Yield finer and finer ways to solve the problem of a path."""
     problem, n_unknowns = path.problem, path.n_unknowns
     growth = 2**problem.mesh.dim
-    better = model.second_order(problem) if hasattr(model, "second_order") else None
+    better = model.second_order(problem)
     if better is not None:
         yield _Finer(partial(simplex_problem, problem), better, _SECOND, SECOND_ORDER, growth * n_unknowns)
-    if not hasattr(model, "potential"):
-        raise ModelError(f"{getattr(model, 'label', model)} can be solved on its own mesh only")
+    if not model.any_mesh:
+        raise ModelError(_OWN_MESH.format(model.label))
     for halvings in range(1, _LEVELS + 1):
         left = 2 ** (-ORDER * halvings)
         make = partial(_halved, problem, halvings)
@@ -198,14 +202,13 @@ def _halved(problem: Problem, times: int) -> Problem:
     return problem
 
 
-def in_second_order(problem: Problem, model: Any) -> tuple[Problem, Any] | None:
+def in_second_order(problem: Problem, model: Model) -> tuple[Problem, Model] | None:
     """Return a problem on simplices of the same nodes, and the model of second order for it.
 
     None where the model has no such elements, is of them already, where its elements were chosen by name, or where the
     mesh cannot be divided into simplices.
     """
-    chosen = getattr(model, "element", None) is not None or not hasattr(model, "element")
-    if chosen or problem.mesh.element in SIMPLICES:
+    if not model.element_is_open or problem.mesh.element in SIMPLICES:
         return None
     try:
         return simplex_problem(problem), model
@@ -280,11 +283,9 @@ def _by_groups(problem: Problem) -> Problem:
 def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float) -> Solution:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
     problem = finer.problem()
-    if isinstance(solver, Newton):
-        # From a state that is near, so that the path is not taken again, and on the same branch.
-        nearby = Nearby(
-            1, solver.tolerance, _MOST_ITERATIONS, method=solver.method, linear=solver.linear, start=_carrying(coarse)
-        )
+    # From a state that is near, so that the path is not taken again, and on the same branch.
+    nearby = solver.starting_at(_carrying(coarse), _MOST_ITERATIONS)
+    if nearby is not None:
         path = solve(problem, finer.model, nearby)
         if _sound(path):
             return path

@@ -16,10 +16,7 @@ from truespring.errors import ProblemError
 from truespring.mesh import Grid
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, leading_support, resultant_rows
-from truespring.solvers import Newton
-
-# Levels this near are one.
-_SAME_LEVEL = 2e-6
+from truespring.solvers import Newton, Solver
 
 Rows = sparse.csr_array[Any, tuple[int, int]]
 
@@ -74,7 +71,7 @@ class LoadCase:
     problem: Problem
     reference: Solution | None = None
     curve: Curve | None = None
-    solver: Newton = field(default_factory=Newton)
+    solver: Solver = field(default_factory=Newton)
     against: str = ""
     own_error: float | None = None
 
@@ -82,7 +79,7 @@ class LoadCase:
         if not self.against:
             known = "what was measured" if self.reference is None else self.reference.label
             object.__setattr__(self, "against", known)
-        if not isinstance(self.solver, Newton):
+        if not self.solver.follows_load:
             raise ProblemError(
                 f'{self.name}: springs are calibrated under load control, with Newton: take control = "load"'
             )

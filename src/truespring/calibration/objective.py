@@ -15,6 +15,7 @@ from truespring.errors import ModelError
 from truespring.linear.choice import Tangent, choose
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError
+from truespring.solvers import Newton
 from truespring.solvers.balance import Balance
 
 # Relative residual of the linear systems behind a gradient. Iterative solvers hold their matrix in single precision: so
@@ -168,7 +169,8 @@ class _At:
         potential = paths[one.case].potential
         assert potential is not None  # it was solved
         linear = choose(case.solver.linear, potential.nodes, loading.held)
-        balance = Balance(potential, loading, case.solver.tolerance, case.solver.max_iterations, linear)
+        usual = Newton()
+        balance = Balance(potential, loading, usual.tolerance, usual.max_iterations, linear)
         self.shape, self._free, self._positions, self._balance = positions.shape, ~loading.held, positions, balance
         self._matrix = balance.hessian(positions, state.load_factor)
         try:

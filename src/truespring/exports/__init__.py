@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from truespring.equilibrium import Solver
 from truespring.errors import ExportError, nearest
 from truespring.exports.abaqus import abaqus
 from truespring.exports.arrays import as_json, npz
@@ -16,9 +15,10 @@ from truespring.exports.exported import plain_springs
 from truespring.exports.exported import solve_springs as solve_springs
 from truespring.exports.mujoco import mujoco
 from truespring.exports.sofa import sofa
-from truespring.models import SpringModel, SpringNetwork
+from truespring.models import Model, SpringNetwork, as_model
 from truespring.outputs import Output
 from truespring.problem import Problem
+from truespring.solvers import Solver
 
 #: The content of each file by its name: text, or bytes.
 Files = Mapping[str, str | bytes]
@@ -75,7 +75,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
 
 def export(
     problem: Problem,
-    model: SpringModel,
+    model: Model,
     target: str,
     folder: str | Path,
     solver: Solver | None = None,
@@ -103,11 +103,11 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
     return several
 
 
-def check_targets(names: Collection[str], problem: Problem, model: SpringModel) -> None:
+def check_targets(names: Collection[str], problem: Problem, model: Model) -> None:
     """Raise ExportError for what a target cannot take, and for two that write one file; solve nothing."""
-    if not isinstance(model, SpringModel):
+    if not as_model(model).has_springs:
         raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
-    springs = model if isinstance(model, SpringNetwork) else model.potential(problem)
+    springs = model.potential(problem)
     written: dict[str, str] = {}
     for name in names:
         target = TARGETS[name]

@@ -8,16 +8,16 @@ from importlib.metadata import version
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.equilibrium import Solution, Solver, State, Status, solve
+from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import PlaneStrain, PlaneStress
 from truespring.mesh import Box, Near, Plane, Selection
 from truespring.mesh.selections import AXES
-from truespring.models import SpringModel, SpringNetwork, VolumeSprings
+from truespring.models import Model, SpringNetwork, VolumeSprings
 from truespring.potential import Potential
 from truespring.problem import Load, Problem
-from truespring.solvers import DisplacementControl, Newton, Reporter
+from truespring.solvers import Newton, Reporter, Solver, as_solver
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +206,7 @@ def plain_springs(springs: Potential | None, program: str, negative: bool = True
 
 def solve_springs(
     problem: Problem,
-    model: SpringModel,
+    model: Model,
     solver: Solver | None = None,
     title: str = "Springs",
     probe: int | None = None,
@@ -217,9 +217,9 @@ def solve_springs(
     A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
     programs put the load on. `probe` is by default the free node that moves most.
     """
-    chosen, remarks = solver or Newton(), []
-    steps = chosen.steps if isinstance(chosen, DisplacementControl) else chosen.load_steps
-    if not isinstance(chosen, Newton):
+    chosen, remarks = Newton() if solver is None else as_solver(solver), []
+    steps = chosen.load_steps
+    if not chosen.follows_load:
         chosen = Newton(load_steps=steps)
         remarks = ["The load is taken up in steps here, not followed past limit points as it was asked."]
     path = solve(problem, model, chosen, report)

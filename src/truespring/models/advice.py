@@ -6,27 +6,22 @@ from typing import Any
 import numpy as np
 
 from truespring.material import PlaneStrain
-from truespring.models.fitness import springs_lock
+from truespring.models.interpolation import locks
+from truespring.models.lattice import Lattice
 from truespring.models.moduli import Moduli, moduli
-from truespring.models.springs import Springs
 from truespring.problem import Problem
 
 # Moduli within this share are the material's, a bending factor within that one is worth no word.
 _SAME_MODULI, _SAME_BENDING = 0.01, 0.05
 
 
-def model_warnings(problem: Problem, model: Any) -> tuple[str, ...]:
-    """Return what should be known of a model: springs of other moduli than the material's, elements that lock.
-
-    Models other than springs tell it themselves, by a method `warnings(problem)`, if there is anything to tell.
-    """
-    if not isinstance(model, Springs):
-        return tuple(model.warnings(problem)) if hasattr(model, "warnings") else ()
+def springs_warnings(problem: Problem, springs: Lattice) -> tuple[str, ...]:
+    """Return what should be known of springs: moduli other than the material's, springs that lock, in sentences."""
     found: dict[str, list[str]] = {}  # each warning once, with its materials
     for twin in problem.homogeneous:
         material = twin.material
         assert material is not None  # springs have asked for it
-        for text in _springs_warnings(twin, model, moduli(twin, model)):
+        for text in _springs_warnings(twin, springs, moduli(twin, springs)):
             found.setdefault(text, []).append(f"E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}")
     everywhere = len(problem.homogeneous)
     return tuple(
@@ -34,7 +29,7 @@ def model_warnings(problem: Problem, model: Any) -> tuple[str, ...]:
     )
 
 
-def _springs_warnings(problem: Problem, springs: Springs, realised: Moduli) -> Iterator[str]:
+def _springs_warnings(problem: Problem, springs: Lattice, realised: Moduli) -> Iterator[str]:
     yield from _moduli_warning(problem, realised)
     if not realised.stable:
         yield "these springs are not stable at rest: nodes inside the body have no positive stiffness"
@@ -99,3 +94,9 @@ def _moduli_warning(problem: Problem, realised: Moduli) -> Iterator[str]:
         f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
         f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
     )
+
+
+def springs_lock(twin: Problem, springs: Lattice) -> bool:
+    """Return whether springs are too stiff as linear finite elements are: coupled ones, and a term in each simplex."""
+    simplices = twin.mesh.element in ("triangle", "tetrahedron")
+    return locks(twin) and (springs.coupled or (springs.volume and simplices))

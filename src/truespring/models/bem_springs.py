@@ -12,6 +12,7 @@ from truespring.loading import Gravity
 from truespring.mesh import Mesh, Selection, select_elements
 from truespring.models.block import inner_nodes, make_block
 from truespring.models.frames import AtRest, Frame, Tangent, Turning
+from truespring.models.model import Model
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, require_body
 from truespring.models.springs import Springs
@@ -20,7 +21,7 @@ from truespring.problem import Problem
 
 
 @dataclass(frozen=True)
-class BemSprings:
+class BemSprings(Model):
     """A block of boundary elements beside springs, coupled at the nodes that they share.
 
     The block is linear elastic material, known by its surface only (see `make_block`). All other elements carry the
@@ -97,9 +98,7 @@ class BemSprings:
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
         """Return what should be known before the model is solved: what its springs do not realise."""
-        from truespring.models.advice import model_warnings
-
-        return tuple(f"beside the block: {text}" for text in model_warnings(problem, Springs(self.rule)))
+        return tuple(f"beside the block: {text}" for text in Springs(self.rule).warnings(problem))
 
 
 def _refuse_apart(mesh: Mesh, chosen: Bools) -> None:

@@ -8,10 +8,12 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.memory import remembered
 from truespring.mesh import Mesh
-from truespring.models.fem import Fem, FemPotential, element_matrices
+from truespring.models.fem_potential import FemPotential, element_matrices
+from truespring.models.finite_elements import fem_potential
+from truespring.models.interpolation import chosen_interpolation
+from truespring.models.lattice import Lattice
 from truespring.models.links import CORNERS, all_alike, link_vectors
 from truespring.models.rules import require_body
-from truespring.models.springs import Springs
 from truespring.models.volume import VolumeTerm
 from truespring.problem import Problem, sample
 
@@ -31,7 +33,7 @@ def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:
 
 
 def bending_factors(
-    problem: Problem, springs: Springs | None, sizes: dict[int, tuple[int, ...]]
+    problem: Problem, springs: Lattice | None, sizes: dict[int, tuple[int, ...]]
 ) -> MappingProxyType[int, float]:
     """Return bending factors by depth, of sections of so many elements through depth (and width).
 
@@ -82,7 +84,7 @@ def bending_excess(problem: Problem) -> float:
     return max(found)
 
 
-def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int, ...]) -> float:
+def _bending_factor(problem: Problem, springs: Lattice | None, counts: tuple[int, ...]) -> float:
     """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
 
     A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
@@ -120,10 +122,10 @@ def _bending_factor(problem: Problem, springs: Springs | None, counts: tuple[int
     return float(energy / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
 
 
-def _element_matrix(problem: Problem, springs: Springs | None, share: Floats | None = None) -> Floats:
+def _element_matrix(problem: Problem, springs: Lattice | None, share: Floats | None = None) -> Floats:
     """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
     if springs is None:
-        elements = Fem("linear").potential(problem)
+        elements = fem_potential(problem, "linear", chosen_interpolation(problem))
         assert isinstance(elements, FemPotential)  # of one kind, as `cell_counts` sees to
         return np.asarray(elements.element_hessians(problem.mesh.nodes)[0])
     if springs.coupled:  # these are FEM

@@ -12,9 +12,11 @@ from truespring.loading import Fixed
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.memory import remembered
 from truespring.mesh import Mesh, box, plural, rectangle
+from truespring.models.advice import springs_lock
 from truespring.models.bending import bending_excess
 from truespring.models.elasticity import hooke, lattice_classes
-from truespring.models.fem import SIMPLICES, fem_potential, locks
+from truespring.models.finite_elements import fem_potential
+from truespring.models.interpolation import SIMPLICES
 from truespring.models.moduli import Moduli, moduli, spring_counts
 from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import RULES, require_body
@@ -261,12 +263,6 @@ def _remarks(twin: Problem, springs: Springs, tolerance: float) -> Iterator[str]
         yield "the volume term is negative: at large stretch nothing bounds the energy from below"
     if springs_lock(twin, springs) and not springs.coupled:  # of these it is a fault
         yield f"at a Poisson's ratio of {material.poisson:g} this mesh locks with them, as with linear finite elements"
-
-
-def springs_lock(twin: Problem, springs: Springs) -> bool:
-    """Return whether springs are too stiff as linear finite elements are: coupled ones, and a term in each simplex."""
-    simplices = twin.mesh.element in ("triangle", "tetrahedron")
-    return locks(twin) and (springs.coupled or (springs.volume and simplices))
 
 
 def _unbounded(twin: Problem, springs: Springs) -> bool:

@@ -7,13 +7,15 @@ import numpy as np
 from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import ModelError
 from truespring.models.mechanism import refuse_mechanism
+from truespring.models.model import Model
 from truespring.models.network import SpringNetwork
-from truespring.models.volume import VolumeSprings, VolumeTerm
+from truespring.models.volume import VolumeTerm
+from truespring.models.volume_springs import VolumeSprings
 from truespring.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class GivenSprings:
+class GivenSprings(Model):
     """The springs of a mesh, each with a stiffness of its own, and a modulus of the volume term of each element.
 
     No rule stands behind them and no lattice repeats itself: moduli are not told of them.
@@ -33,6 +35,7 @@ class GivenSprings:
     label: str = "springs (given)"
 
     kind = "springs"
+    has_springs = True
 
     def __post_init__(self) -> None:
         try:

@@ -1,6 +1,6 @@
 """HEML, hyper-elastic mass links: the energy of a finite element told by the squared lengths of its links."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import factorial
 from typing import NamedTuple
@@ -10,10 +10,14 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import Fem, FemPotential, fem_of_one_kind, fem_potential, locking_warnings
+from truespring.models.fem import Fem
+from truespring.models.fem_potential import FemPotential, fem_of_one_kind
+from truespring.models.finite_elements import fem_potential
+from truespring.models.interpolation import locking_warnings
 from truespring.models.laws import LAWS, Response
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
+from truespring.models.model import Model
 from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
@@ -27,16 +31,17 @@ _SIMPLICES = ("triangle", "tetrahedron")
 
 
 @dataclass(frozen=True)
-class Heml:
+class Heml(Model):
     """Hyper-elastic mass links (Goulette and Chen 2015), by the law of the material.
 
     Attributes:
         law: saint-venant-kirchhoff on any element; neo-hookean or hencky on triangles and tetrahedra.
     """
 
-    law: str
+    law: str = field()
 
     kind = "heml"
+    lines = "links"
 
     def __post_init__(self) -> None:
         if self.law == "linear":

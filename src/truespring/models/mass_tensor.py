@@ -1,6 +1,6 @@
 """The mass-tensor method: forces as polynomials of the displacements, by tensors that are computed once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations_with_replacement
 
@@ -10,8 +10,12 @@ from truespring.arrays import Floats, Ints, ShortInts
 from truespring.errors import ModelError, nearest
 from truespring.memory import slices
 from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.fem import Fem, FemPotential, fem_of_one_kind, fem_potential, locking_warnings
+from truespring.models.fem import Fem
+from truespring.models.fem_potential import FemPotential, fem_of_one_kind
+from truespring.models.finite_elements import fem_potential
+from truespring.models.interpolation import locking_warnings
 from truespring.models.laws import LAWS
+from truespring.models.model import Model
 from truespring.models.strain import voigt_pairs
 from truespring.models.summed import SummedElements
 from truespring.models.symmetric import identity
@@ -26,14 +30,14 @@ _SMALLEST_PIECE = 256
 
 
 @dataclass(frozen=True)
-class MassTensor:
+class MassTensor(Model):
     """The mass-tensor method (Cotin, Delingette, Ayache 1999; nonlinear: Picinbono, Delingette, Ayache 2003).
 
     Attributes:
         law: linear on any element; saint-venant-kirchhoff on triangles and tetrahedra.
     """
 
-    law: str
+    law: str = field()
 
     kind = "mass-tensor"
 
@@ -51,6 +55,11 @@ class MassTensor:
     def label(self) -> str:
         """How curves and tables call the model."""
         return f"mass-tensor ({LAWS[self.law].label.removesuffix(' FEM')})"
+
+    @property
+    def finite(self) -> bool:
+        """Whether strains are finite: false for the linear law."""
+        return LAWS[self.law].finite
 
     def second_order(self, problem: Problem) -> Fem:
         """Return the finite elements of second order of the same law: where finer meshes of this model lead."""

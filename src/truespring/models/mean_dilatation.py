@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.fem import FemPotential, Points, determinant
+from truespring.models.fem_potential import FemPotential, Points, determinant
 from truespring.models.symmetric import contracted, identity, inverted, outer, swapped
 
 

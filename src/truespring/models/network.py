@@ -10,11 +10,14 @@ import numpy as np
 from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_ints
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
+from truespring.models.mechanism import refuse_mechanism
+from truespring.models.model import Model
 from truespring.potential import Pattern, SparseMatrix
+from truespring.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class SpringNetwork:
+class SpringNetwork(Model):
     """Nodes joined by linear springs: the spring force of Lembryk and Ciszkiewicz, equation 3.
 
     Attributes:
@@ -31,6 +34,9 @@ class SpringNetwork:
     springs: Ints
     stiffness: Floats
     rest_length: Floats = field(default_factory=lambda: np.zeros(0))
+
+    kind = "springs"
+    has_springs = True
 
     def __post_init__(self) -> None:
         try:
@@ -62,6 +68,16 @@ class SpringNetwork:
         loops = self.springs[:, 0] == self.springs[:, 1]
         if loops.any():
             raise ModelError(f"spring {int(loops.argmax())} joins node {self.springs[loops][0, 0]} to itself")
+
+    @property
+    def label(self) -> str:
+        """The name of the springs in figures and tables."""
+        return "springs"
+
+    def potential(self, problem: Problem) -> "SpringNetwork":
+        """Return the network itself; raise ModelError where its nodes can move without any spring changing length."""
+        refuse_mechanism(self, problem.loading.held)
+        return self
 
     @cached_property
     def mesh(self) -> Mesh:

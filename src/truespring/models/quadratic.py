@@ -9,7 +9,8 @@ import skfem
 from truespring.arrays import Bools, Floats, Ints
 from truespring.loading import nodal_force
 from truespring.mesh import Grid, SecondOrder, edge_numbers
-from truespring.models.fem import FemPotential, Reference, reference_element
+from truespring.models.fem_potential import FemPotential
+from truespring.models.reference_element import Reference, reference_element
 from truespring.potential import Loading, Turn
 
 # scikit-fem's element of second order and its order of quadrature, 3 points in a triangle and 4 in a tetrahedron; its

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.fem import Points, determinant
+from truespring.models.fem_potential import Points, determinant
 from truespring.models.laws import Response
 from truespring.models.quadratic import QuadraticPotential
 from truespring.models.symmetric import contracted, identity, inverted, outer, swapped, trace

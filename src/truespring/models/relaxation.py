@@ -1,7 +1,5 @@
 """Linear equilibrium of springs near rest, for what is told of them before a solve."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import linalg, sparse
 
@@ -10,9 +8,9 @@ from truespring.linear.choice import choose
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError
 from truespring.mesh import MIXED, Mesh
+from truespring.models.lattice import Lattice
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
-from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
 from truespring.potential import SparseMatrix, rigid_body_modes
 from truespring.problem import Problem
@@ -25,7 +23,7 @@ _ACCURACY = 1e-6
 
 
 def relaxed_elasticity(
-    problem: Problem, springs: Springs, stiffness: Floats, negative: bool
+    problem: Problem, springs: Lattice, stiffness: Floats, negative: bool
 ) -> tuple[Floats | None, float]:
     """Return the elasticity of a body whose boundary is strained uniformly [Pa], and its patch score (see `Moduli`).
 
@@ -65,9 +63,9 @@ def _unit_strains(mesh: Mesh) -> Floats:
     return np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
 
 
-def _at_rest(problem: Problem, springs: Springs) -> SparseMatrix:
+def _at_rest(problem: Problem, springs: Lattice) -> SparseMatrix:
     """The stiffness of the body at rest [N/m]."""
-    return replace(springs, allow_negative=True).potential(problem).hessian(problem.mesh.nodes)
+    return springs.allowing_negative().potential(problem).hessian(problem.mesh.nodes)
 
 
 def _forces_by_form(mesh: Mesh, stiffness: Floats) -> Floats:

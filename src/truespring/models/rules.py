@@ -19,7 +19,7 @@ from truespring.material import Material, Section
 from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
-from truespring.models.fem import fem_of_one_kind
+from truespring.models.fem_potential import fem_of_one_kind
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
 from truespring.problem import Problem, sample
 

@@ -1,6 +1,7 @@
 """Springs: a body idealised as nodes joined by springs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,14 +9,18 @@ from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.mesh import Mesh
+from truespring.models.advice import springs_warnings
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.linked import LinkedElements
 from truespring.models.links import in_a_row
+from truespring.models.model import Model
+from truespring.models.moduli import Moduli, moduli
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
 from truespring.models.summed import SummedLinks, summed_links
-from truespring.models.volume import VolumeSprings, VolumeTerm
+from truespring.models.volume import VolumeTerm
+from truespring.models.volume_springs import VolumeSprings
 from truespring.problem import Problem
 
 # A lattice whose elasticity is within this share of an isotropic one takes a volume term.
@@ -23,7 +28,7 @@ _ISOTROPIC = 1e-6
 
 
 @dataclass(frozen=True)
-class Springs:
+class Springs(Model):
     """The mass-spring model: the edges and diagonals of every element carry springs.
 
     Attributes:
@@ -64,6 +69,7 @@ class Springs:
             raise ModelError(f"rule = '{self.rule}' realises any Poisson's ratio by itself: leave volume out")
 
     kind = "springs"
+    has_springs = True
 
     @property
     def coupled(self) -> bool:
@@ -145,6 +151,23 @@ class Springs:
         network = self.network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
+    def check(self, problem: Problem) -> None:
+        """Raise ModelError where the springs do not fit the problem, or do not resist every strain."""
+        self.potential(problem)
+        self.moduli(problem.homogeneous[0])
+
+    def moduli(self, problem: Problem) -> Moduli:
+        """Return the effective moduli on the problem's mesh, all of it of its own material."""
+        return moduli(problem, self)
+
+    def warnings(self, problem: Problem) -> tuple[str, ...]:
+        """Return what should be known of the springs: moduli other than the material's, springs that lock."""
+        return springs_warnings(problem, self)
+
+    def allowing_negative(self) -> "Springs":
+        """Return the same springs, those of negative stiffness allowed."""
+        return replace(self, allow_negative=True)
+
     def network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
         """Return the springs of the given stiffness of each element's links [N/m], shape (n_elements, links)."""
         mesh = problem.mesh
@@ -164,6 +187,11 @@ class Springs:
                 "another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)
+
+
+def springs_by_rule(models: Mapping[str, object]) -> dict[str, Springs]:
+    """Return those of several models that are springs by a rule or of the user's numbers, by name."""
+    return {name: model for name, model in models.items() if isinstance(model, Springs)}
 
 
 def shared_springs(mesh: Mesh) -> tuple[Ints, Ints]:

@@ -12,6 +12,7 @@ from truespring.material import PlaneStrain
 from truespring.mesh.rows import distinct_rows
 from truespring.mesh.selections import AXES
 from truespring.models.metric import Component, MetricPotential, components
+from truespring.models.model import Model
 from truespring.models.rules import require_body
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
@@ -26,7 +27,7 @@ _SAME_POISSON = 0.01
 
 
 @dataclass(frozen=True)
-class Terzopoulos:
+class Terzopoulos(Model):
     """The metric-tensor model of Terzopoulos, Platt, Barr and Fleischer (SIGGRAPH 1987), of bodies on a regular grid.
 
     Its energy is the integral of sum eta_ij (G_ij - G0_ij)^2, G_ij = dr/da_i . dr/da_j, by forward differences. With

@@ -1,7 +1,6 @@
 """Paths from elsewhere: results of other programs."""
 
 from truespring.reference.calculix import CalculiX as CalculiX
-from truespring.reference.calculix import Program as Program
 from truespring.reference.placing import Placing as Placing
 from truespring.reference.placing import placed as placed
 from truespring.reference.record import Level as Level

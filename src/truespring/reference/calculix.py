@@ -5,78 +5,63 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.equilibrium import Solution, Solver, State, Status
+from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside, second_order, usual_element
 from truespring.exports.exported import plain_springs
 from truespring.loading import Pressure
 from truespring.material import PlaneStress
-from truespring.models import Fem, SpringModel, SpringNetwork
+from truespring.models import Fem, Model, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import on_the_mesh
 from truespring.problem import Problem
+from truespring.program import Program
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
 from truespring.reference.dat import read_dat
 from truespring.reference.record import Level
 from truespring.reference.scan import scanning
-from truespring.solvers import Newton, Reporter
-
-
-@runtime_checkable
-class Program(Protocol):
-    """A model that another program solves: what yields a path though it has no potential here."""
-
-    @property
-    def kind(self) -> str:
-        """The word of the study file."""
-        ...
-
-    def label_on(self, problem: Problem) -> str:
-        """Return how curves and tables call the model of this problem."""
-        ...
-
-    def check(self, problem: Problem, solver: Solver) -> None:
-        """Raise TruespringError, before anything is solved, where it cannot be run."""
-        ...
-
-    def run(
-        self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
-    ) -> Solution:
-        """Follow the equilibria at the load levels that the solver asks for, for `timeout` seconds at most."""
-        ...
+from truespring.solvers import Reporter, Solver
 
 
 @dataclass(frozen=True)
-class CalculiX:
+class CalculiX(Program):
     """The problem in CalculiX: finite elements, or the SPRINGA twin of a spring model.
 
     Attributes:
-        law: "linear", or "saint-venant-kirchhoff", which is NLGEOM; not asked for where there are springs.
+        law: "linear", or "saint-venant-kirchhoff", the default, which is NLGEOM; None where there are springs.
         springs: a model or network of springs instead of a continuum.
         element: "linear", or "quadratic" on triangles and tetrahedra, where it is the default; not of springs.
     """
 
-    law: str = "saint-venant-kirchhoff"
-    springs: SpringModel | None = None
+    law: str | None = None
+    springs: Model | None = None
     element: str | None = None
 
     kind = "calculix"
 
     def __post_init__(self) -> None:
-        if self.law not in LAWS:
+        if self.springs is not None:
+            object.__setattr__(self, "law", None)
+        elif self.law is None:
+            object.__setattr__(self, "law", "saint-venant-kirchhoff")
+        elif self.law not in LAWS:
             raise ModelError(f"law = '{self.law}': CalculiX has {' and '.join(LAWS)} in common with truespring")
 
     def label_on(self, problem: Problem) -> str:
         """Return the label, with the type of the elements."""
         if self.springs is not None:
             return "CalculiX SPRINGA NLGEOM"
-        return f"CalculiX {fem_element(problem, self._element(problem))} {'linear' if self._linear else 'NLGEOM'}"
+        return f"CalculiX {fem_element(problem, self._element(problem))} {'NLGEOM' if self.finite else 'linear'}"
+
+    @property
+    def _law(self) -> str:
+        """The law of the elements."""
+        return str(self.law)
 
     def _element(self, problem: Problem) -> str:
         return self.element or usual_element(problem)
@@ -86,28 +71,33 @@ class CalculiX:
         return None if self.springs is not None else second_order(problem, self._element(problem))
 
     @property
-    def _linear(self) -> bool:
-        return self.springs is None and self.law == "linear"
+    def finite(self) -> bool:
+        """Whether strains are finite: false for the linear law."""
+        return self.springs is not None or self.law != "linear"
+
+    @property
+    def element_is_open(self) -> bool:
+        """Whether the mesh decides on the elements."""
+        return self.springs is None and self.element is None
 
     def second_order(self, problem: Problem) -> Fem | None:
         """Return finite elements of second order of the same law, to which the elements of CalculiX converge too."""
         first = self.springs is None and self._element(problem) == "linear"
-        return Fem(self.law) if first else None
+        return Fem(self._law) if first else None
 
-    def check(self, problem: Problem, solver: Solver) -> None:
+    def check_run(self, problem: Problem, solver: Solver) -> None:
         """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""
-        if not isinstance(solver, Newton):
+        if not solver.follows_load:
             raise ModelError('CalculiX follows the load only: take control = "load", or leave this model out')
         find_ccx()
         if self._network(problem) is None:
-            check_fem(problem, self.law, self._element(problem))
+            check_fem(problem, self._law, self._element(problem))
 
     def _network(self, problem: Problem) -> SpringNetwork | None:
         """The springs; refused where they are more than SPRINGA elements can be."""
         if self.springs is None:
             return None
-        potential = self.springs if isinstance(self.springs, SpringNetwork) else self.springs.potential(problem)
-        network = plain_springs(potential, "CalculiX")
+        network = plain_springs(self.springs.potential(problem), "CalculiX")
         check_springs(problem, network)
         return network
 
@@ -118,14 +108,13 @@ class CalculiX:
 
         A run that does not converge is not an exception, nor is one that takes longer than `timeout` seconds, by
         default an hour: the path ends at the last level reached. Raises ModelError
-        and ExportError as `check` does.
+        and ExportError as `check_run` does.
         """
-        self.check(problem, solver)
-        assert isinstance(solver, Newton)
+        self.check_run(problem, solver)
         levels = [(number + 1) / solver.load_steps for number in range(solver.load_steps)]
         network = self._network(problem)
         if network is None:
-            deck = fem_deck(problem, levels, self.law, self._element(problem))
+            deck = fem_deck(problem, levels, self._law, self._element(problem))
         else:
             deck = spring_deck(problem, network, levels)
         finer = self._finer(problem)
@@ -162,7 +151,7 @@ class CalculiX:
         finer: QuadraticPotential | None,
     ) -> Solution:
         status, warnings = Status.CONVERGED, []
-        if any(state.area_ratio <= 0 for state in states) and not self._linear:
+        if any(state.area_ratio <= 0 for state in states) and self.finite:
             status = Status.INVERTED
             first = next(state for state in states if state.area_ratio <= 0)
             warnings.append(
@@ -184,7 +173,7 @@ class CalculiX:
                 "increment only, and took several to a level"
             )
         pressed = any(isinstance(load, Pressure) for load in problem.loads)
-        if pressed and isinstance(problem.section, PlaneStress) and not self._linear:
+        if pressed and isinstance(problem.section, PlaneStress) and self.finite:
             warnings.append(
                 "the pressure acts on the thickness as it becomes, in truespring's own models on that at rest: plane "
                 "strain has no such difference"
@@ -194,6 +183,8 @@ class CalculiX:
             problem=problem,
             label=self.label_on(problem),
             kind=self.kind,
+            finite=self.finite,
+            lines=self.lines,
             states=tuple(states),
             status=status,
             warnings=tuple(warnings),
@@ -217,7 +208,7 @@ class CalculiX:
         nodes = mesh.nodes if finer is None else finer.nodes
         everywhere = nodes + level.displacement[:, : mesh.dim]
         positions = everywhere[: mesh.n_nodes]
-        external = loading.force(nodes if self._linear else everywhere, load_factor)
+        external = loading.force(everywhere if self.finite else nodes, load_factor)
         reaction = np.where(loading.held, internal[:, : mesh.dim] - external, 0.0)
         energy = math.nan if level.energy is None or (effort and effort.increments > 1) else level.energy
         stretch = None if network is None else network.stretch(positions)

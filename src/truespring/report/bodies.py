@@ -33,7 +33,7 @@ def spring_lines(path: Solution) -> Ints | None:
 
 def spring_word(path: Solution) -> str:
     """Return what these are called."""
-    return "links" if path.kind == "heml" else "springs"
+    return path.lines
 
 
 def path_lines(path: Solution) -> Ints:

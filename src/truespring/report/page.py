@@ -17,7 +17,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, Status
 from truespring.material import Material, PlaneStrain, PlaneStress
 from truespring.mesh import Box, select_elements
-from truespring.models import FiniteElements, Moduli
+from truespring.models import Moduli
 from truespring.problem import Problem, Region
 from truespring.report.figures import Drawing, distance_name, over_name, render_figures
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
@@ -188,8 +188,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
 
 def _element_facts(result: Result) -> list[tuple[str, str]]:
     """Elements of FEM that are not linear ones."""
-    potentials = [path.potential for path in result.paths.values()]
-    used = {one.interpolation for one in potentials if isinstance(one, FiniteElements)}
+    used = {path.element for path in result.paths.values()}
     told = {
         "mean-dilatation": "of mean dilatation, which do not lock where the material is nearly incompressible",
         "quadratic": "of second order, with nodes in the middle of the edges",

@@ -46,10 +46,10 @@ def own_error_sentence(result: Result, called: dict[str, str]) -> str | None:
 def _who(result: Result, names: list[str], one: str, several: str) -> str:
     """A reference by its label, several by what they are, on their mesh, and their verb."""
     labels = {result.paths[name].label for name in names}
-    kinds = {result.paths[name].kind for name in names}
-    if kinds == {"springs"}:
+    paths = [result.paths[name] for name in names]
+    if all(path.has_springs for path in paths):
         return f"springs on this mesh {several} themselves"
-    who = labels.pop() if len(labels) == 1 else "FEM" if kinds == {"fem"} else "each reference"
+    who = labels.pop() if len(labels) == 1 else "FEM" if all(path.element for path in paths) else "each reference"
     return f"{who} on this mesh {one} itself"
 
 

@@ -67,7 +67,7 @@ def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
 
 def is_strong(result: Result, name: str) -> bool:
     """Tell whether a path is drawn in blue: springs, and what is compared."""
-    return name == result.model or result.paths[name].kind == "springs"
+    return name == result.model or result.paths[name].has_springs
 
 
 def full_name(result: Result, name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError
 from truespring.equilibrium import Solution
-from truespring.models import FiniteElements, Moduli
+from truespring.models import Moduli
 from truespring.reactions import moved_supports
 from truespring.report.result import Result
 
@@ -47,8 +47,8 @@ def _model(path: Solution, probe: int) -> dict[str, Any]:
         "warnings": list(path.warnings),
         "solver": None if path.cost is None else asdict(path.cost),
     }
-    if isinstance(path.potential, FiniteElements):
-        values["element"] = path.potential.interpolation
+    if path.element is not None:
+        values["element"] = path.element
     if path.moduli is not None:
         values["moduli"] = moduli_values(path.moduli)
     return values

@@ -10,7 +10,7 @@ from truespring.comparison import Comparison, SupportError, decisive
 from truespring.equilibrium import Solution, State, Status
 from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, FiniteElements, Moduli
+from truespring.models import Fem, Moduli
 from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
@@ -47,12 +47,12 @@ def cause_sentence(result: Result) -> str | None:
     nonlinear = {
         name: one
         for name, one in result.comparisons.items()
-        if isinstance(one.reference.potential, FiniteElements)
-        and one.reference.potential.law.finite
+        if one.reference.element is not None
+        and one.reference.finite
         and one.load_factors.size > 1
         and one.rms_errors[-1] > _TOLD_APART
     }
-    if not nonlinear or result.model is None or result.paths[result.model].kind != "springs":
+    if not nonlinear or result.model is None or not result.paths[result.model].has_springs:
         return None
     name = min(nonlinear, key=lambda one: float(nonlinear[one].rms_errors[-1]))
     levels, errors = nonlinear[name].load_factors, nonlinear[name].rms_errors
@@ -162,8 +162,7 @@ def mesh_sentence(result: Result) -> str | None:
     said of bodies that are driven across x, along y.
     """
     known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
-    potentials = [one.reference.potential for one in result.comparisons.values()]
-    used = {potential.interpolation for potential in potentials if isinstance(potential, FiniteElements)}
+    used = {one.reference.element for one in result.comparisons.values()}
     if known is None or known.depth is None or drive(result).axis != 1:
         return None
     if Fem("linear").chosen_element(result.problem) not in used:
@@ -522,9 +521,9 @@ def _subject(result: Result) -> tuple[str, bool]:
     """What the compared model is called, and whether that is plural."""
     assert result.model is not None
     path = result.paths[result.model]
-    if path.kind != "springs":
+    if not path.has_springs:
         return display_name(result, result.model), False
-    several = sum(other.kind == "springs" for other in result.paths.values()) > 1
+    several = sum(other.has_springs for other in result.paths.values()) > 1
     return display_name(result, result.model) if several else "springs", True
 
 
@@ -541,7 +540,7 @@ def _driven_by_motion(result: Result) -> bool:
 def _by_displacement(result: Result) -> bool:
     """Whether a displacement was controlled, and the load factor found."""
     states = [state for path in result.paths.values() for state in path.states if not state.critical]
-    return any(abs(state.level - state.load_factor) > 1e-9 for state in states)
+    return any(state.level is not None and abs(state.level - state.load_factor) > 1e-9 for state in states)
 
 
 def _full(result: Result) -> str:

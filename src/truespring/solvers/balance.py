@@ -44,9 +44,9 @@ class Equilibrium:
         negative_eigenvalues: of the tangent on the free directions: 0 if stable, None if not known.
         branched: true where an unstable equilibrium was left for a stable one nearby.
         snapped: true where the body moved much further than the step before lets expect.
-        critical: "limit point" or "bifurcation" where stability changes there, else empty.
+        critical: "limit point" or "bifurcation" where stability changes there, else None.
         mode: the way in which a body gives way at a critical point, largest component 1, shape (n_nodes, dim).
-        level: how far the way is gone that the solver was asked for, 0 to 1, where that is not the load factor.
+        level: the share of what the solver controls, 0 to 1, where that is not the load factor.
         reason: why no balance was looked for, in words, where it was not.
         cost: of the path up to here.
     """
@@ -62,7 +62,7 @@ class Equilibrium:
     negative_eigenvalues: int | None = None
     branched: bool = False
     snapped: bool = False
-    critical: str = ""
+    critical: str | None = None
     mode: Floats | None = None
     level: float | None = None
     reason: str = ""

@@ -23,7 +23,9 @@ from truespring.potential import Loading, Potential, SparseMatrix
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter, Watch
 from truespring.solvers.cost import Cost
 from truespring.solvers.line_search import descend
+from truespring.solvers.solver import Geometry, Solver
 
+_AXES = "xyz"
 # A step that takes so many iterations keeps its length; one of fewer is followed by a longer one, of more by a shorter.
 _WANTED_ITERATIONS = 4
 # Turns of the path by more than this, as a cosine, are not taken for the same path: the step is cut.
@@ -45,7 +47,7 @@ _NO_PART = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class DisplacementControl:
+class DisplacementControl(Solver):
     """The displacement `to` [m] of what is selected `on`, the mean along a `direction` "x", "y" or "z", in equal steps.
 
     Attributes:
@@ -63,26 +65,45 @@ class DisplacementControl:
     max_iterations: int = 20
     linear: str = "direct"
 
+    follows_load = False
+    keeps_to_stable_states = False
+
     def __post_init__(self) -> None:
         _check(self.steps, self.max_iterations, self.tolerance, self.linear)
         if not (np.isfinite(self.to) and self.to):
             raise ProblemError(f"to = {self.to!r} m: the displacement to reach must be finite and not zero")
 
+    @property
+    def load_steps(self) -> int:  # type: ignore[override]
+        """The number of steps."""
+        return self.steps
+
+    def check(self, loading: Loading, geometry: Geometry) -> None:
+        """Raise ProblemError where a support holds the controlled displacement, or the body has no such direction."""
+        axes = _AXES[: loading.held.shape[1]]
+        if self.direction not in axes:
+            raise ProblemError(f"direction = {self.direction!r}: allowed are {', '.join(axes)}")
+        if loading.held[geometry.select(self.on), axes.index(self.direction)].any():
+            raise ProblemError("the displacement that is controlled is held by a support: choose another")
+
     def follow(
-        self, potential: Potential, loading: Loading, weights: Floats, report: Reporter | None = None
+        self, potential: Potential, loading: Loading, report: Reporter | None = None, geometry: Geometry | None = None
     ) -> Iterator[Equilibrium]:
-        """Yield the equilibria in the order of the path; `weights` of shape (n_nodes, dim) make what is controlled.
+        """Yield the equilibria in the order of the path.
 
         Where a state cannot be reached the last one yielded is not converged: the best one there.
         """
-        if weights[loading.held].any():
-            raise ProblemError("the displacement that is controlled is held by a support: choose another")
+        geometry = geometry or Geometry()
+        self.check(loading, geometry)
+        nodes = geometry.select(self.on)
+        weights = np.zeros(potential.nodes.shape)  # of a mean
+        weights[nodes, _AXES.index(self.direction)] = 1.0 / len(nodes)
         balance = _balance(potential, loading, self, report)
         yield from _controlled(balance, weights, self.to, self.steps)
 
 
 @dataclass(frozen=True, slots=True)
-class ArcLength:
+class ArcLength(Solver):
     """Along the path from no load to the full one, through every limit point on the way.
 
     Attributes:
@@ -101,12 +122,17 @@ class ArcLength:
     max_iterations: int = 20
     linear: str = "direct"
 
+    follows_load = False
+    keeps_to_stable_states = False
+
     def __post_init__(self) -> None:
         _check(self.load_steps, self.max_iterations, self.tolerance, self.linear)
         if self.max_steps < 1 or not self.longest >= 1:
             raise ProblemError("max_steps and longest must be at least 1")
 
-    def follow(self, potential: Potential, loading: Loading, report: Reporter | None = None) -> Iterator[Equilibrium]:
+    def follow(
+        self, potential: Potential, loading: Loading, report: Reporter | None = None, geometry: Geometry | None = None
+    ) -> Iterator[Equilibrium]:
         """Yield the equilibria in the order of the path.
 
         Where a state cannot be reached the last one yielded is not converged: the best one there.

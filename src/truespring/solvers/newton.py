@@ -15,6 +15,7 @@ from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
 from truespring.solvers.cost import Cost
 from truespring.solvers.line_search import descend
+from truespring.solvers.solver import Geometry, Solver
 
 #: What `method` may be: how balance is found at a load level.
 METHODS = ("auto", "mixed", "line-search")
@@ -24,7 +25,7 @@ _SNAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Newton:
+class Newton(Solver):
     """Full Newton with load steps: cut back where they fail, grown again where they succeed.
 
     Attributes:
@@ -62,14 +63,15 @@ class Newton:
         potential: Potential,
         loading: Loading,
         report: Reporter | None = None,
-        admissible: Callable[[Floats], bool] = lambda positions: True,
+        geometry: Geometry | None = None,
     ) -> Iterator[Equilibrium]:
         """Yield the equilibria from load factor 0 to 1 in order.
 
         Where a level cannot be reached the last one yielded is not converged: the best state there.
-        Equilibria whose positions are not `admissible` (an inverted element) are taken only from where
+        Equilibria whose positions `geometry` does not admit (an inverted element) are taken only from where
         the smallest load step leads to no other. A body unstable without load ends there.
         """
+        admissible = (geometry or Geometry()).admissible
         linear = choose(self.linear, potential.nodes, loading.held)
         balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
         last = descend(balance, 0.0, potential.nodes)
@@ -97,6 +99,10 @@ class Newton:
             previous, last, spent = last.state, reached._replace(state=state), 0
             step = min(2 * step, 1.0 / self.load_steps)
             yield self._with_cost(state, balance)
+
+    def starting_at(self, start: Callable[[Potential], Floats], max_iterations: int) -> "Nearby":
+        """Return Newton's method at full load alone, from the positions that `start` returns."""
+        return Nearby(1, self.tolerance, max_iterations, method=self.method, linear=self.linear, start=start)
 
     def _with_cost(self, state: Equilibrium, balance: Balance) -> Equilibrium:
         """Add what was spent so far."""
@@ -150,6 +156,43 @@ class Newton:
         """Return the level a step further, but no further than the next requested one."""
         requested = (np.floor(load_factor * self.load_steps + 1e-9) + 1) / self.load_steps
         return float(requested if load_factor + step > requested - 1e-9 else load_factor + step)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearby(Newton):
+    """Newton's method at full load alone, from the positions that `start` gives for the nodes of the potential [m].
+
+    The path has this one state, on the same branch as the start. `start` is asked for shape (n_nodes, dim); where
+    motion is prescribed it is made exact here.
+    """
+
+    start: Callable[[Potential], Floats] | None = None
+
+    def follow(
+        self,
+        potential: Potential,
+        loading: Loading,
+        report: Reporter | None = None,
+        geometry: Geometry | None = None,
+    ) -> Iterator[Equilibrium]:
+        """Yield the state at full load; not converged where it was not found from there."""
+        admissible = (geometry or Geometry()).admissible
+        balance = Balance(
+            potential,
+            loading,
+            self.tolerance,
+            self.max_iterations,
+            choose(self.linear, potential.nodes, loading.held),
+            report,
+        )
+        positions = potential.nodes.copy() if self.start is None else self.start(potential)
+        positions[loading.held] = (potential.nodes + loading.motion())[loading.held]
+        found = None
+        if isinstance(potential, Stressed):
+            found = mixed.converge(balance, 1.0, mixed.Start(positions, potential.stress(positions)))
+        if found is None or not found.state.converged or not admissible(found.state.positions):
+            found = descend(balance, 1.0, positions)
+        yield self._with_cost(found.state, balance)
 
 
 def _doubt(

@@ -20,11 +20,10 @@ from truespring.calibration.calibration import Progress
 from truespring.comparison import most_moved
 from truespring.equilibrium import Solution, solve
 from truespring.errors import StudyError, TruespringError, nearest
-from truespring.models import LAWS, Fem, Springs
+from truespring.models import springs_by_rule
 from truespring.problem import Problem
 from truespring.reference import read_result
 from truespring.refining import COST, in_second_order, own_error, work_of
-from truespring.solvers import Newton
 from truespring.study.read import Study
 from truespring.study.run import follow
 
@@ -65,8 +64,7 @@ def calibrate_study(
     reference can be solved. Raises StudyError, with the file, where studies do not go together.
     """
     name = springs_of(study)
-    model = study.entries[name]
-    assert isinstance(model, Springs)  # springs_of takes no other
+    model = springs_by_rule(study.entries)[name]
     for one in (study, *cases, *held_out):
         _require_newton(one)
     for one in (*cases, *held_out):
@@ -103,8 +101,8 @@ def springs_of(study: Study) -> str:
 
     Springs that answer to each other's lengths are passed over where there are others.
     """
-    springs = [name for name, entry in study.entries.items() if isinstance(entry, Springs)]
-    springs = [name for name in springs if not getattr(study.entries[name], "coupled", False)] or springs
+    by_rule = springs_by_rule(study.entries)
+    springs = [name for name, entry in by_rule.items() if not entry.coupled] or list(by_rule)
     if not springs:
         raise StudyError(
             f"{study.file}: there are no springs of a rule or of numbers to start from among "
@@ -115,7 +113,7 @@ def springs_of(study: Study) -> str:
 
 def _reference(study: Study, to: str | None) -> str:
     """The name of the model that the springs of a study are to follow."""
-    known = [name for name, entry in study.entries.items() if not isinstance(entry, Springs)]
+    known = [name for name in study.entries if name not in springs_by_rule(study.entries)]
     if to is not None and to not in known:
         there = f"there are {', '.join(known)}" if known else "there is none beside the springs"
         raise StudyError(f"{study.file}: --to {to}: no such reference{nearest(to, known)}: {there}")
@@ -123,9 +121,9 @@ def _reference(study: Study, to: str | None) -> str:
         raise StudyError(f"{study.file}: there is no reference beside the springs: add a model of kind fem")
     if to is not None:
         return to
-    fem = {name: entry for name, entry in study.entries.items() if isinstance(entry, Fem)}
+    fem = {name: entry for name, entry in study.entries.items() if entry.chosen_element(study.problem)}
     best = [name for name, entry in fem.items() if entry.law == "neo-hookean"]
-    best += [name for name, entry in fem.items() if LAWS[entry.law].finite]
+    best += [name for name, entry in fem.items() if entry.finite]
     return (best or known)[0]
 
 
@@ -133,7 +131,7 @@ def _case(study: Study, reference: str) -> LoadCase:
     path, told = _reference_path(study, study.problem, reference)
     _refuse_short(study, reference, path)
     with _naming(study):
-        return LoadCase(study.stem, study.problem, path, None, _newton(study), *told)
+        return LoadCase(study.stem, study.problem, path, None, study.solver, *told)
 
 
 def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Solution, tuple[str, float | None]]:
@@ -148,7 +146,7 @@ def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Sol
         problem, entry = better
         path = solve(problem, entry, study.solver)
     else:
-        path = follow(study, entry) if problem is study.problem else solve(problem, entry, study.solver)  # type: ignore[arg-type]
+        path = follow(study, entry) if problem is study.problem else solve(problem, entry, study.solver)
     own = own_error(path, entry, study.solver, COST * work_of(path))
     kind = " of second order on the same nodes" if better else ""
     return path, (f"{path.label}{kind}", own.value)
@@ -161,24 +159,22 @@ def _measured(study: Study, springs: str, markers: Path | None, curve: Path | No
     if curve is not None:
         probe = study.probe
         if probe is None:
-            model = study.entries[springs]
-            assert isinstance(model, Springs)
-            probe = most_moved(solve(study.problem, model, study.solver))
+            probe = most_moved(solve(study.problem, study.entries[springs], study.solver))
         told = read_curve(curve, study.problem, probe)
     with _naming(study):
-        return LoadCase(study.stem, study.problem, seen, told, _newton(study))
+        return LoadCase(study.stem, study.problem, seen, told, study.solver)
 
 
 def _turned(study: Study, reference: str) -> Iterator[LoadCase]:
     """The study's load turned by 45 degrees, if it can be and its reference then converges."""
     entry = study.entries[reference]
     problem = turned(study.problem, math.pi / 4)
-    if problem is None or not isinstance(entry, Fem):
+    if problem is None or not entry.chosen_element(problem):
         return
     path, told = _reference_path(study, problem, reference)
     if path.complete:
         name = f"{study.stem}, its load turned by 45 degrees"
-        yield LoadCase(name, problem, path, None, _newton(study), *told)
+        yield LoadCase(name, problem, path, None, study.solver, *told)
 
 
 def _refuse_short(study: Study, reference: str, path: Solution) -> None:
@@ -190,13 +186,8 @@ def _refuse_short(study: Study, reference: str, path: Solution) -> None:
 
 
 def _require_newton(study: Study) -> None:
-    if not isinstance(study.solver, Newton):
+    if not study.solver.follows_load:
         raise StudyError(f'{study.file}: solver.control: springs are calibrated under control = "load"')
-
-
-def _newton(study: Study) -> Newton:
-    assert isinstance(study.solver, Newton)  # others are refused
-    return study.solver
 
 
 @contextmanager

@@ -39,7 +39,7 @@ def converge(
     place = None
     for halvings in range(most):
         study = given.finer(halvings) if halvings else given
-        models = {name: entry for name, entry in study.entries.items() if not isinstance(entry, Solution)}
+        models = {name: entry for name, entry in study.entries.items() if entry.solves}
         if not models:
             raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")
         mesh = study.problem.mesh

@@ -10,7 +10,6 @@ from truespring.comparison import most_moved
 from truespring.equilibrium import Status
 from truespring.errors import ExportError, nearest
 from truespring.exports import Exported, check_targets, known_targets, solve_springs, target_files, write_files
-from truespring.models import SpringModel
 from truespring.report.result import head_note
 from truespring.study.read import Study
 from truespring.study.run import Progress
@@ -78,7 +77,7 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
     `name` is not among them; nothing is solved.
     """
     known = known_targets(targets)
-    springs = {one: entry for one, entry in study.entries.items() if isinstance(entry, SpringModel)}
+    springs = {one: entry for one, entry in study.entries.items() if entry.has_springs}
     if not springs:
         raise ExportError(f"{study.file}: no model of springs among {', '.join(study.entries)}: add one to [models]")
     if name is None:
@@ -100,7 +99,6 @@ def export_study(
     """
     name = springs_of(study, targets, name)
     model = study.entries[name]
-    assert isinstance(model, SpringModel)  # springs_of takes no other
 
     def report(load_factor: float, iteration: int, residual: float) -> None:
         if progress:

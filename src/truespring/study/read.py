@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.equilibrium import Solution, Solver, refuse_control
+from truespring.equilibrium import check_solver
 from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest, one_line, shown
 from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
 from truespring.material import Material, PlaneStrain, PlaneStress, Section
@@ -35,26 +35,21 @@ from truespring.models import (
     Heml,
     MassTensor,
     Model,
-    SpringModel,
     SpringNetwork,
     Springs,
     Terzopoulos,
     UserStiffness,
-    moduli,
-    refuse_mechanism,
 )
 from truespring.opening import read_file
 from truespring.problem import Load, Problem, Region
-from truespring.reference import CalculiX, Program, read_stl
-from truespring.solvers import ArcLength, DisplacementControl, Newton
+from truespring.program import ReadSolution
+from truespring.reference import CalculiX, read_stl
+from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
 from truespring.study import schema
 from truespring.study.changes import changed
 from truespring.study.given import read_given
 from truespring.study.network import read_network
 from truespring.units import to_si
-
-#: What an entry of [models] is: a model that is solved, a program that solves it, or a path that was read.
-Entry = Model | SpringNetwork | Program | Solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +62,7 @@ class Study:
         table: its checked values in SI, all defaults filled in; elements are counted as fine as the mesh is.
         halvings: how often the mesh was made finer than the tables tell.
         problem, solver: what is asked and how it is solved.
-        entries: by name, a model to be solved here or by another program, or a path that was read from a file.
+        entries: the models by name: solved here, by another program, or read from a file (ReadSolution).
         model: the name of the entry that is compared with the others, None where there is nothing to compare.
         references: the names that it is compared with.
         probe: number of the node that is watched; None takes the one that moves most.
@@ -81,7 +76,7 @@ class Study:
     halvings: int
     problem: Problem
     solver: Solver
-    entries: Mapping[str, Entry]
+    entries: Mapping[str, Model]
     model: str
     references: tuple[str, ...]
     probe: int | None
@@ -278,7 +273,7 @@ class _Builder:
                 select(problem.mesh, table.on)
             with self.at("solver"):
                 control = DisplacementControl(table.on, table.direction, table.to, table.load_steps, **past)
-                refuse_control(problem, control)
+                check_solver(problem, control)
                 return control
         if table.control == "arc-length":
             with self.at("solver", "linear"):
@@ -379,27 +374,26 @@ class _Builder:
                 raise StudyError(f"is required and missing; kind: {', '.join(_SECTIONS)}, and a thickness")
             return _SECTIONS[table.kind](table.thickness)
 
-    def entry(self, problem: Problem, solver: Solver, name: str, table: Any) -> Entry:
+    def entry(self, problem: Problem, solver: Solver, name: str, table: Any) -> Model:
         with self.at("models", name):
             match table:
                 case schema.StlTable():
                     beside = self.file.parent
                     undeformed = None if table.undeformed is None else beside / table.undeformed
-                    read: Solution = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
-                    return read
+                    read = read_stl(problem, beside / table.file, table.load_factor, undeformed, table.unit)
+                    return ReadSolution(read)
                 case schema.NetworkTable():
                     if self.network is None:
                         raise StudyError('kind = "network" is for a mesh of nodes and springs')
-                    refuse_mechanism(self.network, problem.loading.held)
-                    return self.network
+                    model: Model = self.network
                 case schema.CalculixTable():
                     springs = None if table.springs is None else self.springs_of(problem, name, table.springs)
                     law = {} if table.law is None else {"law": table.law}
                     program = CalculiX(springs=springs, element=table.element, **law)
-                    program.check(problem, solver)
+                    program.check_run(problem, solver)
                     return program
                 case schema.FemTable():
-                    model: Model = Fem(table.law, table.element)
+                    model = Fem(table.law, table.element)
                 case schema.HemlTable():
                     model = Heml(table.law)
                 case schema.MassTensorTable():
@@ -407,14 +401,10 @@ class _Builder:
                 case schema.TerzopoulosTable():
                     model = Terzopoulos(table.boundary)
                 case schema.BemSpringsTable():
-                    bem = BemSprings(table.block, table.rule, table.corotated)
-                    bem.check(problem)  # its potential takes long
-                    return bem
+                    model = BemSprings(table.block, table.rule, table.corotated)
                 case _:
                     model = self.springs(problem, table)
-            model.potential(problem)  # what does not fit is said before anything is solved
-            if isinstance(model, Springs):
-                moduli(problem.homogeneous[0], model)
+            model.check(problem)  # before anything is solved
             return model
 
     def springs(self, problem: Problem, table: schema.SpringsTable) -> Springs | GivenSprings:
@@ -425,7 +415,7 @@ class _Builder:
         volume = None if own.volume is None else self.file.parent / own.volume
         return read_given(problem, self.file.parent / own.file, volume, table.allow_negative)
 
-    def springs_of(self, problem: Problem, name: str, other: str) -> SpringModel:
+    def springs_of(self, problem: Problem, name: str, other: str) -> Model:
         """Return the springs of another model of the study, which `name` is to be a twin of."""
         tables = self.table.models
         kinds = (schema.SpringsTable, schema.NetworkTable)
@@ -439,10 +429,10 @@ class _Builder:
             told = f"there are {', '.join(known)}" if known else "there are none"
             raise StudyError(f"'{other}' is no model of springs of this study{nearest(other, known)}: {told}")
 
-    def compared(self, entries: Mapping[str, Entry]) -> tuple[str, tuple[str, ...]]:
+    def compared(self, entries: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
         """Return the model that is compared, by default the first springs, and its references, by default the rest."""
         compare = self.table.compare
-        springs = [name for name, entry in entries.items() if isinstance(entry, Springs | GivenSprings)]
+        springs = [name for name, entry in entries.items() if entry.has_springs]
         model = compare.model or (springs or list(entries))[0]
         self._known("model", model, entries)
         if compare.references is None:

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import shlex
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,28 +17,25 @@ from truespring.material import Material, PlaneStrain, PlaneStress, Solid
 from truespring.mesh.selections import AXES
 from truespring.models import (
     RULES,
-    Fem,
     Fitness,
-    Heml,
-    MassTensor,
+    Model,
     Moduli,
-    SpringNetwork,
     Springs,
     follows_poisson,
     judge,
-    model_warnings,
     moduli,
+    springs_by_rule,
 )
 from truespring.outputs import Output, write_whole
+from truespring.potential import Stretched
 from truespring.problem import Problem
 from truespring.reactions import moved_supports
-from truespring.reference import Program
 from truespring.report.curves import write_curves, write_reactions
 from truespring.report.result import Result
 from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import moduli_values, summary
 from truespring.solvers import Reporter
-from truespring.study.read import Entry, Study, read_study
+from truespring.study.read import Study, read_study
 from truespring.study.standings import standings
 
 #: Called with study, model and the load factor reached, for a progress bar.
@@ -90,7 +86,7 @@ def run(
                 progress(study.stem, name, load_factor)
 
         paths[name] = follow(study, entry, report, timeout)
-        if progress and not isinstance(entry, Solution):
+        if progress and entry.solves:
             progress(study.stem, name, 1.0)
         if known:
             known(name, paths[name])
@@ -108,9 +104,7 @@ def run(
         tolerance=study.tolerance,
         source=study.source,
         fitness={
-            name: judge(study.problem, entry, study.tolerance)
-            for name, entry in study.entries.items()
-            if isinstance(entry, Springs)
+            name: judge(study.problem, entry, study.tolerance) for name, entry in springs_by_rule(study.entries).items()
         }
         if comparing
         else {},
@@ -118,34 +112,15 @@ def run(
     )
 
 
-def follow(study: Study, entry: Entry, report: Reporter | None = None, timeout: float | None = None) -> Solution:
-    """Return the path of an entry of a study: solved here, solved by another program, or as it was read.
+def follow(study: Study, model: Model, report: Reporter | None = None, timeout: float | None = None) -> Solution:
+    """Return the path of a model of a study: solved here, solved by another program, or as it was read.
 
     Whatever is raised on the way is this model's own: its path is at rest then, and tells why.
     """
-    if isinstance(entry, Solution):
-        return entry
     try:
-        if isinstance(entry, Program):
-            return entry.run(study.problem, study.solver, report, timeout)
-        return solve(study.problem, entry, study.solver, _timed(report, timeout))
+        return solve(study.problem, model, study.solver, report, timeout)
     except Exception as error:
-        return unsolved(study.problem, entry, error)
-
-
-def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
-    """A report that ends the path when the time is up."""
-    if timeout is None:
-        return report
-    end = time.monotonic() + timeout
-
-    def timed(load_factor: float, iteration: int, residual: float) -> None:
-        if time.monotonic() > end:
-            raise TimeoutError(f"the time limit of {timeout:g} s was reached (--timeout)")
-        if report:
-            report(load_factor, iteration, residual)
-
-    return timed
+        return unsolved(study.problem, model, error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,13 +153,12 @@ class Realised:
 
 def realised_moduli(study: Study) -> Iterator[Realised]:
     """Yield what each springs model of a study realises, solving nothing."""
-    for name, entry in study.entries.items():
-        if isinstance(entry, Springs):
-            found = []
-            for twin in study.problem.homogeneous:
-                assert twin.material is not None  # a study has one
-                found.append((twin.material, moduli(twin, entry)))
-            yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance))
+    for name, entry in springs_by_rule(study.entries).items():
+        found = []
+        for twin in study.problem.homogeneous:
+            assert twin.material is not None  # a study has one
+            found.append((twin.material, moduli(twin, entry)))
+        yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance))
 
 
 def realised_values(realised: Realised) -> dict[str, Any]:
@@ -324,8 +298,8 @@ def plan(study: Study) -> dict[str, Any]:
         "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
         "total_force": loading.force(mesh.nodes).sum(axis=0).tolist(),
         "largest_motion": float(np.linalg.norm(loading.motion(), axis=1).max()),
-        "load_steps": getattr(study.solver, "load_steps", None) or getattr(study.solver, "steps", None),
-        "models": {name: _entry_plan(study, entry) for name, entry in study.entries.items()},
+        "load_steps": study.solver.load_steps,
+        "models": {name: _model_plan(study, name) for name in study.entries},
         "compare": {"model": study.model, "references": list(study.references), "tolerance": study.tolerance},
         "probe": None if study.probe is None else mesh.nodes[study.probe].tolist(),
     }
@@ -338,24 +312,20 @@ def _section(problem: Problem) -> dict[str, Any] | None:
     return {"kind": kind, "thickness": problem.section.thickness}
 
 
-def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:
-    if isinstance(entry, SpringNetwork):
-        return {"kind": "network", "label": "springs", "n_springs": len(entry.springs), "warnings": []}
-    if isinstance(entry, Program):
-        return {"kind": entry.kind, "label": entry.label_on(study.problem), "warnings": []}
-    if not isinstance(entry, Springs):
-        known = entry.warnings if isinstance(entry, Solution) else model_warnings(study.problem, entry)
-        law = {"law": entry.law} if isinstance(entry, Fem | Heml | MassTensor) else {}
-        law |= {"element": entry.chosen_element(study.problem)} if isinstance(entry, Fem) else {}
-        return {"kind": entry.kind, "label": entry.label, **law, "warnings": list(known)}
-    realised = moduli(study.problem.homogeneous[0], entry)
-    fitness = judge(study.problem, entry, study.tolerance)
-    return {
-        "kind": entry.kind,
-        "label": entry.label,
-        "n_springs": realised.n_springs,
-        "moduli": moduli_values(realised),
-        "fit": fitness.fit,
-        "sentence": fitness.sentence,
-        "warnings": list(model_warnings(study.problem, entry)),
-    }
+def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
+    """Return what is known of a model before it is solved."""
+    problem, model = study.problem, study.entries[name]
+    realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
+    plan: dict[str, Any] = {"kind": study.table.models[name].kind, "label": model.label_on(problem)}
+    plan |= {} if model.law is None else {"law": model.law}
+    element = model.chosen_element(problem)
+    plan |= {} if element is None else {"element": element}
+    if realised is not None:
+        plan |= {"n_springs": realised.n_springs, "moduli": moduli_values(realised)}
+    elif model.has_springs:
+        potential = model.potential(problem)
+        plan |= {"n_springs": len(potential.springs)} if isinstance(potential, Stretched) else {}
+    for springs in springs_by_rule({name: model}).values():
+        fitness = judge(problem, springs, study.tolerance)
+        plan |= {"fit": fitness.fit, "sentence": fitness.sentence}
+    return plan | {"warnings": list(model.warnings(problem))}

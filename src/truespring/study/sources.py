@@ -167,7 +167,14 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Solution:
     warnings = (*(str(text) for text in told["warnings"]), f"solved before: read from {folder}")
     held = _held(path, elements) if elements.is_file() else None
     return replace(
-        path, kind=told["kind"], status=Status(told["status"]), states=tuple(states), warnings=warnings, held=held
+        path,
+        kind=told["kind"],
+        has_springs=told["kind"] == "springs",
+        element=told.get("element"),
+        status=Status(told["status"]),
+        states=tuple(states),
+        warnings=warnings,
+        held=held,
     )
 
 

@@ -17,7 +17,7 @@ def standings(study: Study, paths: Mapping[str, Solution], names: Sequence[str])
     left = COST * sum(work_of(path) for path in paths.values() if path.solved)
     found = {}
     # What has a law tells most by its limit: springs as references come last.
-    for name in sorted(names, key=lambda name: not hasattr(study.entries[name], "second_order")):
+    for name in sorted(names, key=lambda name: study.entries[name].law is None):
         try:
             own = own_error(paths[name], study.entries[name], study.solver, left)
             left -= own.work

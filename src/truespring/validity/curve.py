@@ -64,7 +64,7 @@ def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None
     n = int(rising[0]) + 1 if rising.size else n
     compared = full.compared
     mine = np.array([state.displacement for state in springs.states[:n]])
-    theirs_loaded = [state for state in full.reference.states if state.level > 0]
+    theirs_loaded = [state for state in full.reference.states if state.loaded]
     other = np.array([state.displacement for state in (small.reference.states[-1], *theirs_loaded)[:n]])
     norms = np.sqrt((other[:, compared] ** 2).sum(axis=(1, 2)))
     apart = (mine - other)[:, compared].reshape(n, -1) / norms[:, None]

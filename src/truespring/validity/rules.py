@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.errors import ModelError, StudyError, nearest
-from truespring.models import RULES, Springs
+from truespring.models import RULES, Springs, springs_by_rule
 from truespring.problem import Problem
 from truespring.study import Study
 
@@ -52,7 +52,7 @@ def choose(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> l
     "all" are the rules made for the mesh, each once, and with a volume term those that can have one where Poisson's
     ratio is not that of plain springs. Raises StudyError for names that are none.
     """
-    own = {name: entry for name, entry in study.entries.items() if isinstance(entry, Springs)}
+    own = springs_by_rule(study.entries)
     problem = study.problem
     if asked is None and own:
         names = {name: _rule_name(springs) or name for name, springs in own.items()}

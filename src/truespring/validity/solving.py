@@ -12,7 +12,7 @@ from truespring.equilibrium import Solution, State, solve
 from truespring.models import Model
 from truespring.potential import Loading, Potential, Refined
 from truespring.problem import Problem
-from truespring.solvers import Equilibrium, Newton, Reporter
+from truespring.solvers import Equilibrium, Geometry, Newton, Reporter
 from truespring.validity.loads import scaled
 
 #: The share of the load at which a body answers as linear theory has it, to this share itself.
@@ -33,10 +33,10 @@ class _UpToTheEnd(Newton):
         potential: Potential,
         loading: Loading,
         report: Reporter | None = None,
-        admissible: Callable[[Floats], bool] = lambda positions: True,
+        geometry: Geometry | None = None,
     ) -> Iterator[Equilibrium]:
         """Yield the equilibria in order, the last one where the body buckles or is unstable."""
-        for found in Newton.follow(self, potential, loading, report, admissible):
+        for found in Newton.follow(self, potential, loading, report, geometry):
             yield found
             if found.branched or found.negative_eigenvalues:
                 return
@@ -65,20 +65,17 @@ class Solved:
         first = self.small.at(1.0)
         found = [] if first is None else [first]
         for state in self.path.states:
-            if state.negative_eigenvalues or state.branched or not (state.area_ratio > 0 or self._is_linear):
+            if state.negative_eigenvalues or state.branched or not (state.area_ratio > 0 or self.path.finite is False):
                 break
-            found += [state] if state.level > 0 else []
+            found += [state] if state.loaded else []
         return tuple(found)
-
-    @property
-    def _is_linear(self) -> bool:
-        return self.path.kind == "fem" and self.path.label.startswith("linear")
 
     @property
     def levels(self) -> Floats:
         """The load level of each of `states`, shape (n_states,)."""
-        levels = [state.level for state in self.states]
-        return np.array([SMALL * levels[0], *levels[1:]] if levels else [])
+        levels = np.array([state.level for state in self.states], dtype=np.float64)
+        levels[:1] *= SMALL
+        return levels
 
     @property
     def end(self) -> str:
