@@ -62,17 +62,18 @@ def faster(runs: list[Measured], dim: int, programs: tuple[str, ...], load: str 
 FELUPE = ("felupe-svk", "felupe-nh")
 
 _WHY = {
-    "2D": "at this size a loop takes about as long as starting the second thread (0.1 to 0.2 ms), and a solve makes about "
-    "750 such calls (both measured separately); the profile above gives the share of each loop. For larger bodies the "
-    "time grows more slowly than the number of nodes.",
-    "3D": "half of the time is spent in the sweeps and transfers of multigrid (see the profile and the bandwidth table "
-    "above); building the coarse levels and assembly share the rest.",
-    "command": "most of the time is not spent in the solver. In one separate run under the profiler, of 5.1 s: 0.9 s imports, 0.9 s "
-    "numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models at ten levels.",
-    "assembly": "the block of a spring is computed for both of its nodes, so that no two threads write to one row, and its "
-    "data are gathered from several arrays: arithmetic and latency are the limit, not bandwidth.",
-    "matrix product": "a block is stored once for two rows, half the bytes of a plain product: each byte needs more arithmetic, in "
-    "scalar double precision, and the product writes to rows that other blocks have just written.",
+    "2D": "at this size a loop takes about as long as starting the second thread (0.1 to 0.2 ms), and a solve makes "
+    "about 750 such calls (both measured separately); the profile above gives the share of each loop. For larger "
+    "bodies the time grows more slowly than the number of nodes.",
+    "3D": "half of the time is spent in the sweeps and transfers of multigrid (see the profile and the bandwidth "
+    "table above); building the coarse levels and assembly share the rest.",
+    "command": "most of the time is not spent in the solver. In one separate run under the profiler, of 5.1 s: 0.9 s "
+    "imports, 0.9 s numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models "
+    "at ten levels.",
+    "assembly": "the block of a spring is computed for both of its nodes, so that no two threads write to one row, "
+    "and its data are gathered from several arrays: arithmetic and latency are the limit, not bandwidth.",
+    "matrix product": "a block is stored once for two rows, half the bytes of a plain product: each byte needs more "
+    "arithmetic, in scalar double precision, and the product writes to rows that other blocks have just written.",
 }
 
 
