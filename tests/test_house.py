@@ -149,7 +149,7 @@ ALLOWED = {
     "exports": {"outputs", "equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
     "equilibrium": {"reactions", "models", "solvers", "potential", "problem", "mesh", "material"},
     "reactions": {"problem", "loading"},
-    "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
+    "models": {"linear", "potential", "problem", "loading", "mesh", "material", "units"},
     "solvers": {"linear", "potential"},
     "linear": {"potential"},
     "problem": {"loading", "potential", "mesh", "material"},

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.models import LAWS
+from truespring.models import Fem
 from truespring.outputs import Output
 from truespring.report.figures import Drawing
 from truespring.report.quantity import percent, significant
@@ -203,7 +203,7 @@ def _page(validity: Validity, drawings: Mapping[str, Drawing], command: str | No
         "validity/page.html.j2",
         command,
         title=validity.title,
-        law=LAWS[validity.law].label,
+        law=Fem(validity.law).label,
         groups=list(_groups(validity, drawings)),
         several=len(validity.maps) > 1,
         converged=all(one.converged for one in validity.references),
@@ -242,7 +242,7 @@ def _warnings(validity: Validity) -> Iterator[str]:
             yield f"{LOADS[one.load.name].did}: {unconverged(one)}"
         if one.end:
             yield (
-                f"{one.load.did}: {LAWS[one.law].label} ends at {one.load.told(one.reached)} of the "
+                f"{one.load.did}: {Fem(one.law).label} ends at {one.load.told(one.reached)} of the "
                 f"{one.load.told(one.asked)} asked for ({one.end}); what lies beyond is hatched"
             )
 
