@@ -1,8 +1,11 @@
 """The picture of imports: problem x model x solver -> path -> comparison -> report, one way only."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,7 +17,18 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "cli": {"validity", "sweeping", "study", "report", "table1", "equilibrium", "outputs"},
+    "cli": {
+        "calibration",
+        "comparing",
+        "converging",
+        "equilibrium",
+        "outputs",
+        "report",
+        "study",
+        "sweeping",
+        "table1",
+        "validity",
+    },
     "table1": {
         "report",
         "outputs",
@@ -35,7 +49,7 @@ ALLOWED = {
         "report",
         "comparison",
         "equilibrium",
-        "settling",
+        "converging",
         "models",
         "solvers",
         "potential",
@@ -43,15 +57,52 @@ ALLOWED = {
         "loading",
         "mesh",
     },
+    "calibration": {
+        "carrying",
+        "comparison",
+        "equilibrium",
+        "linear",
+        "loading",
+        "mesh",
+        "models",
+        "outputs",
+        "problem",
+        "reactions",
+        "reference",
+        "refining",
+        "report",
+        "solvers",
+        "study",
+        "table",
+        "units",
+    },
+    "comparing": {
+        "comparison",
+        "equilibrium",
+        "mesh",
+        "misfit",
+        "outputs",
+        "problem",
+        "reactions",
+        "reference",
+        "report",
+        "study",
+        "units",
+    },
+    "converging": {
+        "comparison",
+        "equilibrium",
+        "mesh",
+        "outputs",
+        "report",
+        "study",
+    },
     "sweeping": {"study", "report", "outputs", "units"},
     "study": {
-        "calibration",
         "outputs",
         "refining",
         "report",
         "comparison",
-        "misfit",
-        "settling",
         "reference",
         "exports",
         "equilibrium",
@@ -68,32 +119,16 @@ ALLOWED = {
         "program",
     },
     "report": {
-        "calibration",
         "comparison",
         "refining",
         "equilibrium",
         "reactions",
-        "settling",
         "models",
         "potential",
         "problem",
         "loading",
         "mesh",
         "material",
-    },
-    "calibration": {
-        "carrying",
-        "comparison",
-        "reactions",
-        "equilibrium",
-        "models",
-        "solvers",
-        "linear",
-        "problem",
-        "loading",
-        "mesh",
-        "table",
-        "units",
     },
     "comparison": {"carrying", "equilibrium", "reactions", "problem", "mesh"},
     "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh"},
@@ -120,14 +155,13 @@ ALLOWED = {
     "soundness": {"solution", "mesh"},
     "solution": {"reactions", "models", "solvers", "potential", "problem", "mesh"},
     "reactions": {"problem", "loading"},
-    "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
+    "models": {"linear", "potential", "problem", "loading", "mesh", "material", "units"},
     "solvers": {"linear", "potential"},
     "linear": {"potential"},
     "problem": {"loading", "potential", "mesh", "material"},
     "loading": {"potential", "mesh", "material"},
     "potential": set(),
     "mesh": set(),
-    "settling": set(),
     "material": set(),
     "table": {"units"},
     "units": set(),
@@ -147,8 +181,6 @@ HEAVY = {
     "numba",
     "pyamg",
     "pint",
-    "trimesh",
-    "meshio",
     "rich",
     "jinja2",
     "mujoco",
@@ -168,6 +200,7 @@ def rooms() -> dict[str, list[Path]]:
     return found
 
 
+@cache
 def imported(file: Path, everywhere: bool = True) -> set[str]:
     """Dotted names that a file imports, at its top only or everywhere."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
@@ -209,6 +242,18 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
                 continue
             assert not heavy, f"{file} imports {heavy} at its top"
             assert not any(name.startswith("truespring.kernels") for name in at_top), f"{file} imports numba at its top"
+
+
+def test_what_is_imported_is_a_declared_dependency() -> None:
+    project = tomllib.loads((SOURCE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    declared = [*project["dependencies"], *(one for name in extras.keys() - {"test"} for one in extras[name])]
+    modules = {"scikit-fem": "skfem", "lazy-loader": "lazy_loader", "ansys-mapdl-reader": "ansys", "pillow": "PIL"}
+    names = [re.split("[<>=]", one)[0] for one in declared]
+    allowed = {modules.get(name, name) for name in names} | {"truespring", *sys.stdlib_module_names}
+    for files in rooms().values():
+        for file in files:
+            assert {name.split(".")[0] for name in imported(file)} <= allowed, file
 
 
 def test_the_library_neither_prints_nor_exits() -> None:

@@ -48,7 +48,7 @@ def test_an_exception_loses_its_own_model_only(
 ) -> None:
     """Raised when the second of three models is built, or after its first level."""
     from truespring import equilibrium
-    from truespring.models.fem import FemPotential
+    from truespring.models import FemPotential
 
     solve_one, gradient = equilibrium._solve, FemPotential.gradient
 
@@ -238,8 +238,8 @@ def test_a_study_keeps_what_was_read(tmp_path: Path) -> None:
 
 def test_a_changed_study_is_calibrated_as_it_was_changed(tmp_path: Path) -> None:
     """The study that is written asks for the changed body, not for that of the file."""
-    from truespring.study.calibrate import calibrate_study
-    from truespring.study.calibrated import calibrated_study, write_calibrated
+    from truespring.calibration.study import calibrate_study
+    from truespring.calibration.writing import calibrated_study, write_calibrated
 
     changes = {"mesh.elements": [4, 1], "mesh.size": ["20 mm", "5 mm"], "load.1.force": [0.0, -1e-4]}
     found = calibrate_study(read_study(written(tmp_path), changes=changes))

@@ -35,6 +35,13 @@ def frozen_ints(values: object, shape: tuple[int | None, ...], name: str) -> Int
     return array
 
 
+def in_space(vectors: Floats) -> Floats:
+    """Return vectors of 1 to 3 components with zeros for the missing ones, shape (n, 3)."""
+    padded = np.zeros((len(vectors), 3))
+    padded[:, : vectors.shape[1]] = vectors
+    return padded
+
+
 def _check_shape(found: tuple[int, ...], wanted: tuple[int | None, ...], name: str) -> None:
     if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
         shape = ", ".join("n" if w is None else str(w) for w in wanted)

@@ -230,13 +230,6 @@ def solve_springs(
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
-def in_space(vectors: Floats) -> Floats:
-    """Pad vectors of a plane body with zeros to three components, shape (n, 3)."""
-    padded = np.zeros((len(vectors), 3))
-    padded[:, : vectors.shape[1]] = vectors
-    return padded
-
-
 def _support(support: Fixed, directions: Sequence[int]) -> str:
     axes = ", ".join(AXES[axis] for axis in directions)
     words = f"{_where(support.on)} held along {axes}"

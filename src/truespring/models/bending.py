@@ -125,7 +125,7 @@ def _bending_factor(problem: Problem, springs: Lattice | None, counts: tuple[int
 def _element_matrix(problem: Problem, springs: Lattice | None, share: Floats | None = None) -> Floats:
     """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
     if springs is None:
-        elements = fem_potential(problem, "linear", chosen_interpolation(problem))
+        elements = fem_potential(problem, "linear", chosen_interpolation(problem, "linear"))
         assert isinstance(elements, FemPotential)  # of one kind, as `cell_counts` sees to
         return np.asarray(elements.element_hessians(problem.mesh.nodes)[0])
     if springs.coupled:  # these are FEM

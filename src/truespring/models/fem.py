@@ -23,7 +23,7 @@ class Fem(Model):
     """The finite element model.
 
     Attributes:
-        law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
+        law: a key of LAWS.
         element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals, hexahedra,
             wedges and pyramids), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes
             in the middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the
@@ -49,11 +49,11 @@ class Fem(Model):
     def label(self) -> str:
         """How curves and tables call the model: the law is always named."""
         asked = "" if self.element is None else f" ({self.element.replace('-', ' ')})"
-        return f"{LAWS[self.law].label}{asked}"
+        return f"{LAWS[self.law].label} FEM{asked}"
 
     def chosen_element(self, problem: Problem) -> str:
         """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
-        return chosen_interpolation(problem, self.element)
+        return chosen_interpolation(problem, self.law, self.element)
 
     @property
     def finite(self) -> bool:
@@ -77,7 +77,7 @@ class Fem(Model):
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
-            f'element = "{default_interpolations(problem)[-1]}", the default here, does not lock',
+            f'element = "{default_interpolations(problem, self.law)[-1]}", the default here, does not lock',
             *stiff,
         )
 

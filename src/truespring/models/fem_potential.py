@@ -9,9 +9,9 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
-from truespring.material import PlaneStress
 from truespring.mesh import Mesh
-from truespring.models.laws import LAWS, Constants, Law, Response
+from truespring.models.law import Constants, Law, Response
+from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, voigt_places
@@ -331,13 +331,7 @@ def require_continuum(problem: Problem) -> None:
 
 def of_one_kind(problem: Problem, law: str, kind: type[FemPotential] = FemPotential) -> FemPotential:
     """Return the potential of a class on a mesh of one kind of elements, its constants by material."""
-    plane_stress = isinstance(problem.section, PlaneStress)
-    if len(problem.materials) == 1:
-        constants = Constants(*problem.materials[0].lame, plane_stress)
-    else:
-        lam, mu = (problem.of_elements(value)[:, None] for value in (lambda one: one.lame.lam, lambda one: one.lame.mu))
-        constants = Constants(lam, mu, plane_stress)
-    return kind(problem, LAWS[law], constants)
+    return kind(problem, LAWS[law], law_constants(problem, law))
 
 
 def element_matrices(problem: Problem) -> Floats:

@@ -14,7 +14,8 @@ from truespring.models.fem import Fem
 from truespring.models.fem_potential import FemPotential, fem_of_one_kind
 from truespring.models.finite_elements import fem_potential
 from truespring.models.interpolation import locking_warnings
-from truespring.models.laws import LAWS, Response
+from truespring.models.law import Response
+from truespring.models.laws import LAWS
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
 from truespring.models.model import Model
@@ -56,7 +57,7 @@ class Heml(Model):
     @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        return f"HEML ({LAWS[self.law].label.removesuffix(' FEM')})"
+        return f"HEML ({LAWS[self.law].label})"
 
     def second_order(self, problem: Problem) -> Fem:
         """Return the finite elements of second order of the same law: where finer meshes of this model lead."""

@@ -3,6 +3,7 @@
 from truespring.errors import ModelError
 from truespring.material import PlaneStress
 from truespring.mesh import counted
+from truespring.models.laws import LAWS
 from truespring.problem import Problem
 
 #: Kinds whose strain is one, as long as they are of first order.
@@ -16,15 +17,15 @@ LOCKING_POISSON = 0.4
 ELEMENTS = ("linear", "mean-dilatation", "quadratic", "quadratic-mean-dilatation")
 
 
-def chosen_interpolation(problem: Problem, asked: str | None = None) -> str:
-    """Return the interpolation on the problem's mesh, one of ELEMENTS: the one asked for, else the default.
+def chosen_interpolation(problem: Problem, law: str, asked: str | None = None) -> str:
+    """Return the interpolation of a law on the problem's mesh, one of ELEMENTS: the one asked for, else the default.
 
-    Raises ModelError where the mesh does not allow the one asked for.
+    Raises ModelError where the mesh or the law does not allow the one asked for.
     """
     if asked is None:
-        usual, incompressible = default_interpolations(problem)
+        usual, incompressible = default_interpolations(problem, law)
         return incompressible if locks(problem) else usual
-    allowed = _allowed(problem)
+    allowed = _allowed(problem, law)
     if asked not in allowed:
         within = " in plane stress" if isinstance(problem.section, PlaneStress) else ""
         raise ModelError(
@@ -34,16 +35,16 @@ def chosen_interpolation(problem: Problem, asked: str | None = None) -> str:
     return asked
 
 
-def default_interpolations(problem: Problem) -> tuple[str, str]:
+def default_interpolations(problem: Problem, law: str) -> tuple[str, str]:
     """Return the default interpolations on the mesh: the usual one, and that where the usual one locks."""
-    if problem.mesh.element in SIMPLICES:
-        return "quadratic", "quadratic-mean-dilatation"
-    return "linear", "mean-dilatation"
+    if problem.mesh.element not in SIMPLICES:
+        return "linear", "mean-dilatation"
+    return "quadratic", "quadratic" if LAWS[law].trace is None else "quadratic-mean-dilatation"
 
 
-def _allowed(problem: Problem) -> tuple[str, ...]:
-    """The interpolations that the mesh allows."""
-    found = dict.fromkeys(("linear", *default_interpolations(problem)))
+def _allowed(problem: Problem, law: str) -> tuple[str, ...]:
+    """Return the interpolations that the mesh and the law allow."""
+    found = dict.fromkeys(("linear", *default_interpolations(problem, law)))
     if isinstance(problem.section, PlaneStress):  # the third direction is free to take lambda's part
         found.pop("quadratic-mean-dilatation", None)
     return tuple(found)

@@ -23,7 +23,7 @@ from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
 #: Laws whose energy is a polynomial of the displacements.
-TENSOR_LAWS = ("linear", "saint-venant-kirchhoff")
+TENSOR_LAWS = tuple(name for name, law in LAWS.items() if law.quadratic)
 _SIMPLICES = ("triangle", "tetrahedron")
 # Threads share the simplices from so many on.
 _SMALLEST_PIECE = 256
@@ -54,7 +54,7 @@ class MassTensor(Model):
     @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        return f"mass-tensor ({LAWS[self.law].label.removesuffix(' FEM')})"
+        return f"mass-tensor ({LAWS[self.law].label})"
 
     @property
     def finite(self) -> bool:

@@ -39,6 +39,7 @@ from truespring.models import (
     Springs,
     Terzopoulos,
     UserStiffness,
+    material_constants,
 )
 from truespring.opening import read_file
 from truespring.problem import Load, Problem, Region
@@ -468,7 +469,9 @@ def _springs(table: schema.SpringsTable) -> Springs:
 
 
 def _material(table: schema.MaterialTable) -> Material:
-    return Material(table.young, table.poisson, table.density)
+    constants = {name: getattr(table, name, None) for name in material_constants()}
+    known = {name: value for name, value in constants.items() if value is not None}
+    return Material(table.young, table.poisson, table.density, known)
 
 
 _LOADS: dict[str, Callable[[Any, Any], Load]] = {

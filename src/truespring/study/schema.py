@@ -1,9 +1,9 @@
 """The tables of a study file, as pydantic knows them. Numbers are SI; texts carry units."""
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     BaseModel,
@@ -14,13 +14,14 @@ from pydantic import (
     PlainValidator,
     Tag,
     WithJsonSchema,
+    create_model,
     field_validator,
     model_validator,
 )
 
 from truespring.errors import TruespringError, nearest, shown
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
-from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.models import ELEMENTS, LAWS, RULES, Constant, material_constants
 from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
 
 
@@ -79,6 +80,9 @@ Density = Annotated[float, _si("density"), _quantity("density")]
 Acceleration = Annotated[float, _si("acceleration"), _quantity("acceleration")]
 Moment = Annotated[float, _si("moment"), _quantity("moment")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
+_QUANTITIES: dict[Dimension, Any] = {
+    dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
+}
 RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
 _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
 PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
@@ -224,12 +228,28 @@ MeshTable = Annotated[
 ]
 
 
-class MaterialTable(Table):
+class _PlainMaterialTable(Table):
     """What the body is made of."""
 
     young: Stress
     poisson: Number
     density: Density | None = None
+
+
+def with_constants(table: type[Table], name: str, constants: Mapping[str, Constant]) -> type[Table]:
+    """Return a table of this name that takes the constants of laws too, each an optional key with its unit."""
+    fields: dict[str, Any] = {}
+    for key, constant in constants.items():
+        quantity = Number if constant.dimension is None else _QUANTITIES[constant.dimension]
+        described = Field(default=None, description=f"{constant.meaning} [{constant.unit}]")
+        fields[key] = (quantity | None, described)
+    return create_model(name, __base__=table, __doc__=table.__doc__, **fields)
+
+
+if TYPE_CHECKING:
+    MaterialTable = _PlainMaterialTable
+else:
+    MaterialTable = with_constants(_PlainMaterialTable, "MaterialTable", material_constants())
 
 
 class RegionTable(MaterialTable):
