@@ -118,7 +118,7 @@ ALLOWED = {
     "solvers": {"linear", "potential"},
     "linear": {"potential"},
     "problem": {"loading", "potential", "mesh", "material"},
-    "loading": {"potential", "mesh", "material"},
+    "loading": {"potential", "mesh", "units"},
     "potential": set(),
     "mesh": set(),
     "settling": set(),

@@ -21,7 +21,7 @@ from truespring.study import read_study
 from truespring.validity import Validity, map_validity, reference
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.lines import polylines, spans
-from truespring.validity.loads import LOADS, scaled
+from truespring.validity.loads import LOAD_TYPES
 from truespring.validity.refine import LINES, Cells, Rows, crossings
 from truespring.validity.sentences import headline, verdict
 from truespring.validity.solving import Task, run_task
@@ -105,7 +105,7 @@ def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
     """What a map tells of a level is what `compare` tells of the two paths there."""
     lloyd, found = bent.maps[0], bent.references[0]
     body = Body.of(read_study(study))
-    problem = body.springs_problem(LOADS["bend"], found.factor, Spot(depth=3))
+    problem = body.springs_problem(LOAD_TYPES["bend"], found.factor, Spot(depth=3))
     path = ts.solve(problem, ts.Springs("lloyd"), ts.Newton(load_steps=10))
     whole = ts.compare(path, found.solved.path, [0.04, 0.005])
     curve = lloyd.curves[Spot(depth=3)]
@@ -138,7 +138,7 @@ def test_what_a_clamp_leaves_is_told_of_meshes_that_are_not_fine(study: Path, mo
     file = study.with_name("clamped.toml")
     file.write_text(text)
     body = Body.of(read_study(file))
-    found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+    found = reference.solve_reference(body, LOAD_TYPES["bend"], "linear", last=0.3, steps=1)
     assert len(found.n_nodes) == 3 and not found.converged
     apart = _two_refinements_finer(found, body)
     assert apart < found.error < 6 * apart
@@ -151,7 +151,7 @@ def test_what_a_clamp_leaves_is_told_of_cubes() -> None:
     body = Body.of(read_study(study))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference, "_MOST_UNKNOWNS", {3: 10_000})
-        found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+        found = reference.solve_reference(body, LOAD_TYPES["bend"], "linear", last=0.3, steps=1)
     assert found.elements == 4
     apart = _two_refinements_finer(found, body)
     assert apart < found.error < 8 * apart  # of three meshes no order is believed: it is told with the first
@@ -340,7 +340,7 @@ def test_loads_are_scaled_one_and_all() -> None:
         supports=[ts.Fixed("left"), ts.Fixed("right-middle", ["x"], displacement=(0.1, 0.0))],
         loads=[ts.Force("top", (0.0, 1.0)), ts.Traction("top", (0.0, 2.0)), ts.Gravity((0.0, 3.0))],
     )
-    half, whole = scaled(problem, 0.5).loading, problem.loading
+    half, whole = problem.scaled(0.5).loading, problem.loading
     assert half.external_force == pytest.approx(0.5 * whole.external_force)
     assert half.motion() == pytest.approx(0.5 * whole.motion())
     turned = ts.Problem(
@@ -350,8 +350,8 @@ def test_loads_are_scaled_one_and_all() -> None:
         supports=[ts.Fixed("left", rotation=0.2)],
         loads=[ts.Moment("right", 1.0), ts.Pressure("top", 1.0)][:1],
     )
-    assert scaled(turned, 0.5).supports[0].rotation == pytest.approx(0.1)
-    assert scaled(turned, 0.5).loads[0].moment == pytest.approx(0.5)  # type: ignore[union-attr]
+    assert turned.scaled(0.5).supports[0].rotation == pytest.approx(0.1)
+    assert turned.scaled(0.5).loads[0].moment == pytest.approx(0.5)  # type: ignore[union-attr]
 
 
 def test_the_verb_leaves_a_table_pictures_and_a_page(

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from truespring.material import PlaneStrain
 from truespring.models.fitness import springs_lock
 from truespring.models.moduli import Moduli, moduli
 from truespring.models.springs import Springs
@@ -94,7 +93,7 @@ def _moduli_warning(problem: Problem, realised: Moduli) -> Iterator[str]:
     for name, (young, poisson) in found.items():
         shown.setdefault(f"{young:.6g} Pa and {poisson:.4g}", name)
     said = ", ".join(f"{pair} {name}" for pair, name in shown.items())
-    explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
+    explained = f" ({problem.section.moduli_words})" if problem.section and problem.section.moduli_words else ""
     yield (
         f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
         f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"

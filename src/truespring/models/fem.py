@@ -11,7 +11,6 @@ from skfem.quadrature import get_quadrature
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
-from truespring.material import PlaneStress
 from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS, MIXED, Mesh, counted
 from truespring.models.laws import LAWS, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
@@ -104,7 +103,7 @@ class Fem:
             return incompressible if locks(problem) else usual
         allowed = _allowed(problem)
         if self.element not in allowed:
-            within = " in plane stress" if isinstance(problem.section, PlaneStress) else ""
+            within = f" in {problem.section.words}" if problem.section and _free_thickness(problem) else ""
             raise ModelError(
                 f"element = '{self.element}' is not for a mesh of {problem.mesh.kinds} elements{within}; "
                 f"allowed here: {', '.join(allowed)}"
@@ -148,9 +147,14 @@ def _defaults(problem: Problem) -> tuple[str, str]:
 def _allowed(problem: Problem) -> tuple[str, ...]:
     """The interpolations that the mesh allows."""
     found = dict.fromkeys(("linear", *_defaults(problem)))
-    if isinstance(problem.section, PlaneStress):  # the third direction is free to take lambda's part
+    if _free_thickness(problem):  # the third direction is free to take lambda's part
         found.pop("quadratic-mean-dilatation", None)
     return tuple(found)
+
+
+def _free_thickness(problem: Problem) -> bool:
+    """Whether the body changes its thickness freely: plane stress."""
+    return problem.section is not None and problem.section.free_thickness
 
 
 def _stiff_simplices(problem: Problem) -> tuple[str, ...]:
@@ -169,7 +173,7 @@ def _stiff_simplices(problem: Problem) -> tuple[str, ...]:
 def locks(problem: Problem) -> bool:
     """Return whether linear elements are known to lock: nearly incompressible, and not free to change thickness."""
     incompressible = any(material.poisson > LOCKING_POISSON for material in problem.materials)
-    return incompressible and not isinstance(problem.section, PlaneStress)
+    return incompressible and not _free_thickness(problem)
 
 
 def locking_warnings(problem: Problem) -> tuple[str, ...]:
@@ -202,7 +206,7 @@ def _require_continuum(problem: Problem) -> None:
 
 
 def _of_one_kind(problem: Problem, law: str, kind: "type[FemPotential] | None") -> "FemPotential":
-    plane_stress = isinstance(problem.section, PlaneStress)
+    plane_stress = _free_thickness(problem)
     if len(problem.materials) == 1:
         constants = Constants(*problem.materials[0].lame, plane_stress)
     else:

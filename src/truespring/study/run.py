@@ -14,7 +14,7 @@ import numpy as np
 from truespring.comparison import compare, most_moved
 from truespring.equilibrium import Solution, solve, unsolved
 from truespring.errors import StudyError
-from truespring.material import Material, PlaneStrain, PlaneStress, Solid
+from truespring.material import Material
 from truespring.mesh.selections import AXES
 from truespring.models import (
     RULES,
@@ -231,7 +231,7 @@ def _draw_moduli(study: Study, realised: Sequence[Realised], folder: Path) -> Pa
         for one in realised
         for moduli in [one.by_material[0][1]]
     }
-    within = " in plane strain" if isinstance(study.problem.section, PlaneStrain) else ""
+    within = study.problem.section.within if study.problem.section else ""
     return save_young(several, f"material{within}", folder)
 
 
@@ -332,10 +332,9 @@ def plan(study: Study) -> dict[str, Any]:
 
 
 def _section(problem: Problem) -> dict[str, Any] | None:
-    if problem.section is None or isinstance(problem.section, Solid):
+    if problem.section is None or not problem.section.key:
         return None
-    kind = "plane-stress" if isinstance(problem.section, PlaneStress) else "plane-strain"
-    return {"kind": kind, "thickness": problem.section.thickness}
+    return {"kind": problem.section.key, "thickness": problem.section.thickness}
 
 
 def _entry_plan(study: Study, entry: Any) -> Mapping[str, Any]:

@@ -1,7 +1,7 @@
 """Validity maps: up to which load, on which meshes, springs may be trusted."""
 
 from truespring.validity.axes import read_range as read_range
-from truespring.validity.loads import LOADS as LOADS
+from truespring.validity.loads import LOAD_TYPES as LOAD_TYPES
 from truespring.validity.mapping import map_validity as map_validity
 from truespring.validity.maps import Map as Map
 from truespring.validity.maps import Validity as Validity

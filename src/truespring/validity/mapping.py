@@ -16,7 +16,7 @@ from truespring.sweeping import Failure, Pool
 from truespring.validity.axes import NAMES, Range, axis_of, chosen, known, range_of, sizes_to
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.curve import Curve, curve
-from truespring.validity.loads import LOADS, LoadType
+from truespring.validity.loads import LOAD_TYPES, LoadType
 from truespring.validity.maps import Key, Map, Validity
 from truespring.validity.reference import Reference, solve_reference
 from truespring.validity.refine import Cells, Rows
@@ -51,7 +51,7 @@ def map_validity(
     Args:
         study: a study file, or one that was read.
         law: of the reference, a key of LAWS; it is solved on finer and finer meshes until it changes no more.
-        loads: load types, keys of LOADS, or "all"; by default the study's own load.
+        loads: load types, keys of LOAD_TYPES, or "all"; by default the study's own load.
         rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs,
             or all rules where it has none.
         x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
@@ -143,12 +143,16 @@ class _Run:
         self.axes = {str(name): axis_of(str(name), self.body, self.ranges) for name in numbers}
         if not adaptive:
             self.axes = {name: replace(axis, start=tuple(range(len(axis.values)))) for name, axis in self.axes.items()}
-        names = list(LOADS) if loads and "all" in loads else list(loads or ["own"])
+        names = list(LOAD_TYPES) if loads and "all" in loads else list(loads or ["own"])
         if "all" in (loads or ()):
-            names = [one for one in names if self.body.dim in LOADS[one].dims and (self.body.shape or one == "own")]
+            names = [
+                one for one in names if self.body.dim in LOAD_TYPES[one].dims and (self.body.shape or one == "own")
+            ]
         for name in names:
-            if name not in LOADS:
-                raise StudyError(f"load '{name}' is unknown{nearest(name, LOADS)}; allowed: {', '.join(LOADS)}, all")
+            if name not in LOAD_TYPES:
+                raise StudyError(
+                    f"load '{name}' is unknown{nearest(name, LOAD_TYPES)}; allowed: {', '.join(LOAD_TYPES)}, all"
+                )
         self.loads = [self.body.refuse(name) for name in dict.fromkeys(names)]
         self.rules = {one.name: one for one in choose(study, rules, "poisson" in self.axes)}
         self.progress = progress or (lambda what, done, wanted: None)
@@ -177,7 +181,7 @@ class _Run:
                 values = {place: self._errors(Key(*pair, spot)) for place, spot in places.items()}
                 grids[pair].add(values)
         for (load, rule), grid in grids.items():
-            yield self._map(LOADS[load], self.rules[rule], grid)
+            yield self._map(LOAD_TYPES[load], self.rules[rule], grid)
 
     def _grid(self) -> Any:
         y = self.axes.get(self.y or "")
@@ -241,7 +245,7 @@ class _Run:
         wanted = {(key.load, key.spot.poisson) for key in keys} - self.references.keys()
         last = self.ranges["load"].last if "load" in self.ranges else None
         jobs = {
-            (load, poisson): _Wanted(self.body, LOADS[load], self.law, poisson, last, self.steps[load])
+            (load, poisson): _Wanted(self.body, LOAD_TYPES[load], self.law, poisson, last, self.steps[load])
             for load, poisson in sorted(wanted, key=str)
         }
         for key, found in self._run(jobs, lambda key: f"{key[0]}: reference"):
@@ -252,7 +256,7 @@ class _Run:
 
     def _task(self, key: Key) -> Task:
         reference = self.references[key.load, key.spot.poisson]
-        problem = self.body.springs_problem(LOADS[key.load], reference.factor, key.spot)
+        problem = self.body.springs_problem(LOAD_TYPES[key.load], reference.factor, key.spot)
         return Task(problem, self.rules[key.rule].springs, self.steps[key.load])
 
     def _curve(self, key: Key, solved: Any) -> Curve | Failure:
@@ -261,7 +265,7 @@ class _Run:
         reference = self.references[key.load, key.spot.poisson]
         if not solved.states:
             return Failure(f"the springs have no equilibrium under a small load: {solved.end or 'unstable at rest'}")
-        probe = self.body.probe_in(solved.path.problem, LOADS[key.load])
+        probe = self.body.probe_in(solved.path.problem, LOAD_TYPES[key.load])
         return curve(solved, reference, sizes_to(reference.asked), probe)
 
     def _run(self, jobs: Mapping[Any, Any], say: Callable[[Any], str]) -> Iterator[tuple[Any, Any]]:

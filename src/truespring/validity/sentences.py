@@ -47,7 +47,7 @@ def _by_load(validity: Validity, one: Map) -> str:
 
 def _moving(one: Map) -> str:
     """Of the study's own load, what its size is."""
-    return f", which moves the probe by up to {one.load.told(float(one.x[-1]))}" if one.load.name == "own" else ""
+    return f", which moves the probe by up to {one.load.told(float(one.x[-1]))}" if one.load.own else ""
 
 
 def _others(one: Map, line: float) -> list[float]:

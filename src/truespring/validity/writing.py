@@ -19,7 +19,6 @@ from truespring.report.quantity import percent, significant
 from truespring.report.style import figure_style
 from truespring.validity.curve import Curve
 from truespring.validity.lines import polylines
-from truespring.validity.loads import LOADS
 from truespring.validity.maps import Map, Validity
 from truespring.validity.picture import figures
 from truespring.validity.reference import Reference
@@ -247,7 +246,7 @@ def _groups(validity: Validity, drawings: Mapping[str, Drawing]) -> Iterator[dic
 def _warnings(validity: Validity) -> Iterator[str]:
     for one in validity.references:
         if not one.converged:
-            yield f"{LOADS[one.load.name].did}: {unconverged(one)}"
+            yield f"{one.load.did}: {unconverged(one)}"
         if one.end:
             yield (
                 f"{one.load.did}: {LAWS[one.law].label} ends at {one.load.told(one.reached)} of the "
