@@ -1,4 +1,4 @@
-"""The figures aimed at, beside what was measured."""
+"""Targets of the benchmark and the measured values."""
 
 import math
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ LARGE = 30_000
 
 @dataclass(frozen=True)
 class Aim:
-    """What is wanted: at least or at most a number; `measured` is None where it was not measured.
+    """A target: at least or at most a number; `measured` is None where it was not measured.
 
     `why` tells what stands in the way where it is missed.
     """
 
     what: str
-    wanted: float
+    target: float
     measured: float | None
     at_least: bool = False
     why: str = ""
@@ -32,9 +32,9 @@ class Aim:
         """Met, or by how much it is missed."""
         if self.measured is None or math.isnan(self.measured):
             return "not measured"
-        if self.measured >= self.wanted if self.at_least else self.measured <= self.wanted:
+        if self.measured >= self.target if self.at_least else self.measured <= self.target:
             return "met"
-        return f"missed by {abs(self.measured / self.wanted - 1):.0%}"
+        return f"missed by {abs(self.measured / self.target - 1):.0%}"
 
 
 def of_springs(runs: list[Measured], dim: int, load: str = "bending") -> list[Measured]:
@@ -62,43 +62,43 @@ def faster(runs: list[Measured], dim: int, programs: tuple[str, ...], load: str 
 FELUPE = ("felupe-svk", "felupe-nh")
 
 _WHY = {
-    "2D": "at this size a loop takes about as long as handing half of it to the second thread (0.1 to 0.2 ms), and a "
-    "solve makes about 750 such calls (both measured once, apart); the share of each loop is in the profile above. "
-    "Larger bodies do not feel it: the time grows slower than the number of nodes.",
-    "3D": "the profile above: half of the time are the sweeps and transfers of multigrid, which are as far from the "
-    "limit of memory as the table says; building the coarse levels and assembly share the rest.",
-    "command": "most of it is not solving. In a run under the profiler, once, apart, of 5.1 s: 0.9 s imports, 0.9 s "
-    "numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models at ten levels.",
-    "assembly": "a spring's block is computed by both of its nodes, so that threads never write to one row, and what "
-    "it is computed from is fetched by number from several arrays: arithmetic and latency bound it, not bandwidth.",
-    "matrix product": "a block is kept once and serves two rows, half the bytes of a plain product: per byte it "
-    "takes more arithmetic, in scalar instructions and double precision, and writes to rows that other blocks wrote "
-    "to just before.",
+    "2D": "at this size a loop takes about as long as starting the second thread (0.1 to 0.2 ms), and a solve makes "
+    "about 750 such calls (both measured separately); the profile above gives the share of each loop. For larger "
+    "bodies the time grows more slowly than the number of nodes.",
+    "3D": "half of the time is spent in the sweeps and transfers of multigrid (see the profile and the bandwidth "
+    "table above); building the coarse levels and assembly share the rest.",
+    "command": "most of the time is not spent in the solver. In one separate run under the profiler, of 5.1 s: 0.9 s "
+    "imports, 0.9 s numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models "
+    "at ten levels.",
+    "assembly": "the block of a spring is computed for both of its nodes, so that no two threads write to one row, "
+    "and its data are gathered from several arrays: arithmetic and latency are the limit, not bandwidth.",
+    "matrix product": "a block is stored once for two rows, half the bytes of a plain product: each byte needs more "
+    "arithmetic, in scalar double precision, and the product writes to rows that other blocks have just written.",
 }
 
 
 def aims(results: dict, runs: list[Measured]) -> Iterator[Aim]:
     """Yield all of them."""
-    for dim, size, wanted in ((2, "51,000", ((12, 25), (8, 15))), (3, "31,000", ((35, 80), (15, 30)))):
-        for name, programs, (least, best) in zip(("CalculiX", "FElupe"), (("calculix",), FELUPE), wanted, strict=True):
+    for dim, size, target in ((2, "51,000", ((12, 25), (8, 15))), (3, "31,000", ((35, 80), (15, 30)))):
+        for name, programs, (least, best) in zip(("CalculiX", "FElupe"), (("calculix",), FELUPE), target, strict=True):
             measured = faster(runs, dim, programs)
             what, why = f"{dim}D, {size} nodes: times faster than {name}", _WHY[f"{dim}D"]
             yield Aim(what, least, measured, at_least=True, why=why)
-            yield Aim(f"{what}, hoped for", best, measured, at_least=True, why=why)
+            yield Aim(f"{what}, stretch target", best, measured, at_least=True, why=why)
     for dim, upper, memory in ((2, "one million", 2.5), (3, "300,000", 10.0)):
         springs = of_springs(runs, dim)
         largest = springs[-1] if springs and springs[-1].depth == SIZES[dim][-1] else None
         power = growth(springs) if largest else None
         yield Aim(f"{dim}D: p of time ~ n^p from 30,000 to {upper} nodes", 1.1, power)
         taken = largest.peak_bytes / largest.n_nodes / 1024 if largest else None
-        yield Aim(f"{dim}D, largest size: memory over an empty process, KiB a node", memory, taken)
+        yield Aim(f"{dim}D, largest size: memory above an empty process, KiB per node", memory, taken)
         newton = max((run.iterations for run in springs), default=None)
-        yield Aim(f"{dim}D: Newton iterations, most of all sizes", 8, newton)
+        yield Aim(f"{dim}D: largest number of Newton iterations", 8, newton)
         per_newton = [run.linear_iterations / run.iterations for run in springs if run.linear_iterations]
         gradients = max(per_newton, default=None)
-        yield Aim(f"{dim}D: conjugate gradients an iteration of Newton, most of all sizes", 15, gradients)
+        yield Aim(f"{dim}D: largest number of CG iterations per Newton iteration", 15, gradients)
     limit = max(results["bandwidth"].values())
-    for name, least_nodes, wanted in (
+    for name, least_nodes, target in (
         ("assembly", 50_000, 3.0),
         ("assembly", 1_000_000, 6.0),
         ("matrix product", 50_000, 1.5),
@@ -108,6 +108,6 @@ def aims(results: dict, runs: list[Measured]) -> Iterator[Aim]:
         at = [row for one in sized if one["dim"] == 2 for row in one["rows"] if row["name"] == name]
         measured = Moved(name, at[0]["seconds"], at[0]["bytes_moved"]).over(limit) if at else None
         what = f"2D, {least_nodes:,} nodes: {name}, times the memory limit"
-        yield Aim(what, wanted, measured, why=_WHY[name])
-    for command, wanted in (("truespring verify examples/bending.toml", 4.0), ("truespring --help", 0.3)):
-        yield Aim(f"`{command}`, seconds", wanted, results["command_line"].get(command), why=_WHY["command"])
+        yield Aim(what, target, measured, why=_WHY[name])
+    for command, target in (("truespring verify examples/bending.toml", 4.0), ("truespring --help", 0.3)):
+        yield Aim(f"`{command}`, seconds", target, results["command_line"].get(command), why=_WHY["command"])

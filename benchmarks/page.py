@@ -1,4 +1,4 @@
-"""The page docs/performance.md from results.json: python -m benchmarks.page rebuilds it without measuring."""
+"""The page docs/performance.md from results.json: `python -m benchmarks.page` rebuilds it without measuring."""
 
 import json
 import math
@@ -12,7 +12,7 @@ from benchmarks.figure import draw
 from benchmarks.limits import Moved
 from benchmarks.runs import HERE, PROGRAMS, ROOT, Measured
 
-# How each program solves; the rest of its row comes from the runs.
+# The solver of each program; the rest of its row comes from the runs.
 _SOLVERS = {
     "truespring": "one load step, residual to 1e-8 of the load",
     "calculix": "NLGEOM, one increment, SPOOLES on all threads; residual and correction to 1e-7, in its own norms",
@@ -20,7 +20,7 @@ _SOLVERS = {
     "skfem": "plain Newton, MKL Pardiso; residual to 1e-8 of the load",
 }
 
-# Of a solve's time, for a kernel to have a row of its own.
+# Kernels below this share of the time of a solve are summed into one row.
 _LEAST_SHARE = 0.03
 
 
@@ -39,8 +39,8 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
     machine, versions = results["machine"], results["versions"]
     yield "# Performance\n"
     yield (
-        "The numbers on this page are measured by `make bench`, which rebuilds it: all on one machine, each run in a "
-        f"process of its own. {results['date']}, commit {results['commit']}; "
+        "`make bench` measures the numbers on this page and rebuilds it: all on one machine, each run in a separate "
+        f"process. {results['date']}, commit {results['commit']}; "
         f"{machine['processor']}, {machine['cores']} cores, {machine['memory_bytes'] / 2**30:.0f} GiB, "
         f"{machine['system']}; "
         f"{', '.join(f'{name} {number}' for name, number in versions.items())}.\n"
@@ -61,7 +61,7 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]], words: tuple[int, ...] = (0,)) -> Iterator[str]:
-    """Yield the lines of a table; the columns `words` stand to the left, numbers to the right."""
+    """Yield the lines of a table; the columns `words` are aligned left, numbers right."""
     head = list(head)
     yield f"| {' | '.join(head)} |"
     yield f"|{'|'.join('---' if column in words else '---:' for column in range(len(head)))}|"
@@ -75,7 +75,7 @@ def _seconds(value: float) -> str:
 
 
 def _sizes(runs: list[Measured], dim: int, load: str) -> list[int]:
-    """Those of SIZES that were run, as elements over the height."""
+    """Return the entries of SIZES that were run, as elements over the height."""
     return sorted({run.depth for run in runs if (run.dim, run.load) == (dim, load)} & set(SIZES[dim]))
 
 
@@ -83,31 +83,31 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
     bent, pulled = (f"{MOVED[load]:.0%}" for load in ("bending", "stretching"))
     yield "## What is compared\n"
     yield (
-        "**Springs are a cheaper model than finite elements.** A spring knows two nodes, an element integrates a law "
-        "of matter over all of its own; springs have a Poisson's ratio of their own and are right only as far as "
-        "[their error](#time-to-the-same-error) tells. The times below are those of springs beside those of finite "
-        "elements with the same nodes, supports and force, not those of two ways to solve the same equations. Where "
-        "the equations are the same, truespring's own finite elements are the comparison, and the biquadratic springs, "
-        "whose limit is St. Venant-Kirchhoff's law.\n"
+        "**Springs are a cheaper model than finite elements.** A spring depends on two nodes; an element integrates a "
+        "constitutive law over its volume. Springs have a fixed Poisson's ratio and a model error, see "
+        "[below](#time-to-the-same-error). The times compare springs with finite elements of the same nodes, supports "
+        "and force; they do not compare two ways to solve the same equations. For that, compare truespring's finite "
+        "elements with the peers, or the biquadratic springs, which converge to the St. Venant-Kirchhoff law.\n"
     )
     yield (
-        f"Two bodies, held on the left, pulled on the right by a dead force: a rectangle {LENGTH:g} by 1 of squares in "
-        f"plane stress (Poisson's ratio 1/3) and a box {LENGTH:g} by 1 by 1 of cubes (1/4). Bending: the force that "
-        f"moves the end of the springs down by {bent} of the length. Stretching: that which makes them {pulled} "
-        "longer. (They are so slender after truespring's one-step iteration failed on fine meshes of bodies 4 to 1, at "
-        "the corners of the clamp, where CalculiX and FElupe had trouble too.)\n"
+        f"Two bodies are fixed on the left and loaded on the right by a dead force: a rectangle {LENGTH:g} by 1 of "
+        f"squares in plane stress (Poisson's ratio 1/3) and a box {LENGTH:g} by 1 by 1 of cubes (1/4). In bending the "
+        f"force moves the end of the springs down by {bent} of the length, in stretching it extends them by {pulled}. "
+        "(An aspect ratio of 4 was too difficult: on fine meshes the one-step iteration of truespring failed at the "
+        "corners of the clamp, and CalculiX and FElupe failed there as well.)\n"
     )
     yield (
-        "Seconds are wall time from the built mesh to equilibrium: pattern, assembly, factorisation or multigrid "
-        "setup, all iterations; not reading, writing and compiling (compiled code comes from its cache; each process "
-        "first solves a small mesh, untimed). The median of three runs, or one run where that takes 20 s. Peers "
-        "take as few equal load steps as they need; attempts that fail are not timed.\n"
+        "Seconds are wall time from the built mesh to equilibrium: sparsity pattern, assembly, factorisation or "
+        "multigrid setup, and all iterations, without reading, writing and compiling (compiled code comes from a "
+        "cache; each process first solves a small mesh, untimed). Times are the median of three runs, or of one run "
+        "if it takes 20 s. Peers use the smallest number of equal load steps that converges; failed attempts are not "
+        "timed.\n"
     )
     rows = []
     for name, program in PROGRAMS.items():
         version = next((run.version for run in runs if run.program == name and run.version), "not run")
         rows.append((program.label, version, program.law, _SOLVERS[program.module]))
-    yield from table(("program", "version", "what matter is", "how it is solved"), rows, words=(0, 1, 2, 3))
+    yield from table(("program", "version", "law", "solver"), rows, words=(0, 1, 2, 3))
 
 
 def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterator[str]:
@@ -136,13 +136,13 @@ def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterato
     ]
     yield from table(("nodes", *(f"{count:,}" for count in nodes)), rows)
     if left_out:
-        yield f"Left out, as no solve may take longer than {longest:g} s:\n"
+        yield f"Left out, because a solve may take at most {longest:g} s:\n"
         yield from (f"* {label}: {why}" for label, why in left_out.items())
         yield ""
 
 
 def _agreement(runs: list[Measured]) -> Iterator[str]:
-    """How far the tips of programs of one law are apart on one mesh."""
+    """Yield the largest difference of tip displacements among programs with the same law and mesh."""
     apart: dict[tuple[str, int], float] = {}
     for law in ("St. Venant-Kirchhoff", "neo-Hookean"):
         for dim in (2, 3):
@@ -152,16 +152,16 @@ def _agreement(runs: list[Measured]) -> Iterator[str]:
                     tips.setdefault((run.load, run.depth), []).append(run.tip)
             spreads = [max(values) / min(values) - 1 for values in tips.values() if len(values) > 1]
             apart[law, dim] = max(spreads, default=0.0)
-    told = "; ".join(f"{law}, {dim}D: {value:.1e}" for (law, dim), value in apart.items())
+    listed = "; ".join(f"{law}, {dim}D: {value:.1e}" for (law, dim), value in apart.items())
     yield (
-        "Programs of the same law agree: the largest relative distance of two tips on one mesh, over all sizes and "
-        f"both loads: {told}. (CalculiX prints seven digits.)\n"
+        "Programs with the same law agree. Largest relative difference of two tip displacements on one mesh, over all "
+        f"sizes and both loads: {listed}. (CalculiX prints seven digits.)\n"
     )
 
 
 def _ratios(runs: list[Measured]) -> Iterator[str]:
-    yield "## How many times faster springs are\n"
-    yield "At the size of each column, than:\n"
+    yield "## Speed-up of springs\n"
+    yield "Time of each program over that of the springs, at the size of each column:\n"
     columns = [(dim, load) for dim, load in LOADS if _at_reference(runs, SPRINGS[dim], dim, load)]
     rows = []
     for name, program in PROGRAMS.items():
@@ -175,8 +175,8 @@ def _ratios(runs: list[Measured]) -> Iterator[str]:
 
 
 def _at_reference(runs: list[Measured], program: str, dim: int, load: str) -> Measured | None:
-    wanted = (program, dim, load, REFERENCE[dim])
-    return next((run for run in runs if (run.program, run.dim, run.load, run.depth) == wanted and run.seconds), None)
+    key = (program, dim, load, REFERENCE[dim])
+    return next((run for run in runs if (run.program, run.dim, run.load, run.depth) == key and run.seconds), None)
 
 
 def _details(runs: list[Measured]) -> Iterator[str]:
@@ -186,18 +186,18 @@ def _details(runs: list[Measured]) -> Iterator[str]:
         if not springs:
             continue
         power = aims.growth(springs)
-        grown = f": time ~ n^{power:.2f} from {aims.LARGE:,} nodes on" if power is not None else ""
+        grown = f": time ~ n^{power:.2f} above {aims.LARGE:,} nodes" if power is not None else ""
         yield f"{dim}D, {load}{grown}\n"
         yield from table(
             (
                 "nodes",
                 "seconds",
                 "Newton",
-                "conjugate gradients",
+                "CG",
                 "Lanczos",
-                "KiB a node",
-                "end moves, of the length",
-                "how",
+                "KiB per node",
+                "tip displacement / length",
+                "method",
             ),
             (
                 (
@@ -219,8 +219,8 @@ def _details(runs: list[Measured]) -> Iterator[str]:
 def _memory(runs: list[Measured]) -> Iterator[str]:
     yield "## Memory\n"
     yield (
-        "Peak resident memory over that of a bare Python interpreter which has imported nothing, in MiB: libraries "
-        "count, and all that the process holds. Bending.\n"
+        "Peak resident memory in MiB, minus that of a Python interpreter without imports; libraries are included. "
+        "Bending.\n"
     )
     for dim in (2, 3):
         depths = _sizes(runs, dim, "bending")
@@ -241,13 +241,13 @@ def _mebibytes(run: Measured | None) -> str:
 def _limit(results: dict) -> Iterator[str]:
     limit = max(results["bandwidth"].values())
     reading = max(value for name, value in results["bandwidth"].items() if name.startswith("read"))
-    yield "## The limit: memory\n"
-    told = "; ".join(f"{name}: {value / 1e9:.1f} GB/s" for name, value in results["bandwidth"].items())
-    yield f"Bandwidth of this machine's memory in the same run, arrays of 512 MiB: {told}.\n"
+    yield "## Memory bandwidth\n"
+    listed = "; ".join(f"{name}: {value / 1e9:.1f} GB/s" for name, value in results["bandwidth"].items())
+    yield f"Memory bandwidth of this machine in the same run, arrays of 512 MiB: {listed}.\n"
     yield (
-        "What the loops of the springs take, beside the time in which memory could move the bytes that they must read "
-        "and write once, at the largest of these bandwidths. Below 1 what is moved fits into a cache. Against reading "
-        f"alone, {reading / 1e9:.1f} GB/s, the last column would be {reading / limit:.2f} times as large.\n"
+        "Time of the spring kernels over the time needed to read and write their data once at the largest of these "
+        "bandwidths. Below 1 the data fit into a cache. Relative to the bandwidth of reading alone, "
+        f"{reading / 1e9:.1f} GB/s, the last column would be {reading / limit:.2f} times as large.\n"
     )
     rows = []
     for one in results["kernels"]:
@@ -256,8 +256,8 @@ def _limit(results: dict) -> Iterator[str]:
             least = 1e3 * moved.bytes_moved / limit
             numbers = f"{moved.bytes_moved / 1e6:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}"
             rows.append((f"{_where(one)}: {moved.name}", *numbers, f"{moved.over(limit):.1f}"))
-    yield from table(("", "MB", "ms", "limit, ms", "times the limit"), rows)
-    yield "Where the time of a whole solve goes, each share with what it takes to hand work to the threads:\n"
+    yield from table(("", "MB", "ms", "limit, ms", "time over limit"), rows)
+    yield "Shares of the time of a whole solve, including the distribution of work to threads:\n"
     shares = [
         {name: value / sum(one["shares"].values()) for name, value in one["shares"].items()}
         for one in results["kernels"]
@@ -267,7 +267,7 @@ def _limit(results: dict) -> Iterator[str]:
     rows = [(name, *(f"{one.get(name, 0):.0%}" for one in shares)) for name in large]
     rest = (f"{1 - sum(one.get(name, 0) for name in large):.0%}" for one in shares)
     yield from table(
-        ("", *map(_where, results["kernels"])), [*rows, (f"{len(names) - len(large)} smaller ones", *rest)]
+        ("", *map(_where, results["kernels"])), [*rows, (f"{len(names) - len(large)} smaller shares", *rest)]
     )
 
 
@@ -278,12 +278,13 @@ def _where(one: dict) -> str:
 def _accuracy(runs: list[Measured]) -> Iterator[str]:
     yield "## Time to the same error\n"
     yield (
-        "The bent bodies once more, on meshes from one element over the height on. The truth is St. Venant-Kirchhoff's "
-        "law on infinitely fine meshes (Richardson, from the three finest of truespring's finite elements): the law "
-        "that CalculiX solves and that biquadratic springs have for their limit; the neo-Hookean one is as near to it "
-        "as its floor tells. The floor is the error on infinitely fine meshes, too soft (+) or too stiff (-): what the "
-        "model itself is off, which no mesh mends. The error is that of the end's displacement; a target counts as "
-        "reached where every finer mesh meets it too; times, of one run a mesh, are interpolated.\n"
+        "The bodies in bending on meshes with one or more elements over the height. The reference is the St. "
+        "Venant-Kirchhoff law in the limit of infinitely fine meshes (Richardson extrapolation from the three finest "
+        "meshes of truespring's finite elements). CalculiX solves this law, and biquadratic springs converge to it. "
+        "The model error is the error in the limit of infinitely fine meshes, too soft (+) or too stiff (-); mesh "
+        "refinement does not reduce it. For neo-Hookean programs it is the difference between the two laws. Errors "
+        "are those of the tip displacement; a target is reached if every finer mesh reaches it too; times are "
+        "interpolated between meshes, one run each.\n"
     )
     for dim in (2, 3):
         truth = errors.limit(errors.solved(runs, errors.TRUTH, dim))
@@ -296,11 +297,11 @@ def _accuracy(runs: list[Measured]) -> Iterator[str]:
                 continue
             found = errors.accuracy(solved, truth)
             rows.append((program.label, f"{round(found.floor, 4) + 0.0:+.2%}", *_reached(found)))
-        yield from table((f"{dim}D", "floor", *(f"to {target:.0%}" for target in errors.TARGETS)), rows)
+        yield from table((f"{dim}D", "model error", *(f"to {target:.0%}" for target in errors.TARGETS)), rows)
     yield (
-        "Seconds, and about how many nodes that takes; `<=` where the coarsest mesh is good enough. Bodies as plain as "
-        "these need few nodes for such errors, and every program answers at once: springs pay where a mesh is fine for "
-        "another reason, its geometry.\n"
+        "Seconds, and the approximate number of nodes; `<=` where the coarsest mesh is sufficient. Simple bodies need "
+        "few nodes for such errors, and every program is fast: springs save time where the geometry needs a fine "
+        "mesh.\n"
     )
 
 
@@ -313,15 +314,15 @@ def _reached(found: errors.Accuracy) -> Iterator[str]:
 
 
 def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
-    yield "## Figures aimed at\n"
+    yield "## Targets\n"
     rows = []
     reasons = {}
     for aim in aims.aims(results, runs):
         if aim.verdict.startswith("missed") and aim.why:
             reasons[aim.what] = aim.why
         measured = "" if aim.measured is None else f"{aim.measured:.3g}"
-        rows.append((aim.what, f"{'at least' if aim.at_least else 'at most'} {aim.wanted:g}", measured, aim.verdict))
-    yield from table(("springs, bent by half the length", "wanted", "measured", ""), rows, words=(0, 3))
+        rows.append((aim.what, f"{'at least' if aim.at_least else 'at most'} {aim.target:g}", measured, aim.verdict))
+    yield from table(("springs, bent by half the length", "target", "measured", ""), rows, words=(0, 3))
     if reasons:
         yield "Why:\n"
         yield from (f"* {what}: {why}" for what, why in reasons.items())
@@ -329,10 +330,10 @@ def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
 
 
 def _recorded(recorded: dict) -> Iterator[str]:
-    yield "## Recorded once\n"
+    yield "## Other programs\n"
     yield (
-        f"Not part of `make bench`: {recorded['date']}, {recorded['processor']}, {recorded['cores']} cores, one run "
-        "each. Bending, the same meshes and forces.\n"
+        f"Measured once, not by `make bench`: {recorded['date']}, {recorded['processor']}, {recorded['cores']} cores, "
+        "one run each. Bending, with the same meshes and forces.\n"
     )
     rows = (
         (run["program"], run["version"], f"{run['dim']}D, {run['n_nodes']:,}", _seconds(run["seconds"]), run["notes"])

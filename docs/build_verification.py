@@ -111,7 +111,7 @@ def uniform_tension() -> Iterator[Row]:
             f"tension, {LAWS[law].label}: stress at stretch {found:.6f}",
             ts.reference_error(tensile(0.3), ts.Fem(law)),
         )
-        yield Row(what, 0.3, float(stress[0]), "the law itself", own)
+        yield Row(what, 0.3, float(stress[0]), "the law", own)
 
 
 def moduli() -> Iterator[Row]:
@@ -323,7 +323,7 @@ def cook_springs() -> Iterator[Row]:
         for rule, wanted in zip(("van-gelder", "lloyd"), tips, strict=True):
             found = cook_tip(cook_mesh(64, "triangle", diagonal), ts.Springs(rule))
             what = f"Cook's membrane, {rule} springs on triangles, n = 64, diagonal {diagonal}: tip"
-            yield Row(what, found, wanted, "an independent code; the right answer is 23.97")
+            yield Row(what, found, wanted, "an independent code; the converged value is 23.97")
 
 
 def locking() -> Iterator[Row]:
@@ -356,7 +356,9 @@ def loads_and_paths() -> Iterator[Row]:
 def shipped_studies() -> str:
     """What the shipped studies show: among it the two findings of Lembryk and Ciszkiewicz."""
     errors = "error at the probe | rms error | largest error"
-    lines = [f"| study | springs | reference | {errors} | reference's own error | error against it refined |"]
+    lines = [
+        f"| study | springs | reference | {errors} | error of the reference | error against the refined reference |"
+    ]
     lines.append("|---|---|---|---|---|---|---|---|")
     for name in ("stretching", "bending", "soft_block", "tissue"):
         result = run(read_study(ROOT / "examples" / f"{name}.toml"))
@@ -392,30 +394,30 @@ def against_the_truth() -> str:
 HEAD = """\
 # Verification
 
-The numbers on this page are measured by `make verification`, which rebuilds it
+`make verification` measures the numbers on this page and rebuilds it
 ({versions});
-the limits against CalculiX are held by tests.
+tests check the differences from CalculiX.
 
-The gap between springs and FEM is a measurement, not a test: it is in the last tables. What is tested is that
-the springs do what a lattice of springs must, and the finite elements what their law says. Where a figure is of finite
-elements the last column is their own error: their distance from the limit of finer and finer meshes, root mean square
-over the nodes ([what that is](study.md#how-far-a-reference-is-itself-off)).
+The difference between springs and FEM is a measurement, not a test: see the last tables. The tests compare the springs
+with the theory of spring lattices and the finite elements with their constitutive law. For finite elements, the last
+column is their discretisation error: the rms difference from the limit of mesh refinement over the nodes
+([definition](study.md#error-of-a-reference)).
 """
 
 
 LOCKING = """\
-Linear hexahedra thus reach 0.922 of the limit at Poisson's ratio 0.45 and 0.791 at 0.49, as `tests/test_fem.py` holds.
-0.937 and 0.819 have been found by an independent code against a reference of its own; these are not met.
+Linear hexahedra reach 0.922 of the limit at Poisson's ratio 0.45 and 0.791 at 0.49 (checked by `tests/test_fem.py`). An
+independent code found 0.937 and 0.819 against a different reference; these values are not reproduced.
 """
 
 
 CALCULIX = """\
 ## CalculiX
 
-The same bodies, nodes and loads in CalculiX 2.20, held by `tests/test_calculix.py` where `ccx` is installed;
-largest nodal distance over largest displacement, or distance at the tip over its displacement:
+The same bodies, nodes and loads in CalculiX 2.20, checked by `tests/test_calculix.py` if `ccx` is installed: largest
+nodal difference over largest displacement, or the difference at the tip over its displacement.
 
-| twin | difference at most |
+| body | largest difference |
 |---|---|
 | plane strain (CPE4), linear and NLGEOM, bending and stretching | 1e-6 |
 | plane stress as CPE4 with exchanged constants, linear and NLGEOM | 1e-6 |
@@ -437,23 +439,26 @@ def page() -> str:
     for title, rows in (
         ("Springs", (two_springs, uniform_tension, moduli, lattices, irregular, elastica)),
         ("Any Poisson's ratio", (volume_terms, biquadratic_springs)),
-        ("Where springs are wrong, and the moduli say so", (cook_springs,)),
-        ("Loads, and paths past limit points", (loads_and_paths,)),
+        ("Inaccurate springs, as predicted by their effective moduli", (cook_springs,)),
+        ("Loads and paths past limit points", (loads_and_paths,)),
         ("Finite elements", (cook, locking)),
     ):
-        table = ["| what | truespring | reference | apart | source | own error |", "|---|---|---|---|---|---|"]
+        table = [
+            "| quantity | truespring | reference | difference | source | discretisation error |",
+            "|---|---|---|---|---|---|",
+        ]
         table += [str(row) for make in rows for row in make()]
         parts.append(f"## {title}\n\n" + "\n".join(table) + "\n")
     parts.append(LOCKING)
     parts.append(CALCULIX)
     parts.append(
-        "## What springs and FEM make of the same body\n\nThe shipped studies at full load, all models of each on one "
+        "## Springs and FEM on the same body\n\nThe shipped studies at full load, with all models of a study on one "
         "mesh: 16 x 4 squares, 20 x 5 x 5 cubes, 4142 tetrahedra from a file. Errors are against the reference on that "
-        "mesh, but for the last column: against the same law refined.\n\n" + shipped_studies() + "\n"
+        "mesh; in the last column, against the refined reference.\n\n" + shipped_studies() + "\n"
     )
     parts.append(
-        "The plane ones once more, against triangles of second order on a mesh twice halved, root mean square; for "
-        "comparison also the four-node elements on the mesh of the springs.\n\n" + against_the_truth() + "\n"
+        "The rms errors of the plane studies against second-order triangles on a mesh refined twice. For comparison, "
+        "the table includes the four-node elements on the mesh of the springs.\n\n" + against_the_truth() + "\n"
     )
     return "\n".join(parts)
 

@@ -11,6 +11,8 @@ import pytest
 from tests.studies import STUDY, changed, written
 from tests.test_examples import EXAMPLES
 from truespring.calibration import turned
+from truespring.calibration.study import calibrate_study
+from truespring.calibration.writing import write_calibrated
 from truespring.cli import main
 from truespring.comparison import compare
 from truespring.equilibrium import solve
@@ -23,8 +25,6 @@ from truespring.problem import Problem
 from truespring.report.result import head_note
 from truespring.report.series import write_mesh
 from truespring.study import export_study, read_study, run
-from truespring.study.calibrate import calibrate_study
-from truespring.study.calibrated import write_calibrated
 from truespring.study.given import read_given, write_given
 from truespring.study.toml import toml_text
 

@@ -11,10 +11,10 @@ import pytest
 
 import truespring as ts
 from truespring.cli import main
+from truespring.converging.converge import _watched
+from truespring.converging.settling import Attempt, refinement, settle
 from truespring.errors import TruespringError
 from truespring.mesh import refined
-from truespring.settling import Attempt, refinement, settle
-from truespring.study.converge import _watched
 
 MESHES = {
     "squares": ts.rectangle((4.0, 3.0), (3, 2)),

@@ -238,8 +238,8 @@ def test_a_study_keeps_what_was_read(tmp_path: Path) -> None:
 
 def test_a_changed_study_is_calibrated_as_it_was_changed(tmp_path: Path) -> None:
     """The study that is written asks for the changed body, not for that of the file."""
-    from truespring.study.calibrate import calibrate_study
-    from truespring.study.calibrated import calibrated_study, write_calibrated
+    from truespring.calibration.study import calibrate_study
+    from truespring.calibration.writing import calibrated_study, write_calibrated
 
     changes = {"mesh.elements": [4, 1], "mesh.size": ["20 mm", "5 mm"], "load.1.force": [0.0, -1e-4]}
     found = calibrate_study(read_study(written(tmp_path), changes=changes))

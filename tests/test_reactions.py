@@ -16,6 +16,7 @@ from tests.test_report import words
 from truespring.calibration.calibration import CaseResult, _warnings
 from truespring.calibration.unknowns import make_unknowns
 from truespring.cli import main
+from truespring.comparing import compare_sources, find_sources
 from truespring.reactions import leading_support
 from truespring.report.curves import write_curves
 from truespring.report.plots import reactions_figure, tells_reactions
@@ -24,7 +25,6 @@ from truespring.report.style import figure_style
 from truespring.report.summary import difference, summary
 from truespring.report.verdict import drive, force_sentence, verdict
 from truespring.solvers import Newton
-from truespring.study import compare_sources, find_sources
 from truespring.validity.curve import curve
 from truespring.validity.solving import Task, run_task
 

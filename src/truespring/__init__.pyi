@@ -4,8 +4,10 @@ from .calibration import Calibration as Calibration
 from .calibration import LoadCase as LoadCase
 from .calibration import calibrate as calibrate
 from .calibration import read_curve as read_curve
+from .calibration.page import draw_calibration as draw_calibration
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
+from .converging import converge as converge
 from .equilibrium import Solution as Solution
 from .equilibrium import State as State
 from .equilibrium import Status as Status
@@ -53,11 +55,9 @@ from .reference import read_result as read_result
 from .reference import read_stl as read_stl
 from .refining import OwnError as OwnError
 from .refining import reference_error as reference_error
-from .report.calibration import draw_calibration as draw_calibration
 from .solvers import ArcLength as ArcLength
 from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
-from .study import converge as converge
 from .study import read_network as read_network
 from .sweeping import sweep as sweep
 from .validity import map_validity as map_validity

@@ -21,10 +21,11 @@ from truespring.errors import TruespringError, one_line
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from truespring.converging import Refinement
     from truespring.equilibrium import Solution
     from truespring.outputs import Output
     from truespring.report.result import Result
-    from truespring.study import Known, Realised, Refinement, Study
+    from truespring.study import Known, Realised, Study
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -429,8 +430,9 @@ def _moduli(options: argparse.Namespace) -> int:
 
 
 def _converge(options: argparse.Namespace) -> int:
-    from truespring.report.tables import settling_table
-    from truespring.study import converge, read_studies, write_settling
+    from truespring.converging import converge, write_settling
+    from truespring.converging.page import settling_table
+    from truespring.study import read_studies
 
     studies = read_studies(options.study)
     if not 0 < options.tolerance < 1:
@@ -457,9 +459,9 @@ def _converge(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
+    from truespring.comparing import compare_sources, find_sources, read_probe, write_comparisons
+    from truespring.comparing.tables import difference_tables
     from truespring.report.summary import difference
-    from truespring.report.tables import difference_tables
-    from truespring.study import compare_sources, find_sources, read_probe, write_comparisons
 
     told = [(name, getattr(options, name)) for name in _TOLD]
     sources = find_sources(options.source, told)
@@ -512,8 +514,8 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from truespring.report.sweeps import sweep_table
     from truespring.sweeping import plan_sweep, read_vary, run_sweep, write_sweep
+    from truespring.sweeping.page import sweep_table
 
     vary = dict[str, Any]()
     for key, values in map(read_vary, options.vary):
@@ -571,10 +573,10 @@ def _say_failed_points(rows: "Sequence[dict[str, Any]]", keys: Sequence[str], mo
 
 
 def _calibrate(options: argparse.Namespace) -> int:
-    from truespring.report.calibration import calibration_table
+    from truespring.calibration.page import calibration_table
+    from truespring.calibration.study import calibrate_study
+    from truespring.calibration.writing import calibrated_values, write_calibrated
     from truespring.study import read_studies
-    from truespring.study.calibrate import calibrate_study
-    from truespring.study.calibrated import calibrated_values, write_calibrated
 
     study, *others = read_studies([options.study, *options.case, *options.held_out])
     cases, held_out = others[: len(options.case)], others[len(options.case) :]

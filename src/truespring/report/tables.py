@@ -5,12 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
 from truespring.report.result import Result
-from truespring.report.settling import settling_rows
 from truespring.report.standing import own_errors
-from truespring.report.summary import difference
 from truespring.report.supports import support_rows
 from truespring.report.verdict import verdict
-from truespring.settling import Refinement
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,7 +18,7 @@ def moduli_table(title: str, moduli: Moduli) -> "Table":
     plane = moduli.dim == 2
     # Finite elements realise the material, but for bending on a coarse mesh.
     elements = ("four-node FEM" if plane else "eight-node FEM",) if moduli.bending else ()
-    table = _table(title, "", "springs", *elements, "material")
+    table = new_table(title, "", "springs", *elements, "material")
 
     def add(what: str, found: str, wanted: str = "") -> None:
         table.add_row(what, found, *[wanted] * (1 + len(elements)))
@@ -69,7 +66,7 @@ def _section(moduli: Moduli, depth: int) -> str:
 
 def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
     """Return the stiffness rules: what each is made for, what it realises, and where it comes from."""
-    table = _table("Stiffness rules", "rule", "", "uses nu", "")
+    table = new_table("Stiffness rules", "rule", "", "uses nu", "")
     for name, rule in rules.items():
         uses = "yes" if rule["follows_poisson"] else "no"
         words = f"{rule['realises']}\nSource: {rule['source']}"
@@ -79,14 +76,14 @@ def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
 
 def result_tables(result: Result) -> "Iterator[Table | str]":
     """Yield the state of every path, the errors, the verdict, notes and warnings of a study."""
-    table = _table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
+    table = new_table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
     for name, path in result.paths.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
         table.add_row(name, path.label, str(path.status), f"{path.load_factor:.6g}", *spent)
     yield table
     if result.comparisons:
         yield _error_table(result)
-        supports = _support_table(result)
+        supports = support_table(result)
         if supports is not None:
             yield supports
     yield verdict(result)
@@ -97,53 +94,11 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
             yield f"warning: {name}: {warning}"
 
 
-def difference_tables(result: Result) -> "Iterator[Table | str]":
-    """Yield how far two results are apart at the last load level that both have, and what should be known of them."""
-    (one,) = result.comparisons.values()
-    values = difference(result)
-    table = _table(result.title, "", "")
-    table.show_header = False
-    for key, what in _DIFFERENCES.items():
-        if (value := values.get(key)) is not None:
-            table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")
-    table.add_row("compared", "node by node" if one.node_by_node else "at nodes of one, carried from the other")
-    table.add_row("nodes", f"{len(one.outside):,}, {one.n_outside:,} outside")
-    yield table
-    supports = _support_table(result)
-    if supports is not None:
-        yield supports
-    yield verdict(result)
-    for warning in values["warnings"]:
-        yield f"warning: {warning}"
-
-
-_DIFFERENCES = {
-    "load_factor": "at load factor",
-    "rms_error": "root-mean-square error",
-    "max_error": "largest error",
-    "probe_error": "error at the probe",
-    "force_error": "error of the supports' force or torque",
-    "energy_error": "error of the stored energy",
-    "rms_distance": "root-mean-square distance [m]",
-    "max_distance": "largest distance [m]",
-    "surface_rms": "surfaces apart, root mean square [m]",
-    "hausdorff": "surfaces apart, at most (Hausdorff) [m]",
-}
-
-
-def settling_table(title: str, found: Refinement) -> "Table":
-    """Return what quantities come to on finer meshes: value, order, extrapolated value, error, and what they tell."""
-    table = _table(title, "model", "", "value", "order", "at h = 0", "error", "")
-    for row in settling_rows(found):
-        table.add_row(*row)
-    return table
-
-
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
     by = ("by",) if forced else ()
     columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "own error")
-    table = _table(f"'{result.model}' against", "reference", "", *columns)
+    table = new_table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
         up_to = one.agrees_up_to_load_factor
@@ -153,14 +108,14 @@ def _error_table(result: Result) -> "Table":
     return table
 
 
-def _support_table(result: Result) -> "Table | None":
-    """Force and torque of each moved support, of the model and of each reference; None where none are known."""
+def support_table(result: Result) -> "Table | None":
+    """Return force and torque of each moved support, of the model and of each reference; None where none are known."""
     rows = list(support_rows(result))
     if not rows:
         return None
     loaded = any(row.share_of_load for row in rows)
     columns = ("", f"'{result.model}'", "reference", "error", *(("of the load",) if loaded else ()))
-    table = _table("What moved supports take", "support", *columns)
+    table = new_table("What moved supports take", "support", *columns)
     for row in rows:
         shares = [row.share_of_load or "-"] if loaded else []
         table.add_row(row.support, f"{row.quantity}, {row.label}", row.mine, row.theirs, row.error or "-", *shares)
@@ -171,7 +126,8 @@ def _share(error: float | None) -> str:
     return "-" if error is None else f"{error:.2%}"
 
 
-def _table(title: str, *columns: str) -> "Table":
+def new_table(title: str, *columns: str) -> "Table":
+    """Return an empty table; named columns but the first are aligned right."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left")

@@ -1,12 +1,6 @@
 """Study files: read, checked, run."""
 
-from truespring.settling import Refinement as Refinement
 from truespring.study.changes import value_at as value_at
-from truespring.study.compare import compare_sources as compare_sources
-from truespring.study.compare import read_probe as read_probe
-from truespring.study.compare import write_comparisons as write_comparisons
-from truespring.study.converge import converge as converge
-from truespring.study.converge import write_settling as write_settling
 from truespring.study.export import export_study as export_study
 from truespring.study.export import springs_of as springs_of
 from truespring.study.network import read_network as read_network
@@ -29,4 +23,3 @@ from truespring.study.run import write_model as write_model
 from truespring.study.run import write_moduli as write_moduli
 from truespring.study.run import write_overview as write_overview
 from truespring.study.run import write_rest as write_rest
-from truespring.study.sources import find_sources as find_sources

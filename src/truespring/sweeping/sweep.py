@@ -255,7 +255,7 @@ def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:
 
     The page tells how to run it again: the command line, where it was one.
     """
-    from truespring.report.sweeps import render_sweep
+    from truespring.sweeping.page import render_sweep
 
     page = render_sweep(done.plan.text.file, done.plan.text.tables.get("title"), done.plan.keys, done.rows, command)
     with Output(out, "sweep.csv") as output:

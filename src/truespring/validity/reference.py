@@ -8,8 +8,8 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.comparison import compare
+from truespring.converging.settling import Settling, settle
 from truespring.errors import MeshError, StudyError
-from truespring.settling import Settling, settle
 from truespring.validity.bodies import Body
 from truespring.validity.loads import Course, LoadType
 from truespring.validity.solving import Solved, Task, conjugate_force, run_task

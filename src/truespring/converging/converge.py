@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from truespring.comparison import most_moved
+from truespring.converging.page import render_settling
+from truespring.converging.settling import Attempt, Refinement, refinement
 from truespring.equilibrium import Solution
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
 from truespring.outputs import Output
-from truespring.report.settling import render_settling
-from truespring.settling import Attempt, Refinement, refinement
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 

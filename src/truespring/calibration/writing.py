@@ -9,16 +9,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from truespring.errors import StudyError
-from truespring.outputs import Output
-from truespring.report.calibration import (
+from truespring.calibration.page import (
     calibration_values,
     draw_calibration,
     fitted_sentence,
     render_calibration,
 )
+from truespring.calibration.study import Calibrated
+from truespring.errors import StudyError
+from truespring.outputs import Output
 from truespring.study import schema
-from truespring.study.calibrate import Calibrated
 from truespring.study.given import write_given
 from truespring.study.read import Study
 from truespring.study.toml import toml_text

@@ -3,14 +3,19 @@
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truespring.converging.settling import Refinement, Settling
 from truespring.report.figures import Drawing
 from truespring.report.page import close, picture, versions
 from truespring.report.plots import Curve, plot
 from truespring.report.style import SPRING_STYLES, figure_style
-from truespring.settling import Refinement, Settling
+from truespring.report.tables import new_table
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 
 def settling_rows(found: Refinement) -> Iterator[tuple[str, ...]]:
@@ -25,6 +30,14 @@ def settling_rows(found: Refinement) -> Iterator[tuple[str, ...]]:
         yield one.model, one.quantity, value, order, limit, error, state
 
 
+def settling_table(title: str, found: Refinement) -> "Table":
+    """Return what quantities come to on finer meshes: value, order, extrapolated value, error, and what they tell."""
+    table = new_table(title, "model", "", "value", "order", "at h = 0", "error", "")
+    for row in settling_rows(found):
+        table.add_row(*row)
+    return table
+
+
 def render_settling(title: str, file: Path, found: Refinement, command: str) -> str:
     """Return the page as HTML; `command` is what does it again."""
     from jinja2 import Environment, StrictUndefined
@@ -32,7 +45,7 @@ def render_settling(title: str, file: Path, found: Refinement, command: str) -> 
     folder = files("truespring.report")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["close"] = close
-    template = environment.from_string((folder / "settling.html.j2").read_text(encoding="utf-8"))
+    template = environment.from_string((files("truespring.converging") / "page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         # The look of all pages stands in that of studies.
         style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],

@@ -1,11 +1,11 @@
 """Bodies that do not lie where they should, told with the options that would make them."""
 
+from truespring.comparing.options import FileOptions
+from truespring.comparing.sources import Source
 from truespring.equilibrium import Solution
 from truespring.errors import ReferenceFileError
 from truespring.mesh.selections import AXES
 from truespring.misfit import Misfit, find_misfit
-from truespring.study.options import FileOptions
-from truespring.study.sources import Source
 
 _UNITS = {1e-6: "um", 1e-3: "mm", 1e-2: "cm", 0.0254: "inch", 0.3048: "ft", 1.0: "m", 1e3: "km"}
 

@@ -6,17 +6,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from truespring.calibration import (
-    REGULARISATION,
-    Calibration,
-    LoadCase,
-    calibrate,
-    make_unknowns,
-    read_curve,
-    require_one_body,
-    turned,
-)
-from truespring.calibration.calibration import Progress
+from truespring.calibration.calibration import REGULARISATION, Calibration, Progress, calibrate
+from truespring.calibration.cases import LoadCase, require_one_body
+from truespring.calibration.curve import read_curve
+from truespring.calibration.turned import turned
+from truespring.calibration.unknowns import make_unknowns
 from truespring.comparison import most_moved
 from truespring.equilibrium import Solution, solve
 from truespring.errors import StudyError, TruespringError, nearest

@@ -9,7 +9,7 @@ from truespring.report.figures import Drawing
 from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent
 from truespring.report.style import figure_style
-from truespring.report.sweep_plots import sweep_figures
+from truespring.sweeping.figures import sweep_figures
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -75,7 +75,7 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         drawings = [Drawing(one.png(), one.svg(), one.title, one.width) for one in sweep_figures(keys, rows)]
     failed = [row for row in rows if row["status"] != "converged"]
     extremes = _extremes(rows)
-    template = environment.from_string((folder / "sweep.html.j2").read_text(encoding="utf-8"))
+    template = environment.from_string((files("truespring.sweeping") / "page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         # The look of all pages stands in that of studies.
         style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.calibration import Calibration, CaseResult
+from truespring.calibration.calibration import Calibration, CaseResult
 from truespring.report.frame import EDGE, GRID, draw_bar, draw_frame, round_numbers, written
 from truespring.report.lines import draw_lines
 from truespring.report.plots import Curve, plot

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats
+from truespring.comparing.options import FileOptions, Given, options_of
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
@@ -21,7 +22,6 @@ from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, torque_axes
 from truespring.reference import Placing, format_of, placed, read_record, read_shell, read_stl
-from truespring.study.options import FileOptions, Given, options_of
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 

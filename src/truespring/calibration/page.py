@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truespring.calibration import Calibration, CaseResult
-from truespring.report.calibration_plots import calibration_figures
+from truespring.calibration.calibration import Calibration, CaseResult
+from truespring.calibration.figures import calibration_figures
 from truespring.report.figures import Drawing
 from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent
@@ -150,7 +150,7 @@ def render_calibration(
     folder = files("truespring.report")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["close"] = close
-    template = environment.from_string((folder / "calibration.html.j2").read_text(encoding="utf-8"))
+    template = environment.from_string((files("truespring.calibration") / "page.html.j2").read_text(encoding="utf-8"))
     told = found.identifiability
     shown = [f"{value:.2e}" for value in told.singular_values[:_SHOWN]]
     return template.render(

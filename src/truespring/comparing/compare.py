@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from truespring.comparing.misfits import box_words, refuse_misfit
+from truespring.comparing.options import Given, read_place
+from truespring.comparing.sources import Progress, Source, open_source
 from truespring.comparison import TOLERANCE, Comparison, compare
 from truespring.equilibrium import Solution
 from truespring.errors import StudyError, TruespringError
@@ -18,9 +21,6 @@ from truespring.report.curves import write_curves
 from truespring.report.result import Result
 from truespring.report.series import write_difference
 from truespring.report.summary import difference
-from truespring.study.misfits import box_words, refuse_misfit
-from truespring.study.options import Given, read_place
-from truespring.study.sources import Progress, Source, open_source
 
 Probe = str | tuple[float, ...] | None
 
