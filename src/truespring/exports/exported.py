@@ -121,7 +121,7 @@ class Exported:
     def told_of_springs(self) -> tuple[str, ...]:
         """How springs bear weight, what to expect of them, and what is to be known, a sentence a line."""
         everywhere = [load.words() for load in self.problem.loads if load.on is None]
-        weight = [f"{words.capitalize()} acts as forces on nodes." for words in everywhere]
+        weight = [f"{words[:1].upper()}{words[1:]} acts as forces on nodes." for words in everywhere]
         return printable([*weight, *self.expected, *self.notes])
 
     def _asked(self) -> Iterator[str]:
