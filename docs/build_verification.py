@@ -108,7 +108,7 @@ def uniform_tension() -> Iterator[Row]:
         found = 1 + float(path.states[-1].displacement[:, 0].max()) / 1.5
         _, stress = principal_state(law, 1.0, 1 / 3, (found, None, None))
         what, own = (
-            f"tension, {LAWS[law].label}: stress at stretch {found:.6f}",
+            f"tension, {ts.Fem(law).label}: stress at stretch {found:.6f}",
             ts.reference_error(tensile(0.3), ts.Fem(law)),
         )
         yield Row(what, 0.3, float(stress[0]), "the law", own)
@@ -386,7 +386,7 @@ def against_the_truth() -> str:
             for who, model in {**models, "four-node elements": ts.Fem(law)}.items():
                 error = ts.compare(ts.solve(problem, model, steps), truth).error
                 shown = "no equilibrium of the truth" if error is None else f"{error:.1%}"
-                found.setdefault(f"{who}: {LAWS[law].label}", []).append(shown)
+                found.setdefault(f"{who}: {ts.Fem(law).label}", []).append(shown)
     order = sorted(found, key=lambda one: one.split(":")[0])
     return "\n".join(lines + [f"| {name} | {' | '.join(found[name])} |" for name in order])
 

@@ -9,6 +9,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+import truespring as ts
+from truespring.models import LAWS, Law
+from truespring.models.law import Constants
+
 Floats = NDArray[np.float64]
 
 
@@ -222,32 +226,25 @@ def shallow_truss_limit(half_span: float, rise: float, stiffness: float) -> tupl
 # --- Constitutive laws in principal stretches ------------------------------------------------------------------------
 
 
-def _linear(stretch: Floats, lam: float, mu: float) -> Floats:
-    strain = stretch - 1
-    return lam * strain.sum() + 2 * mu * strain
+def material_of(law: str, young: float, poisson: float) -> ts.Material:
+    """A material for a law, with examples of the constants that it takes, those that are stresses by `young`.
+
+    Of a law whose constants give the moduli at small strain Poisson's ratio is that of the examples.
+    """
+    entry = LAWS[law]
+    values = {name: constant.example for name, constant in entry.constants.items()}
+    scale = 1.0
+    if entry.lame is not None:
+        lam, mu = entry.lame(values)
+        scale, poisson = young * (lam + mu) / mu / (3 * lam + 2 * mu), lam / 2 / (lam + mu)
+    scaled = {name: value * (scale if entry.constants[name].dimension else 1.0) for name, value in values.items()}
+    return ts.Material(young, poisson, constants=scaled)
 
 
-def _saint_venant_kirchhoff(stretch: Floats, lam: float, mu: float) -> Floats:
-    strain = (stretch**2 - 1) / 2
-    return stretch * (lam * strain.sum() + 2 * mu * strain)
-
-
-def _neo_hookean(stretch: Floats, lam: float, mu: float) -> Floats:
-    return mu * (stretch - 1 / stretch) + lam * np.log(stretch).sum() / stretch
-
-
-def _hencky(stretch: Floats, lam: float, mu: float) -> Floats:
-    strain = np.log(stretch)
-    return (lam * strain.sum() + 2 * mu * strain) / stretch
-
-
-#: Nominal stresses dW/dl_i [Pa] of the principal stretches l, shape (3,), by Lame's constants [Pa].
-NOMINAL_STRESS: dict[str, Callable[[Floats, float, float], Floats]] = {
-    "linear": _linear,
-    "saint-venant-kirchhoff": _saint_venant_kirchhoff,
-    "neo-hookean": _neo_hookean,
-    "hencky": _hencky,
-}
+def nominal_stress(law: Law, constants: Constants, stretch: Floats) -> Floats:
+    """Derivative of a law's own closed form by the stretches [Pa], shape (3,): by a complex step, so to rounding."""
+    steps = 1e-30j * np.eye(3)
+    return np.array([np.imag(law.density(stretch + step, constants)) / 1e-30 for step in steps])
 
 
 def lame(young: float, poisson: float) -> tuple[float, float]:
@@ -258,14 +255,18 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
 def principal_state(
     law: str, young: float, poisson: float, given: Sequence[float | None], free_guess: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Return the three stretches and nominal stresses [Pa]; None in `given` is a direction free of stress."""
-    lam, mu = lame(1.0, poisson)
+    """Return three stretches and nominal stresses [Pa] of `material_of`; None in `given` is a direction without stress.
+
+    A list of `given` is that of a body in 3D or in plane strain; plane stress is one with None as the last.
+    """
+    unit = material_of(law, 1.0, poisson)
+    constants = Constants(*lame(1.0, unit.poisson), False, dict(unit.constants))
     stretch = np.array([np.nan if one is None else one for one in given])
     free = np.isnan(stretch)
 
     def stress(unknown: Floats) -> Floats:
         stretch[free] = unknown
-        return NOMINAL_STRESS[law](stretch, lam, mu)
+        return nominal_stress(LAWS[law], constants, stretch)
 
     if free.any():
         found = root(lambda unknown: stress(unknown)[free], np.full(int(free.sum()), free_guess), tol=1e-14)

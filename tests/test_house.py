@@ -1,8 +1,11 @@
 """The picture of imports: problem x model x solver -> path -> comparison -> report, one way only."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -146,7 +149,7 @@ ALLOWED = {
     "exports": {"outputs", "equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "material"},
     "equilibrium": {"reactions", "models", "solvers", "potential", "problem", "mesh", "material"},
     "reactions": {"problem", "loading"},
-    "models": {"linear", "potential", "problem", "loading", "mesh", "material"},
+    "models": {"linear", "potential", "problem", "loading", "mesh", "material", "units"},
     "solvers": {"linear", "potential"},
     "linear": {"potential"},
     "problem": {"loading", "potential", "mesh", "material"},
@@ -171,8 +174,6 @@ HEAVY = {
     "numba",
     "pyamg",
     "pint",
-    "trimesh",
-    "meshio",
     "rich",
     "jinja2",
     "mujoco",
@@ -192,6 +193,7 @@ def rooms() -> dict[str, list[Path]]:
     return found
 
 
+@cache
 def imported(file: Path, everywhere: bool = True) -> set[str]:
     """Dotted names that a file imports, at its top only or everywhere."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
@@ -233,6 +235,18 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
                 continue
             assert not heavy, f"{file} imports {heavy} at its top"
             assert not any(name.startswith("truespring.kernels") for name in at_top), f"{file} imports numba at its top"
+
+
+def test_what_is_imported_is_a_declared_dependency() -> None:
+    project = tomllib.loads((SOURCE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    declared = [*project["dependencies"], *(one for name in extras.keys() - {"test"} for one in extras[name])]
+    modules = {"scikit-fem": "skfem", "lazy-loader": "lazy_loader", "ansys-mapdl-reader": "ansys", "pillow": "PIL"}
+    names = [re.split("[<>=]", one)[0] for one in declared]
+    allowed = {modules.get(name, name) for name in names} | {"truespring", *sys.stdlib_module_names}
+    for files in rooms().values():
+        for file in files:
+            assert {name.split(".")[0] for name in imported(file)} <= allowed, file
 
 
 def test_the_library_neither_prints_nor_exits() -> None:

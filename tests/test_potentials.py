@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import truespring as ts
-from tests.closed_forms import difference_errors, observed_orders
+from tests.closed_forms import difference_errors, material_of, observed_orders
 from tests.meshes import plane_of_two, solid_of_four
 from truespring import potential as potential_module
 from truespring.arrays import Floats
@@ -85,7 +85,11 @@ def shape(element: str) -> ts.Mesh:
 
 
 def body(
-    mesh: ts.Mesh, section: ts.PlaneStress | ts.PlaneStrain = THIN, distorted: bool = True, poisson: float = 0.3
+    mesh: ts.Mesh,
+    section: ts.PlaneStress | ts.PlaneStrain = THIN,
+    distorted: bool = True,
+    poisson: float = 0.3,
+    law: str = "linear",
 ) -> ts.Problem:
     """A body held on the left and pulled on the right; its nodes moved by up to a seventh where `distorted`."""
     x, y = mesh.nodes[:, 0], mesh.nodes[:, 1]
@@ -93,7 +97,7 @@ def body(
     pull, more = np.array([0.1, -0.15, 0.06]), np.array([0.02, 0.05, -0.03])
     return ts.Problem(
         ts.Mesh(mesh.nodes + jitter, mesh.elements, mesh.element),
-        ts.Material(young=7.0, poisson=poisson),
+        material_of(law, 7.0, poisson),
         section if mesh.dim == 2 else None,
         [ts.Fixed(on=np.flatnonzero(x == 0))],
         # The second load meets held nodes too: their supports answer for that share.
@@ -164,7 +168,7 @@ def _fem() -> dict[str, Case]:
     for law, entry in LAWS.items():
         for kind in BODIES:
             for section in (THIN, LONG) if shape(kind).dim == 2 else (THIN,):
-                problem = body(shape(kind), section)
+                problem = body(shape(kind), section, law=law)
                 for element in ELEMENTS:
                     model = ts.Fem(law, element)
                     try:
@@ -179,7 +183,7 @@ def _fem() -> dict[str, Case]:
                         problem,
                         quadratic=not entry.finite,
                         geometric=entry.finite,
-                        quadratic_stress=law == "linear" or (law == "saint-venant-kirchhoff" and not mean),
+                        quadratic_stress=entry.quadratic and not (entry.finite and mean),
                         barrier=entry.finite and (entry.barrier or mean),
                         mirrored=entry.finite and not entry.barrier and not mean,
                     )
@@ -194,7 +198,7 @@ def _links_and_tensors() -> dict[str, Case]:
         law, links = LAWS[model.law], isinstance(model, ts.Heml)
         for kind in BODIES:
             for section in (THIN, LONG) if shape(kind).dim == 2 else (THIN,):
-                problem = body(shape(kind), section)
+                problem = body(shape(kind), section, law=model.law)
                 try:
                     model.potential(problem)
                 except ts.TruespringError:
@@ -207,7 +211,7 @@ def _links_and_tensors() -> dict[str, Case]:
                     quadratic=not law.finite,
                     springs=links,
                     stressed=law.finite,
-                    quadratic_stress=not law.barrier,
+                    quadratic_stress=law.quadratic,
                     barrier=law.barrier,
                     mirrored=law.finite and not law.barrier,
                 )
@@ -310,7 +314,7 @@ def test_every_rule_law_and_element_is_here() -> None:
     # Two interpolations on each of six kinds of element and two bodies of several, the plane ones in two sections; on
     # triangles in plane strain and on tetrahedra another.
     bodies = 3 * 2 + 5
-    laws = len(LAWS) * (2 * bodies + 2)
+    laws = len(LAWS) * 2 * bodies + 2 * sum(law.trace is not None for law in LAWS.values())
     # HEML: one law on every element, the others on simplices; mass-tensor: the linear law likewise, another on these.
     links, tensors = bodies + 3 * (len(HEML_LAWS) - 1), bodies + 3
     assert len(CASES) == 1 + rules + 11 + laws + links + tensors + 3 * len(BOUNDARIES) + 8
@@ -518,7 +522,9 @@ def test_one_element_or_spring_is_projected_to_the_nearest(seed: int) -> None:
     """The nearest semidefinite matrix cuts off the negative eigenvalues."""
     potentials: list[Potential] = [ts.SpringNetwork([[0.0, 0.0, 0.0], [1.0, 0.5, 0.2]], [[0, 1]], [2.0])]
     for single in (ts.rectangle((1.0, 1.0), (1, 1)), ts.box((1.0, 1.0, 1.0), (1, 1, 1))):
-        potentials += [ts.Fem(law).potential(body(single, distorted=False)) for law in LAWS if LAWS[law].finite]
+        potentials += [
+            ts.Fem(law).potential(body(single, distorted=False, law=law)) for law in LAWS if LAWS[law].finite
+        ]
     for potential in potentials:
         positions = deformed(potential.nodes * 0.7, seed, size=0.05)
         values, vectors = np.linalg.eigh(potential.hessian(positions).toarray())

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 import truespring as ts
-from tests.closed_forms import NOMINAL_STRESS, cube_tension, lame, lattice_tension, principal_state
+from tests.closed_forms import cube_tension, lame, lattice_tension, material_of, principal_state
 from truespring.arrays import Floats
+from truespring.models import LAWS
 
 TIGHT = ts.Newton(load_steps=2, tolerance=1e-13)
 SOFT, HARD = 1.0, 5.0
-LAWS = tuple(NOMINAL_STRESS)
 KINDS = {
     "quadrilateral": ("linear", "mean-dilatation"),
     "triangle": ("linear", "quadratic"),
@@ -36,15 +36,16 @@ def body(
     hard: ts.Box | str | list[int] | Floats,
     poisson: tuple[float, float],
     loads: tuple[ts.Force, ...] = (),
+    law: str = "linear",
 ) -> ts.Problem:
     """The material SOFT with a region of HARD."""
     return ts.Problem(
         mesh,
-        ts.Material(SOFT, poisson[0]),
+        material_of(law, SOFT, poisson[0]),
         ts.PlaneStress(1.0) if mesh.dim == 2 else None,
         supports,
         loads,
-        [ts.Region(hard, ts.Material(HARD, poisson[1]))],
+        [ts.Region(hard, material_of(law, HARD, poisson[1]))],
     )
 
 
@@ -55,13 +56,13 @@ def half(mesh: ts.Mesh, axis: int) -> ts.Box:
     return ts.Box(tuple(lower), tuple(mesh.upper))
 
 
-def in_series(mesh: ts.Mesh, stress: float, poisson: tuple[float, float]) -> ts.Problem:
+def in_series(mesh: ts.Mesh, stress: float, poisson: tuple[float, float], law: str = "linear") -> ts.Problem:
     """Pulled along x, every node held across it: no part hinders another's contraction."""
     across = "yz"[: mesh.dim - 1]
     area = float(mesh.upper[1:].prod())
     load = ts.Force("right", [stress * area] + [0.0] * (mesh.dim - 1))
     supports = [ts.Fixed("left", fix="x"), ts.Fixed(range(mesh.n_nodes), fix=across)]
-    return body(mesh, supports, half(mesh, 0), poisson, (load,))
+    return body(mesh, supports, half(mesh, 0), poisson, (load,), law)
 
 
 def stretches_in_series(path: ts.Solution) -> tuple[float, float]:
@@ -112,7 +113,7 @@ def test_cubes_in_series(stress: float, k_body: float) -> None:
 def test_finite_elements_in_series(kind: str, element: str, law: str) -> None:
     stress, poisson = 0.2, (0.3, 0.1)
     mesh = bar(kind)
-    path = ts.solve(in_series(mesh, stress, poisson), ts.Fem(law, element), TIGHT)
+    path = ts.solve(in_series(mesh, stress, poisson, law), ts.Fem(law, element), TIGHT)
 
     def stretch(young: float, ratio: float) -> float:
         across = [1.0, None] if mesh.dim == 2 else [1.0, 1.0]
@@ -126,12 +127,12 @@ def test_finite_elements_in_series(kind: str, element: str, law: str) -> None:
     assert stretches_in_series(path) == pytest.approx(expected, rel=1e-10)
 
 
-def in_parallel(mesh: ts.Mesh, stretch: float, poisson: float) -> ts.Problem:
+def in_parallel(mesh: ts.Mesh, stretch: float, poisson: float, law: str = "linear") -> ts.Problem:
     """Pulled to a stretch along x, the upper half hard, all free across: both halves contract alike."""
     rollers = [ts.Fixed(side, fix=axis) for side, axis in zip(("left", "bottom", "back"), "xyz", strict=True)]
     motion = [(stretch - 1) * mesh.upper[0]] + [0.0] * (mesh.dim - 1)
     supports = [*rollers[: mesh.dim], ts.Fixed("right", fix="x", displacement=motion)]
-    return body(mesh, supports, half(mesh, 1), (poisson, poisson))
+    return body(mesh, supports, half(mesh, 1), (poisson, poisson), law=law)
 
 
 def check_parallel(problem: ts.Problem, model: object, stretches: Floats, stress: float) -> None:
@@ -160,7 +161,7 @@ def test_springs_in_parallel(stress: float) -> None:
 @pytest.mark.parametrize(("kind", "element"), [(kind, element) for kind, both in KINDS.items() for element in both])
 def test_finite_elements_in_parallel(kind: str, element: str, law: str) -> None:
     stretches, nominal = principal_state(law, 1.0, 0.3, [1.2, None, None])
-    check_parallel(in_parallel(bar(kind), 1.2, 0.3), ts.Fem(law, element), stretches, float(nominal[0]))
+    check_parallel(in_parallel(bar(kind), 1.2, 0.3, law), ts.Fem(law, element), stretches, float(nominal[0]))
 
 
 @pytest.mark.parametrize("springs", [ts.Springs("isotropic", volume=True), ts.Springs("biquadratic")])

@@ -1,7 +1,5 @@
 """Bodies read from STL files: what was written comes back, and what is no such body is refused in words."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -229,11 +227,6 @@ def test_a_uniform_strain_comes_back_on_any_mesh(
     assert state.area_ratio == pytest.approx(np.linalg.det(np.eye(2) + strain), rel=1e-10)
 
 
-def test_the_library_that_parses_is_imported_only_to_read() -> None:
-    code = "import sys, truespring.reference; sys.exit('trimesh' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 # --- warnings -------------------------------------------------------------------------------------
 
 
@@ -311,6 +304,14 @@ BROKEN = {
     "prose": (b"Dear reader, this is no mesh.\n" * 10, "no STL file"),
     "prose on solids": (b"solid ground is what we need\n" * 10, "no facet"),
     "a picture": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(range(256)), "no STL file"),
+    "ASCII, four vertices and two": (
+        WHOLE.replace("vertex 0 1 0\n", "", 1).replace("vertex 0 1 0\n", "vertex 0 1 0\n" * 2).encode(),
+        "each of three vertices",
+    ),
+    "ASCII, a solid that ends before it begins": (
+        f"solid a\n{FACET}endsolid a\nendsolid a\n{FACET}solid a\n".encode(),
+        "do not follow each other",
+    ),
     "NaN": (WHOLE.replace("1 0 0", "1 nan 0", 1).encode(), "not finite.*facet 1"),
     "infinite": (WHOLE.replace("1 0 0", "1 inf 0", 1).encode(), "not finite"),
     "no area": (WHOLE.replace("0 1 0", "2 0 0").encode(), "no area"),
@@ -354,7 +355,7 @@ def test_any_cut_is_noticed(bent: ts.Solution, tmp_path: Path) -> None:
 def test_a_missing_file_and_a_folder_are_refused(bent: ts.Solution, tmp_path: Path) -> None:
     with pytest.raises(ReferenceFileError, match=r"none\.stl does not exist: check the path"):
         read_stl(bent.problem, tmp_path / "none.stl")
-    with pytest.raises(ReferenceFileError, match="is a folder: give the STL file"):
+    with pytest.raises(ReferenceFileError, match="is a folder"):
         read_stl(bent.problem, tmp_path)
     whole = binary(tmp_path / "a.stl", flat(bent.problem.mesh, bent.problem.mesh.nodes))
     with pytest.raises(ReferenceFileError, match=r"rest\.stl does not exist"):

@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from truespring.arrays import Floats
+from truespring.arrays import Floats, in_space
 from truespring.errors import MeshError, ReferenceFileError, TruespringError
+from truespring.mesh import CELL_SHAPES
 from truespring.mesh.files import read_mesh
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk_grid
+from truespring.mesh.files.vtk_grid import contents
+from truespring.mesh.files.vtu_writing import write_vtu
 from truespring.reference.result import read_record
+from truespring.reference.vtk_cells import named
 
 GRADIENT = np.array([[0.01, 0.002, 0.0], [-0.001, -0.003, 0.0], [0.0, 0.0, -0.003]])
 SHAPE = (4, 2, 1)  # cells of the bar
@@ -260,7 +264,7 @@ def test_files_elsewhere_are_not_read(name: str, form: str, tmp_path: Path) -> N
         file = folder / "body.pvtu"
         piece = f'<Piece Source="{name}"/>'
         file.write_text(f'<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid>{piece}</PUnstructuredGrid></VTKFile>')
-    with pytest.raises(ReferenceFileError, match=r"body\.pvt?[du].* names '.*(own folder or below|that end in)"):
+    with pytest.raises(ReferenceFileError, match=r"body\.pvt?[du].* names '.*(same folder or below|that end in)"):
         read_record(file)
 
 
@@ -316,3 +320,50 @@ def test_every_suffix_is_a_mesh_and_a_result() -> None:
     from truespring.reference.result import READERS
 
     assert VTK_FORMATS.keys() <= FORMATS.keys() and VTK_FORMATS.keys() <= READERS.keys()
+
+
+# --- what we write -----------------------------------------------------------------------------------------------
+
+
+def test_every_kind_of_cell_is_written_as_vtk_reads_it(tmp_path: Path) -> None:
+    import pyvista as pv
+
+    points, cells, first = [], {}, 0
+    for number, (kind, shape) in enumerate(CELL_SHAPES.items()):
+        for place in (0, 5):
+            points.append(in_space(shape.places) + np.array([5.0 * number, place, 0.0]))
+        n_nodes = len(shape.places)
+        cells[kind] = first + np.arange(2 * n_nodes).reshape(2, n_nodes)
+        first += 2 * n_nodes
+    places = np.concatenate(points)
+    point_arrays = {"moved": moved(places), 'a "<&> b': np.arange(first, dtype=np.uint8)}
+    cell_arrays = {"stress": np.arange(18.0 * len(cells)).reshape(-1, 9), "part": np.arange(2 * len(cells))}
+    file = tmp_path / "all.vtu"
+    write_vtu(file, places, cells.items(), point_arrays, cell_arrays)
+
+    by_vtk = pv.read(file)
+    types = [shape.vtk_type for shape in CELL_SHAPES.values() for _ in (0, 1)]
+    assert by_vtk.celltypes.tolist() == types and by_vtk.points.tolist() == places.tolist()
+    for arrays, found in ((point_arrays, by_vtk.point_data), (cell_arrays, by_vtk.cell_data)):
+        assert {name: found[name].tolist() for name in found} == {name: arrays[name].tolist() for name in arrays}
+    sizes = by_vtk.compute_cell_sizes()
+    assert np.abs(sizes["Length"] + sizes["Area"] + sizes["Volume"]).min() > 0.1
+    for kind, nodes in cells.items():  # of a linear wedge VTK's first triangle goes round the other way
+        order = [0, 2, 1, 3, 5, 4] if kind == "wedge" else slice(None)
+        assert by_vtk.cells_dict[CELL_SHAPES[kind].vtk_type].tolist() == nodes[:, order].tolist()
+    ours = named(contents(read_vtk_grid(file.read_bytes(), tmp_path)).cells, file)
+    assert {kind: nodes.tolist() for kind, nodes in ours.items()} == {k: c.tolist() for k, c in cells.items()}
+
+
+@pytest.mark.parametrize("n_points", [0, 1 << 17, (1 << 17) + 1, 300_000])
+def test_arrays_of_any_length_are_written_in_blocks(n_points: int, tmp_path: Path) -> None:
+    """A block holds 1 MiB: none, one that is full, and several, the last of which is not."""
+    import pyvista as pv
+
+    points, values = np.zeros((n_points, 1)), np.arange(n_points)
+    write_vtu(tmp_path / "points.vtu", points, [], {"number": values})
+    read = pv.read(tmp_path / "points.vtu")
+    assert (read.n_points, read.n_cells) == (n_points, 0)
+    assert n_points == 0 or (read.point_data["number"] == values).all()
+    if n_points:
+        assert (read_vtk_grid((tmp_path / "points.vtu").read_bytes(), tmp_path).point_arrays["number"] == values).all()

@@ -112,7 +112,7 @@ def test_cells_without_our_shape_functions_are_refused(tmp_path: Path) -> None:
     grid = pyvista.UnstructuredGrid(np.array([5, 0, 1, 2, 3, 4]), np.array([7]), places)
     grid.point_data["u"] = places
     grid.save(file)
-    with pytest.raises(ReferenceFileError, match=r"grid.vtu: cells of VTK's type 7 are not read; line, triangle, quad"):
+    with pytest.raises(ReferenceFileError, match=r"grid.vtu: cells of VTK's type 7 are not read; line, "):
         read_vtk_result(file)
 
 

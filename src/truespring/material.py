@@ -2,8 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
@@ -19,13 +19,26 @@ class Lame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """An isotropic elastic material: `young` [Pa], `poisson` [-], `density` [kg/m^3] if known."""
+    """An isotropic elastic material.
+
+    Attributes:
+        young: Young's modulus [Pa], positive.
+        poisson: Poisson's ratio [-], between -1 and 0.5, both excluded.
+        density: [kg/m^3], positive; None where not known.
+        constants: further constants of constitutive laws by name [SI], as a mapping or pairs, kept as sorted pairs.
+            Which there are is said by the entries of LAWS; a law ignores those of others.
+    """
 
     young: float
     poisson: float
     density: float | None = None
+    constants: Mapping[str, float] | Sequence[tuple[str, float]] = field(default=())
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "constants", tuple(sorted(dict(self.constants).items())))
+        for name, value in dict(self.constants).items():
+            if not math.isfinite(value):
+                raise ProblemError(f"{name} = {value!r}: a constant of a material must be finite")
         if not (math.isfinite(self.young) and self.young > 0):
             raise ProblemError(f"young = {self.young!r} Pa: Young's modulus must be positive and finite")
         if not -1 < self.poisson < 0.5:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, in_space
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 
@@ -195,8 +195,8 @@ def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: 
     if state is None or theirs is None or not other.fills:
         return 0.0
     some, told = _some(len(grid.points)), motion or places
-    moved = told.factor * _turned(_in_space((state.all_positions - grid.points)[some]), told.axes)
-    rest = places.factor * _turned(_in_space(grid.points[some]), places.axes) + np.array(places.shift)
+    moved = told.factor * _turned(in_space((state.all_positions - grid.points)[some]), told.axes)
+    rest = places.factor * _turned(in_space(grid.points[some]), places.axes) + np.array(places.shift)
     dim = min(other.dim, grid.dim)
     if other.dim == 3 and grid.dim == 2:
         rest[:, 2] = (other.points[:, 2].min() + other.points[:, 2].max()) / 2
@@ -211,9 +211,3 @@ def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: 
 
 def _some(n_points: int) -> Ints:
     return np.unique(np.linspace(0, n_points - 1, _SAMPLE).astype(np.int64))
-
-
-def _in_space(vectors: Floats) -> Floats:
-    padded = np.zeros((len(vectors), 3))
-    padded[:, : vectors.shape[1]] = vectors
-    return padded

@@ -1,7 +1,6 @@
 """What a calibration tells: a table for a terminal, values for JSON, and a page that loads nothing from anywhere."""
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,8 +8,8 @@ import numpy as np
 from truespring.calibration.calibration import Calibration, CaseResult
 from truespring.calibration.figures import calibration_figures
 from truespring.report.figures import Drawing
-from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent
+from truespring.report.shell import picture, render
 from truespring.report.style import figure_style
 
 if TYPE_CHECKING:
@@ -145,17 +144,11 @@ def render_calibration(
         names: of the files beside the page.
         command: what does it again.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    folder = files("truespring.report")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = close
-    template = environment.from_string((files("truespring.calibration") / "page.html.j2").read_text(encoding="utf-8"))
     told = found.identifiability
     shown = [f"{value:.2e}" for value in told.singular_values[:_SHOWN]]
-    return template.render(
-        # The look of all pages stands in that of studies.
-        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+    return render(
+        "calibration/page.html.j2",
+        command,
         title=title,
         what=what,
         headline=found.headline,
@@ -174,8 +167,6 @@ def render_calibration(
             for name, value in found.objectives.items()
         ],
         files=f"Beside this page: {', '.join(names)}.",
-        versions=versions(),
-        command=command,
     )
 
 

@@ -17,6 +17,7 @@ from truespring.comparing.options import FileOptions, Given, options_of
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ReferenceFileError, StudyError, TruespringError, nearest
 from truespring.mesh import read_mesh
+from truespring.mesh.files.vtu import read_grids
 from truespring.opening import read_file
 from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
@@ -173,11 +174,9 @@ def _of_folder(source: Source, report: Callable[[float], None]) -> Solution:
 
 def _held(path: Solution, body: Path) -> Bools | None:
     """The directions of nodes that supports held, as mesh.vtu tells them; None where it does not, or of other nodes."""
-    import meshio
-
-    told, nodes = meshio.read(body), path.problem.mesh.nodes
-    held = told.point_data.get("held")
-    if held is None or len(held) != len(nodes) or not np.allclose(told.points[:, : nodes.shape[1]], nodes):
+    (grid,), nodes = read_grids(read_file(body, ReferenceFileError)), path.problem.mesh.nodes
+    held = grid.point_arrays.get("held")
+    if held is None or len(held) != len(nodes) or not np.allclose(grid.points[:, : nodes.shape[1]], nodes):
         return None
     return np.asarray(held[:, : nodes.shape[1]] > 0)
 

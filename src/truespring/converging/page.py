@@ -1,7 +1,6 @@
 """What a study tells on finer and finer meshes: rows of a table, and a page that loads nothing from anywhere."""
 
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +8,8 @@ import numpy as np
 
 from truespring.converging.settling import Refinement, Settling
 from truespring.report.figures import Drawing
-from truespring.report.page import close, picture, versions
 from truespring.report.plots import Curve, plot
+from truespring.report.shell import picture, render
 from truespring.report.style import SPRING_STYLES, figure_style
 from truespring.report.tables import new_table
 
@@ -40,15 +39,9 @@ def settling_table(title: str, found: Refinement) -> "Table":
 
 def render_settling(title: str, file: Path, found: Refinement, command: str) -> str:
     """Return the page as HTML; `command` is what does it again."""
-    from jinja2 import Environment, StrictUndefined
-
-    folder = files("truespring.report")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = close
-    template = environment.from_string((files("truespring.converging") / "page.html.j2").read_text(encoding="utf-8"))
-    return template.render(
-        # The look of all pages stands in that of studies.
-        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+    return render(
+        "converging/page.html.j2",
+        command,
         title=title,
         file=str(file),
         sentence=found.sentence,
@@ -61,8 +54,6 @@ def render_settling(title: str, file: Path, found: Refinement, command: str) -> 
         ],
         picture=_figure(found),
         rows=list(settling_rows(found)),
-        versions=versions(),
-        command=command,
     )
 
 

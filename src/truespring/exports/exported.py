@@ -223,13 +223,6 @@ def solve_springs(
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
-def in_space(vectors: Floats) -> Floats:
-    """Pad vectors of a plane body with zeros to three components, shape (n, 3)."""
-    padded = np.zeros((len(vectors), 3))
-    padded[:, : vectors.shape[1]] = vectors
-    return padded
-
-
 def printable(sentences: Iterable[str]) -> tuple[str, ...]:
     """Return sentences of a line each: whatever a title holds, it does not end the comment that it stands in."""
     signs = ("".join(sign if sign.isprintable() else " " for sign in sentence) for sentence in sentences)

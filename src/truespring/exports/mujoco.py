@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats
-from truespring.exports.exported import Exported, in_space
+from truespring.arrays import Bools, Floats, in_space
+from truespring.exports.exported import Exported
 from truespring.exports.motion import Motion, motion_of
 from truespring.mesh.selections import AXES
 from truespring.models import SpringNetwork

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats
-from truespring.exports.exported import Exported, in_space
+from truespring.arrays import Bools, Floats, in_space
+from truespring.exports.exported import Exported
 from truespring.models import SpringNetwork
 
 #: What the form was checked against.

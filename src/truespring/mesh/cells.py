@@ -19,6 +19,7 @@ class CellShape:
     """A kind of cell in its own coordinates.
 
     Attributes:
+        vtk_type: VTK's number of the cell type.
         base: the kind of its corners alone.
         corners: places of the corners, shape (n_corners, dim).
         between: the corners midway between which each further node stands.
@@ -27,6 +28,7 @@ class CellShape:
         facets: what bounds it, by its corners, seen from outside anticlockwise; of a plane cell its edges.
     """
 
+    vtk_type: int
     base: str
     corners: Floats
     between: Groups
@@ -147,34 +149,35 @@ _FACETS: dict[str, Groups] = {
 _HEXAHEDRON_FACES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
 
-def _shape(base: str, powers: Floats, between: Groups = ()) -> CellShape:
-    return CellShape(base, np.array(_CORNERS[base], dtype=float), between, powers, _FACETS[base])
+def _shape(vtk_type: int, base: str, powers: Floats, between: Groups = ()) -> CellShape:
+    return CellShape(vtk_type, base, np.array(_CORNERS[base], dtype=float), between, powers, _FACETS[base])
 
 
-#: By meshio's name of the cell.
+#: By the cell's name, as meshio and scikit-fem spell it. An entry is all that a kind of cell in results needs.
 CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
     {
-        "line": _shape("line", _powers(_cubic(1, 1))),
-        "line3": _shape("line", _powers(_cubic(1, 2)), _EDGES["line"]),
-        "triangle": _shape("triangle", _powers(_simplex(2, 1))),
-        "triangle6": _shape("triangle", _powers(_simplex(2, 2)), _EDGES["triangle"]),
-        "quad": _shape("quad", _powers(_cubic(2, 1))),
-        "quad8": _shape("quad", _powers(_serendipity(2)), _EDGES["quad"]),
-        "quad9": _shape("quad", _powers(_cubic(2, 2)), (*_EDGES["quad"], (0, 1, 2, 3))),
-        "tetra": _shape("tetra", _powers(_simplex(3, 1))),
-        "tetra10": _shape("tetra", _powers(_simplex(3, 2)), _EDGES["tetra"]),
-        "hexahedron": _shape("hexahedron", _powers(_cubic(3, 1))),
-        "hexahedron20": _shape("hexahedron", _powers(_serendipity(3)), _EDGES["hexahedron"]),
+        "line": _shape(3, "line", _powers(_cubic(1, 1))),
+        "line3": _shape(21, "line", _powers(_cubic(1, 2)), _EDGES["line"]),
+        "triangle": _shape(5, "triangle", _powers(_simplex(2, 1))),
+        "triangle6": _shape(22, "triangle", _powers(_simplex(2, 2)), _EDGES["triangle"]),
+        "quad": _shape(9, "quad", _powers(_cubic(2, 1))),
+        "quad8": _shape(23, "quad", _powers(_serendipity(2)), _EDGES["quad"]),
+        "quad9": _shape(28, "quad", _powers(_cubic(2, 2)), (*_EDGES["quad"], (0, 1, 2, 3))),
+        "tetra": _shape(10, "tetra", _powers(_simplex(3, 1))),
+        "tetra10": _shape(24, "tetra", _powers(_simplex(3, 2)), _EDGES["tetra"]),
+        "hexahedron": _shape(12, "hexahedron", _powers(_cubic(3, 1))),
+        "hexahedron20": _shape(25, "hexahedron", _powers(_serendipity(3)), _EDGES["hexahedron"]),
         "hexahedron27": _shape(
+            29,
             "hexahedron",
             _powers(_cubic(3, 2)),
             (*_EDGES["hexahedron"], *_HEXAHEDRON_FACES, tuple(range(8))),
         ),
-        "wedge": _shape("wedge", _powers(_prism(1, True))),
-        "wedge15": _shape("wedge", _powers(_prism(2, False)), _EDGES["wedge"]),
-        "wedge18": _shape("wedge", _powers(_prism(2, True)), (*_EDGES["wedge"], *_FACETS["wedge"][2:])),
-        "pyramid": _shape("pyramid", np.array(_PYRAMID, dtype=float)),
-        "pyramid13": _shape("pyramid", np.array(_PYRAMID_13, dtype=float), _EDGES["pyramid"]),
+        "wedge": _shape(13, "wedge", _powers(_prism(1, True))),
+        "wedge15": _shape(26, "wedge", _powers(_prism(2, False)), _EDGES["wedge"]),
+        "wedge18": _shape(32, "wedge", _powers(_prism(2, True)), (*_EDGES["wedge"], *_FACETS["wedge"][2:])),
+        "pyramid": _shape(14, "pyramid", np.array(_PYRAMID, dtype=float)),
+        "pyramid13": _shape(27, "pyramid", np.array(_PYRAMID_13, dtype=float), _EDGES["pyramid"]),
     }
 )
 

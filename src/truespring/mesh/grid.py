@@ -51,7 +51,7 @@ class Grid:
 
     Attributes:
         points: at rest [m], shape (n_points, dim).
-        cells: point numbers by meshio's name of the cells, a key of CELL_SHAPES, in VTK's order, shape (n_cells, k).
+        cells: point numbers by a key of CELL_SHAPES, in VTK's order, shape (n_cells, k).
 
     Raises MeshError where a kind is not known or a cell names a point that does not exist.
     """

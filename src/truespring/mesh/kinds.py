@@ -24,7 +24,7 @@ class ElementKind:
         simplices: triangles or tetrahedra, each counted by `simplex_weight`, whose measures add up to
             the element's own: of a hexahedron both divisions into five, of a wedge or a pyramid two that divide each
             face of four corners both ways, whose mean is exact.
-        vtk: meshio's name of the cell.
+        vtk: the name of the cell in CELL_SHAPES.
         sharing: for each pair (edges first) how many elements of an unbounded regular mesh share it;
             empty where that depends on the mesh.
         merged: its nodes as the corners of a quadrilateral or hexahedron, of which some are one; so a mesh of several

@@ -14,7 +14,10 @@ from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
 from truespring.models.given import GivenSprings as GivenSprings
 from truespring.models.heml import Heml as Heml
+from truespring.models.law import Constant as Constant
+from truespring.models.law import Law as Law
 from truespring.models.laws import LAWS as LAWS
+from truespring.models.laws import material_constants as material_constants
 from truespring.models.mass_tensor import MassTensor as MassTensor
 from truespring.models.mechanism import refuse_mechanism as refuse_mechanism
 from truespring.models.moduli import Moduli as Moduli

@@ -12,7 +12,8 @@ from skfem.quadrature import get_quadrature
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS, MIXED, Mesh, counted
-from truespring.models.laws import LAWS, Constants, Law, Response
+from truespring.models.law import Constants, Law, Response
+from truespring.models.laws import LAWS, law_constants
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, voigt_places
 from truespring.potential import Pattern, Potential, SparseMatrix
@@ -68,7 +69,7 @@ class Fem:
     """The finite element model.
 
     Attributes:
-        law: linear, saint-venant-kirchhoff, neo-hookean or hencky.
+        law: a key of LAWS.
         element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals, hexahedra,
             wedges and pyramids), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes
             in the middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the
@@ -94,14 +95,14 @@ class Fem:
     def label(self) -> str:
         """How curves and tables call the model: the law is always named."""
         asked = "" if self.element is None else f" ({self.element.replace('-', ' ')})"
-        return f"{LAWS[self.law].label}{asked}"
+        return f"{LAWS[self.law].label} FEM{asked}"
 
     def chosen_element(self, problem: Problem) -> str:
         """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
         if self.element is None:
-            usual, incompressible = _defaults(problem)
+            usual, incompressible = self._defaults(problem)
             return incompressible if locks(problem) else usual
-        allowed = _allowed(problem)
+        allowed = self._allowed(problem)
         if self.element not in allowed:
             within = f" in {problem.section.words}" if problem.section and _free_thickness(problem) else ""
             raise ModelError(
@@ -122,7 +123,7 @@ class Fem:
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
-            f'element = "{_defaults(problem)[-1]}", the default here, does not lock',
+            f'element = "{self._defaults(problem)[-1]}", the default here, does not lock',
             *stiff,
         )
 
@@ -136,20 +137,18 @@ class Fem:
         kinds = {kind.interpolation: kind for kind in own}
         return fem_potential(problem, self.law, kinds[self.chosen_element(problem)])
 
+    def _defaults(self, problem: Problem) -> tuple[str, str]:
+        """Return the default interpolations on the mesh: usually, and where the usual one locks."""
+        if problem.mesh.element not in SIMPLICES:
+            return "linear", "mean-dilatation"
+        return "quadratic", "quadratic" if LAWS[self.law].trace is None else "quadratic-mean-dilatation"
 
-def _defaults(problem: Problem) -> tuple[str, str]:
-    """The interpolations that are the default on the mesh: usually, and where the usual ones lock."""
-    if problem.mesh.element in SIMPLICES:
-        return "quadratic", "quadratic-mean-dilatation"
-    return "linear", "mean-dilatation"
-
-
-def _allowed(problem: Problem) -> tuple[str, ...]:
-    """The interpolations that the mesh allows."""
-    found = dict.fromkeys(("linear", *_defaults(problem)))
-    if _free_thickness(problem):  # the third direction is free to take lambda's part
-        found.pop("quadratic-mean-dilatation", None)
-    return tuple(found)
+    def _allowed(self, problem: Problem) -> tuple[str, ...]:
+        """Return the interpolations that the mesh and the law allow."""
+        found = dict.fromkeys(("linear", *self._defaults(problem)))
+        if _free_thickness(problem):  # the third direction is free to take lambda's part
+            found.pop("quadratic-mean-dilatation", None)
+        return tuple(found)
 
 
 def _free_thickness(problem: Problem) -> bool:
@@ -206,13 +205,7 @@ def _require_continuum(problem: Problem) -> None:
 
 
 def _of_one_kind(problem: Problem, law: str, kind: "type[FemPotential] | None") -> "FemPotential":
-    plane_stress = _free_thickness(problem)
-    if len(problem.materials) == 1:
-        constants = Constants(*problem.materials[0].lame, plane_stress)
-    else:
-        lam, mu = (problem.of_elements(value)[:, None] for value in (lambda one: one.lame.lam, lambda one: one.lame.mu))
-        constants = Constants(lam, mu, plane_stress)
-    return (kind or FemPotential)(problem, LAWS[law], constants)
+    return (kind or FemPotential)(problem, LAWS[law], law_constants(problem, law))
 
 
 def element_matrices(problem: Problem) -> Floats:

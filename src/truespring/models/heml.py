@@ -11,7 +11,8 @@ from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.fem import Fem, FemPotential, fem_of_one_kind, fem_potential, locking_warnings
-from truespring.models.laws import LAWS, Response
+from truespring.models.law import Response
+from truespring.models.laws import LAWS
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
 from truespring.models.summed import SummedLinks, summed_links
@@ -51,7 +52,7 @@ class Heml:
     @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        return f"HEML ({LAWS[self.law].label.removesuffix(' FEM')})"
+        return f"HEML ({LAWS[self.law].label})"
 
     def second_order(self, problem: Problem) -> Fem:
         """Return the finite elements of second order of the same law: where finer meshes of this model lead."""

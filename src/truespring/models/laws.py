@@ -1,18 +1,20 @@
 """Constitutive laws: from the strain to energy density, stress and elasticity.
 
 Arrays have their tensor axes first, then those of elements and points; a symmetric tensor has one
-axis, its components in Voigt's order. In the plane the third direction is settled here: in plane
-strain it keeps its length, in plane stress it takes the one that leaves it free of stress. A law is
-one function and one line in LAWS.
+axis, its components in Voigt's order. A law accounts for the third direction of a plane body: in plane
+strain its length is fixed, in plane stress it is free of stress. A law is two functions, the response
+and the energy density in principal stretches against which it is tested, and one entry of LAWS.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.errors import ModelError, nearest
+from truespring.material import Material
+from truespring.models.law import Constant, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import (
     contracted,
@@ -25,69 +27,10 @@ from truespring.models.symmetric import (
     swapped,
     trace,
 )
+from truespring.problem import Problem
 
-
-@dataclass(frozen=True, slots=True)
-class Constants:
-    """What a law needs: the Lamé constants [Pa] and how the third direction behaves.
-
-    The constants are numbers, or arrays of shape (n_elements, 1) where materials differ.
-    `lam_plane` is 2 lam mu / (lam + 2 mu) in plane stress, lam otherwise: the constant with which a
-    quadratic law within the plane accounts for the third direction.
-    """
-
-    lam: float | Floats
-    mu: float | Floats
-    plane_stress: bool
-
-    @property
-    def lam_plane(self) -> float | Floats:
-        """The first Lamé constant within the plane [Pa]."""
-        return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
-
-    def part(self, first: int, last: int) -> "Constants":
-        """Return those of a slice of the elements."""
-        if np.ndim(self.lam) == 0:
-            return self
-        return Constants(np.asarray(self.lam)[first:last], np.asarray(self.mu)[first:last], self.plane_stress)
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """What a law answers.
-
-    Attributes:
-        energy: per reference volume [J/m^3]; infinite where the law does not reach.
-        stress: second Piola-Kirchhoff stress [Pa], axes (component, ...); of the linear law, the stress.
-        elasticity: makes its derivative by the Green strain [Pa], axes (component, component, ...): a function,
-            for it costs most and energy and forces do not need it. A component of the strain stands for both of
-            its mirror images, so that a change of strain of e.g. e_xy multiplies twice.
-        thickness_stretch: length of the third direction over its rest length; 1 where it is held or in 3D.
-        across: Kirchhoff stress of the third direction [Pa], zero in plane stress; of the linear law, the stress.
-    """
-
-    energy: Floats
-    stress: Floats
-    elasticity: Callable[[], Floats]
-    thickness_stretch: Floats
-    across: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Law:
-    """A table entry: `respond` takes the strain measure named by `finite`.
-
-    A finite law takes the right Cauchy-Green tensor C = F^T F and is frame invariant; a law that is
-    not finite takes the small strain (F + F^T) / 2 - I. A law with a `barrier` has infinite energy
-    where an element is inverted; C alone cannot tell that. In 3D and plane strain lambda's part of the
-    energy is lam/2 (ln J)^2 of a `logarithmic` law, else lam/2 times the squared trace of its strain.
-    """
-
-    respond: Callable[[Floats, Constants], Response]
-    finite: bool
-    barrier: bool
-    logarithmic: bool
-    label: str
+# A law whose constants give Young's modulus and Poisson's ratio at small strain takes a material within these of it.
+_SAME_MATERIAL = 0.01
 
 
 def linear(strain: Floats, constants: Constants) -> Response:
@@ -226,13 +169,134 @@ def _log_difference(a: Floats, b: Floats) -> Floats:
     return np.divide(logarithm, x, out=np.ones_like(x), where=x != 0)
 
 
+def _small_density(stretch: Any, constants: Constants) -> Any:
+    return _quadratic_density(stretch - 1, constants)
+
+
+def _green_density(stretch: Any, constants: Constants) -> Any:
+    return _quadratic_density((stretch**2 - 1) / 2, constants)
+
+
+def _hencky_density(stretch: Any, constants: Constants) -> Any:
+    return _quadratic_density(np.log(stretch), constants)
+
+
+def _quadratic_density(strain: Any, constants: Constants) -> Any:
+    """mu e : e + lam/2 (tr e)^2 of the three principal strains [J/m^3]."""
+    return constants.mu * (strain**2).sum() + constants.lam / 2 * strain.sum() ** 2
+
+
+def _neo_hookean_density(stretch: Any, constants: Constants) -> Any:
+    log_J = np.log(stretch).sum()
+    return constants.mu * (((stretch**2).sum() - 3) / 2 - log_J) + constants.lam / 2 * log_J**2
+
+
 LAWS: MappingProxyType[str, Law] = MappingProxyType(
     {
-        "linear": Law(linear, finite=False, barrier=False, logarithmic=False, label="linear FEM"),
-        "saint-venant-kirchhoff": Law(
-            saint_venant_kirchhoff, finite=True, barrier=False, logarithmic=False, label="St. Venant-Kirchhoff FEM"
+        "linear": Law(
+            linear,
+            _small_density,
+            label="linear",
+            source="Hooke's law of the small strain",
+            finite=False,
+            barrier=False,
+            quadratic=True,
+            trace="small",
         ),
-        "neo-hookean": Law(neo_hookean, finite=True, barrier=True, logarithmic=True, label="neo-Hookean FEM"),
-        "hencky": Law(hencky, finite=True, barrier=True, logarithmic=True, label="Hencky FEM"),
+        "saint-venant-kirchhoff": Law(
+            saint_venant_kirchhoff,
+            _green_density,
+            label="St. Venant-Kirchhoff",
+            source="Hooke's law of the Green strain; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4",
+            finite=True,
+            barrier=False,
+            quadratic=True,
+            trace="green",
+            domain=(1 / np.sqrt(3), np.inf),
+        ),
+        "neo-hookean": Law(
+            neo_hookean,
+            _neo_hookean_density,
+            label="neo-Hookean",
+            source="Simo and Pister 1984; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4.3",
+            finite=True,
+            barrier=True,
+            quadratic=False,
+            trace="logarithmic",
+        ),
+        "hencky": Law(
+            hencky,
+            _hencky_density,
+            label="Hencky",
+            source="Hencky 1928: quadratic in ln U",
+            finite=True,
+            barrier=True,
+            quadratic=False,
+            trace="logarithmic",
+            domain=(0.0, np.e),
+        ),
     }
 )
+
+
+def material_constants() -> dict[str, Constant]:
+    """Return all constants that laws take besides lam and mu, by name: the further keys of a material."""
+    return {name: constant for law in LAWS.values() for name, constant in law.constants.items()}
+
+
+def law_constants(problem: Problem, name: str) -> Constants:
+    """Return the constants of a law for the elements of a problem, numbers or of shape (n_elements, 1) [SI].
+
+    Raises ModelError where a material has a constant that no law knows, lacks one that the law needs, has one out of
+    range, or has other moduli than the law's constants give at small strain.
+    """
+    plane_stress = problem.section is not None and problem.section.free_thickness
+    law = LAWS[name]
+    found = {material: _values(material, name) for material in problem.materials}
+    if len(found) == 1:
+        ((material, values),) = found.items()
+        return Constants(*material.lame, plane_stress, values)
+    lam, mu = (problem.of_elements(value)[:, None] for value in (lambda one: one.lame.lam, lambda one: one.lame.mu))
+
+    def by_element(key: str) -> Floats:
+        return problem.of_elements(lambda material: found[material][key])[:, None]
+
+    return Constants(lam, mu, plane_stress, {key: by_element(key) for key in law.constants})
+
+
+def _values(material: Material, name: str) -> dict[str, float]:
+    """The values of a law's constants for a material, defaults filled in [SI]."""
+    law, known, has = LAWS[name], material_constants(), dict(material.constants)
+    for key in has.keys() - known.keys():
+        allowed = f"allowed: {', '.join(known)}" if known else "no law has constants besides young and poisson"
+        raise ModelError(f"material: constant '{key}' is unknown{nearest(key, known)}; {allowed}")
+    values: dict[str, float] = {}
+    for key, constant in law.constants.items():
+        value = has.get(key, constant.default)
+        if value is None:
+            raise ModelError(
+                f"law = '{name}' needs {key} [{constant.unit}], {constant.meaning}: the material has none; "
+                f"give it beside young and poisson"
+            )
+        if not constant.smallest <= value <= constant.largest:
+            raise ModelError(
+                f"{key} = {value:g} {constant.unit}: law = '{name}' takes {constant.smallest:g} to {constant.largest:g}"
+            )
+        values[key] = value
+    if law.lame is not None:
+        _require_same_moduli(material, name, values)
+    return values
+
+
+def _require_same_moduli(material: Material, name: str, values: dict[str, float]) -> None:
+    """Raise ModelError where a law has other moduli at small strain than a material."""
+    lame = LAWS[name].lame
+    assert lame is not None
+    lam, mu = lame(values)
+    young, poisson = mu * (3 * lam + 2 * mu) / (lam + mu), lam / 2 / (lam + mu)
+    if abs(young / material.young - 1) > _SAME_MATERIAL or abs(poisson - material.poisson) > _SAME_MATERIAL:
+        given = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        raise ModelError(
+            f"law = '{name}' with {given} has young = {young:g} Pa and poisson = {poisson:g} at small strain, the "
+            f"material {material.young:g} Pa and {material.poisson:g}: give the same material to all models"
+        )

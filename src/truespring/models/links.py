@@ -8,7 +8,7 @@ from truespring.arrays import Floats, Ints
 from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.models.fem import fem_of_one_kind
-from truespring.models.laws import Constants
+from truespring.models.law import Constants
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 

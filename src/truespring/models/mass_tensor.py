@@ -19,7 +19,7 @@ from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
 #: Laws whose energy is a polynomial of the displacements.
-TENSOR_LAWS = ("linear", "saint-venant-kirchhoff")
+TENSOR_LAWS = tuple(name for name, law in LAWS.items() if law.quadratic)
 _SIMPLICES = ("triangle", "tetrahedron")
 # Threads share the simplices from so many on.
 _SMALLEST_PIECE = 256
@@ -50,7 +50,7 @@ class MassTensor:
     @property
     def label(self) -> str:
         """How curves and tables call the model."""
-        return f"mass-tensor ({LAWS[self.law].label.removesuffix(' FEM')})"
+        return f"mass-tensor ({LAWS[self.law].label})"
 
     def second_order(self, problem: Problem) -> Fem:
         """Return the finite elements of second order of the same law: where finer meshes of this model lead."""

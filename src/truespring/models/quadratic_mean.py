@@ -9,7 +9,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models.fem import Points, determinant
-from truespring.models.laws import Response
+from truespring.models.law import Response
 from truespring.models.quadratic import QuadraticPotential
 from truespring.models.symmetric import contracted, identity, inverted, outer, swapped, trace
 
@@ -45,7 +45,7 @@ class QuadraticMeanPotential(QuadraticPotential):
     def _volume(self, at: Points) -> _Volume:
         strain, lam = self._strain(at), at.constants.lam
         eye = np.broadcast_to(identity(strain), strain.shape)
-        if not self.law.logarithmic:
+        if self.law.trace != "logarithmic":
             own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
             mean = _mean(own, at)
             flat = partial(np.zeros, (len(strain), *strain.shape))

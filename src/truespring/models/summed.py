@@ -11,7 +11,7 @@ from scipy import sparse
 from truespring.arrays import Floats, Ints, ShortInts
 from truespring.mesh import Mesh
 from truespring.models.fem import FemPotential
-from truespring.models.laws import Law
+from truespring.models.law import Law
 from truespring.models.linked import LinkedElements
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem

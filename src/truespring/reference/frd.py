@@ -16,7 +16,7 @@ from truespring.reference.checks import checked, refuse_repeated, refuse_unreada
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.scan import CHUNK, Scan, scanning
 
-# By the file's number of an element's type: meshio's name and the places of its nodes in VTK's order.
+# By the file's number of an element's type: the key in CELL_SHAPES and the places of its nodes in VTK's order.
 # The middles of upright edges stand before those of the upper face here, behind them in VTK; a beam's between its ends.
 _TYPES: dict[int, tuple[str, tuple[int, ...]]] = {
     1: ("hexahedron", tuple(range(8))),

@@ -35,7 +35,7 @@ class Record:
         file: where it was read.
         kind: the format, such as "frd": becomes the kind of the path.
         points: where each point was at rest [the file's unit of length], shape (n_points, 3); a plane body has z = 0.
-        cells: rows of `points` by meshio's name of the cells ("quad", "hexahedron20", ...), in VTK's order of
+        cells: rows of `points` by a key of CELL_SHAPES ("quad", "hexahedron20", ...), in VTK's order of
             nodes, each of shape (n_cells, k); empty for markers.
         levels: in the file's order, at least one; a state of rest is among them only if the file has it.
         names: the number or name that the file gives each point, of length n_points.

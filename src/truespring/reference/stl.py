@@ -1,8 +1,5 @@
 """Deformed bodies that another program wrote as STL: triangles without connectivity and without a unit."""
 
-import io
-import re
-import warnings as python_warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +8,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
+from truespring.mesh.files.stl import parse_stl
 from truespring.mesh.joining import merged as merged_within
 from truespring.mesh.selections import AXES
 from truespring.opening import read_file
@@ -26,8 +24,6 @@ _SAME_BODY = 1e-2  # boxes that differ by more are of different bodies
 # No load makes a body so much larger or smaller: a unit is wrong (1 inch, 1 cm or 1 mm taken for 1 m, or back).
 _WRONG_UNIT = 10.0
 
-_BINARY_HEADER = 84
-_BINARY_FACET = 50
 _EXPORT_AGAIN = "export the body again as STL, ASCII or binary"
 
 
@@ -117,7 +113,11 @@ def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution
 
 def read_facets(file: Path, placing: Placing) -> Floats:
     """Return the vertices of every facet in the file's order [m], shape (n_facets, 3, 3)."""
-    facets = placing.places(_parse(_bytes(file), file).reshape(-1, 3)).reshape(-1, 3, 3)
+    try:
+        read = parse_stl(_bytes(file))
+    except MeshError as error:
+        raise ReferenceFileError(f"{file}: {error}: {_EXPORT_AGAIN}") from None
+    facets = placing.places(read.reshape(-1, 3)).reshape(-1, 3, 3)
     bad = np.flatnonzero(~np.isfinite(facets).all(axis=(1, 2)))
     if bad.size:
         raise ReferenceFileError(
@@ -137,65 +137,6 @@ def _bytes(file: Path) -> bytes:
     data = read_file(file, ReferenceFileError)
     if not data.strip():
         raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")
-    return data
-
-
-def _parse(data: bytes, file: Path) -> Floats:
-    """Check that the file is whole, for the parser is lenient there, and parse it."""
-    from trimesh.exchange.stl import load_stl  # a second: only where an STL file is read
-
-    if not _is_binary(data, file):
-        data = _checked_text(data, file)
-    try:
-        with python_warnings.catch_warnings():
-            python_warnings.simplefilter("error")  # older numpy only warns of a number it cannot read
-            loaded = load_stl(io.BytesIO(data))
-    except (ValueError, Warning) as error:
-        raise ReferenceFileError(f"{file}: a vertex cannot be read ({error}): {_EXPORT_AGAIN}") from None
-    solids = [loaded] if "vertices" in loaded else list(loaded["geometry"].values())
-    return np.concatenate([np.asarray(solid["vertices"], dtype=np.float64) for solid in solids]).reshape(-1, 3, 3)
-
-
-def _is_binary(data: bytes, file: Path) -> bool:
-    """Tell binary from text by the length, since a binary header may begin with "solid" as well."""
-    count = int.from_bytes(data[80:_BINARY_HEADER], "little")
-    wanted = _BINARY_HEADER + _BINARY_FACET * count
-    if len(data) == wanted:
-        if not count:
-            raise ReferenceFileError(f"{file} holds no facet: {_EXPORT_AGAIN}")
-        return True
-    if b"\0" not in data:  # text has none, and every binary file has
-        return False
-    if len(data) < _BINARY_HEADER:
-        raise ReferenceFileError(f"{file} is no STL file, or cut off in its header: {_EXPORT_AGAIN}")
-    state = "cut off, or no STL file" if len(data) < wanted else "damaged, or no STL file"
-    raise ReferenceFileError(
-        f"{file} is {state}: a binary STL of the {count:,} facets that its header names has {wanted:,} bytes, "
-        f"this file has {len(data):,}: {_EXPORT_AGAIN}"
-    )
-
-
-def _checked_text(data: bytes, file: Path) -> bytes:
-    """Return an ASCII file without the names of its solids, which may hold any word; raise where it is not whole."""
-    if not re.match(rb"\s*solid\b", data, re.IGNORECASE):
-        raise ReferenceFileError(f"{file} is no STL file: it does not begin with 'solid': {_EXPORT_AGAIN}")
-    data = re.sub(rb"^([ \t]*(?:end)?solid)\b[^\r\n]*", rb"\1", data, flags=re.IGNORECASE | re.MULTILINE)
-    words = [word.lower() for word in re.findall(rb"^[ \t]*([a-z]+)\b", data, re.IGNORECASE | re.MULTILINE)]
-    n_facets = words.count(b"facet")
-    if not n_facets:
-        raise ReferenceFileError(f"{file} holds no facet: {_EXPORT_AGAIN}")
-    found = (words.count(b"vertex"), words.count(b"endfacet"), words.count(b"endsolid"))
-    wanted = (3 * n_facets, n_facets, words.count(b"solid"))
-    if found != wanted:
-        names = ("vertex", "endfacet", "endsolid")
-        lines = ", ".join(f"{f} of {w} '{name}'" for f, w, name in zip(found, wanted, names, strict=True))
-        raise ReferenceFileError(f"{file} is cut off or damaged: it has {lines} lines: {_EXPORT_AGAIN}")
-    numbers = re.findall(rb"^[ \t]*vertex((?:[ \t]+[^\s]+){3})[ \t\r]*$", data, re.IGNORECASE | re.MULTILINE)
-    if len(numbers) != 3 * n_facets:
-        raise ReferenceFileError(
-            f"{file}: {3 * n_facets - len(numbers)} of {3 * n_facets} vertices do not have three coordinates: "
-            f"{_EXPORT_AGAIN}"
-        )
     return data
 
 

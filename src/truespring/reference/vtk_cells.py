@@ -7,33 +7,29 @@ import numpy as np
 
 from truespring.arrays import Bools, Ints
 from truespring.errors import ReferenceFileError
+from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.files.contents import Cells
+from truespring.mesh.kinds import ELEMENT_KINDS
 
-#: By VTK's number of the type: meshio's name. Pixels and voxels (8, 11) are cells in another order of nodes.
+#: The key in CELL_SHAPES by VTK's number of the type. Pixels and voxels (8, 11) are cells in another order of nodes.
 VTK_NAMES: Mapping[int, str] = {
-    **{3: "line", 5: "triangle", 8: "quad", 9: "quad", 10: "tetra", 11: "hexahedron", 12: "hexahedron", 13: "wedge"},
-    **{14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10", 25: "hexahedron20", 26: "wedge15"},
-    **{27: "pyramid13", 28: "quad9", 29: "hexahedron27", 32: "wedge18"},
+    **{shape.vtk_type: name for name, shape in CELL_SHAPES.items()},
+    **{8: "quad", 11: "hexahedron"},
 }
 #: Vertices: points alone.
 VTK_POINTS = (1, 2)
 #: No cell: what Ansys' reader makes of elements that no body has, such as those of contact.
 VTK_EMPTY = 0
 
-_CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
+_CORNERS = {name: len(shape.corners) for name, shape in CELL_SHAPES.items() if name == shape.base}
 
-# By kind and number of nodes.
-_NAMES = {
-    **{("line", 2): "line", ("line", 3): "line3", ("triangle", 3): "triangle", ("triangle", 6): "triangle6"},
-    **{("quadrilateral", 4): "quad", ("quadrilateral", 8): "quad8", ("quadrilateral", 9): "quad9"},
-    **{("tetrahedron", 4): "tetra", ("tetrahedron", 10): "tetra10", ("hexahedron", 8): "hexahedron"},
-    **{("hexahedron", 20): "hexahedron20", ("hexahedron", 27): "hexahedron27", ("wedge", 6): "wedge"},
-    **{("wedge", 15): "wedge15", ("wedge", 18): "wedge18", ("pyramid", 5): "pyramid", ("pyramid", 13): "pyramid13"},
-}
+_KINDS = {kind.vtk: name for name, kind in ELEMENT_KINDS.items()}
+# The key in CELL_SHAPES by kind and number of nodes.
+_NAMES = {(_KINDS[shape.base], len(shape.places)): name for name, shape in CELL_SHAPES.items()}
 
 
 def named(blocks: Iterable[Cells], file: Path) -> dict[str, Ints]:
-    """Return the nodes of the cells by meshio's name, without vertices; raise where a kind is not read."""
+    """Return the nodes of the cells by a key of CELL_SHAPES, without vertices; raise where a kind is not read."""
     found: dict[str, list[Ints]] = {}
     for block in blocks:
         if block.kind == "vertex":
@@ -65,7 +61,7 @@ def sized(types: Ints, offsets: Ints, connectivity: Ints, is_made: Bools, file: 
         is_made: of the points, whether the reader made them up: cells with such a middle become their corners.
         file: for messages.
 
-    Returns the points of the cells by meshio's name, and how many lost their middles.
+    Returns the points of the cells by a key of CELL_SHAPES, and how many lost their middles.
     """
     refuse_unknown(types[types != VTK_EMPTY], file)
     n_lost = 0

@@ -1,15 +1,9 @@
 """report.html: one file, self-contained, that tells and shows what one or several studies found."""
 
-import base64
-import platform
 import re
 from collections.abc import Iterator, Sequence
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +13,10 @@ from truespring.material import Material
 from truespring.mesh import Box, select_elements
 from truespring.models import FiniteElements, Moduli
 from truespring.problem import Problem, Region
-from truespring.report.figures import Drawing, distance_name, over_name, render_figures
+from truespring.report.figures import distance_name, over_name, render_figures
 from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
+from truespring.report.shell import picture, render
 from truespring.report.standing import own_errors
 from truespring.report.supports import support_rows
 from truespring.report.verdict import (
@@ -42,14 +37,8 @@ from truespring.report.verdict import (
 )
 from truespring.report.viewer import viewer
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-
 #: Numbers that the viewers of one page may hold together: about a megabyte.
 _BUDGET = 400_000
-
-#: A picture of more bytes as SVG than this is shown as PNG.
-_LARGEST_SVG = 180_000
 
 
 def write_page(results: Sequence[Result], file: Path, command: str) -> None:
@@ -59,45 +48,18 @@ def write_page(results: Sequence[Result], file: Path, command: str) -> None:
 
 def render_page(results: Sequence[Result], command: str) -> str:
     """Return the page as HTML: it loads nothing from anywhere."""
-    folder = files("truespring.report")
     studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
     what, several = ("comparison", "comparisons") if results[0].in_detail else ("study", "studies")
     turning = any(study["viewer"] and study["in_space"] for study in studies)
-    scripts = [*(["scene.min.js"] if turning else []), "viewer.js"]
-    return _template().render(
+    scene = ("report/scene.min.js",) if turning else ()
+    return render(
+        "report/page.html.j2",
+        command,
+        (*scene, "report/viewer.js"),
         title=results[0].title if len(results) == 1 else f"{len(results)} {several}",
         what=what,
         studies=studies,
-        versions=versions(),
-        command=command,
-        scripts=[(folder / script).read_text(encoding="utf-8") for script in scripts],
     )
-
-
-@cache
-def _template() -> "Template":
-    """The page without a study; to compile it takes as long as to fill it."""
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = close
-    return environment.from_string((files("truespring.report") / "page.html.j2").read_text(encoding="utf-8"))
-
-
-def close(text: str) -> str:
-    """Keep a number and its unit on one line."""
-    return re.sub(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Pa|N|m))(?:\W|$))", "\N{NO-BREAK SPACE}", text)
-
-
-def versions() -> list[tuple[str, str]]:
-    """Return what a result depends on and its version, truespring first."""
-    found = [("python", platform.python_version())]
-    for package in ("truespring", "numpy", "scipy", "scikit-fem"):
-        try:
-            found.append((package, version(package)))
-        except PackageNotFoundError:
-            found.append((package, "not installed as a package"))
-    return sorted(found, key=lambda one: one[0] != "truespring")
 
 
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
@@ -148,17 +110,6 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
 
 
 _SENTENCES = (carrying_sentence, closest_sentence, cause_sentence, force_sentence, mesh_sentence)
-
-
-def picture(drawing: Drawing) -> dict[str, str]:
-    """A picture as the address that an <img> takes it from, its width on paper in CSS pixels, and its words."""
-    if len(drawing.svg) <= _LARGEST_SVG:
-        address = "data:image/svg+xml," + quote(
-            drawing.svg.decode().replace("\n", " ").replace('"', "'"), safe=" =:/;,'()!*?"
-        )
-    else:
-        address = "data:image/png;base64," + base64.b64encode(drawing.png).decode()
-    return {"address": address, "width": f"{96 * drawing.width:.0f}", "title": drawing.title}
 
 
 # --- tables ---------------------------------------------------------------------------------------

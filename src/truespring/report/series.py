@@ -2,20 +2,18 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats, Ints
+from truespring.arrays import Bools, in_space
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, State
-from truespring.mesh import Mesh, Surface
+from truespring.mesh import Mesh
+from truespring.mesh.files.stl import stl_bytes
+from truespring.mesh.files.vtu_writing import write_vtu
 from truespring.potential import Visible
 from truespring.report.surfaces import facets_of, triangles_of
-
-if TYPE_CHECKING:
-    import meshio
 
 
 def write_series(path: Solution, folder: Path, name: str) -> None:
@@ -30,14 +28,18 @@ def write_series(path: Solution, folder: Path, name: str) -> None:
     levels.mkdir(parents=True, exist_ok=True)
     for old in levels.glob(f"{name}_*.vtu"):
         old.unlink()
-    bodies = [(state.load_factor, _state_mesh(path, state)) for state in path.states]
-    if not bodies and path.surface is not None:
-        bodies = [(path.surface.load_factor, _surface_mesh(path.surface))]
+    bodies = [state.load_factor for state in path.states]
+    surface = path.surface if not bodies else None
+    if surface is not None:
+        bodies = [surface.load_factor]
     entries = []
-    forwards = all(one[0] < other[0] for one, other in pairwise(bodies))
-    for number, (load_factor, body) in enumerate(bodies):
+    forwards = all(one < other for one, other in pairwise(bodies))
+    for number, load_factor in enumerate(bodies):
         file = levels / f"{name}_{number:04d}.vtu"
-        body.write(file, file_format="vtu")
+        if surface is not None:
+            write_vtu(file, surface.points, [("triangle", surface.triangles)])
+        else:
+            _write_state(path, path.states[number], file)
         entries.append(
             f'<DataSet timestep="{load_factor if forwards else number!r}" file={quoteattr(f"{name}/{file.name}")}/>'
         )
@@ -47,36 +49,21 @@ def write_series(path: Solution, folder: Path, name: str) -> None:
 
 def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:
     """Write the body at rest by its elements as VTU [m]; with the directions of nodes that supports hold as 1."""
-    import meshio
-
-    fields = {} if held is None else {"held": _in_space(held.astype(float))}
-    meshio.Mesh(_in_space(mesh.nodes), list(mesh.cells.items()), point_data=fields).write(file, file_format="vtu")
+    fields = {} if held is None else {"held": in_space(held.astype(float))}
+    write_vtu(file, mesh.nodes, mesh.cells.items(), fields)
 
 
-def _state_mesh(path: Solution, state: State) -> "meshio.Mesh":
-    import meshio
-
+def _write_state(path: Solution, state: State, file: Path) -> None:
+    """Write the body at rest with the fields of a state as VTU."""
     mesh = path.problem.mesh
     visible = path.potential if isinstance(path.potential, Visible) else None
-    cells = dict(visible.cells) if visible else mesh.cells
-    ends = np.cumsum([len(nodes) for nodes in cells.values()])[:-1]
-    fields = visible.cell_fields(state.all_positions) if visible else {}
-    return meshio.Mesh(
-        _in_space(mesh.nodes),
-        list(cells.items()),
-        point_data={"displacement": _in_space(state.displacement), "reaction": _in_space(state.reaction)},
-        cell_data={field: np.split(values, ends) for field, values in fields.items()},
+    write_vtu(
+        file,
+        mesh.nodes,
+        (visible.cells if visible else mesh.cells).items(),
+        {"displacement": in_space(state.displacement), "reaction": in_space(state.reaction)},
+        visible.cell_fields(state.all_positions) if visible else {},
     )
-
-
-def _surface_mesh(surface: Surface) -> "meshio.Mesh":
-    return _triangle_mesh(surface.points, surface.triangles)
-
-
-def _triangle_mesh(points: Floats, triangles: Ints) -> "meshio.Mesh":
-    import meshio
-
-    return meshio.Mesh(_in_space(points), [("triangle", triangles)])
 
 
 def write_stl(path: Solution, file: Path) -> None:
@@ -87,13 +74,13 @@ def write_stl(path: Solution, file: Path) -> None:
     """
     mesh = path.problem.mesh
     if path.surface is not None:
-        drawn = _surface_mesh(path.surface)
+        points, triangles = path.surface.points, path.surface.triangles
     elif path.states and mesh.element != "line":
         facets = mesh.elements if mesh.dim == 2 else facets_of(mesh)
-        drawn = _triangle_mesh(path.states[-1].positions, triangles_of(facets))
+        points, triangles = path.states[-1].positions, triangles_of(facets)
     else:
         return
-    drawn.write(file, file_format="stl", binary=True)
+    file.write_bytes(stl_bytes(in_space(points)[triangles]))
 
 
 def write_difference(comparison: Comparison, file: Path) -> None:
@@ -101,26 +88,15 @@ def write_difference(comparison: Comparison, file: Path) -> None:
 
     At the last level that both have; nothing where there is none.
     """
-    import meshio
-
     level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
     mine, theirs = comparison.model.at(level), comparison.reference.at(level)
     if mine is None or theirs is None or not level:
         return
     mesh = comparison.model.problem.mesh
-    apart = mine.displacement - theirs.displacement
     fields = {
-        "displacement": _in_space(mine.displacement),
-        "reference_displacement": _in_space(theirs.displacement),
-        "distance": np.linalg.norm(apart, axis=1),
+        "displacement": in_space(mine.displacement),
+        "reference_displacement": in_space(theirs.displacement),
+        "distance": np.linalg.norm(mine.displacement - theirs.displacement, axis=1),
         "outside": comparison.outside.astype(np.uint8),
     }
-    written = meshio.Mesh(_in_space(mesh.nodes), list(mesh.cells.items()), point_data=fields)
-    written.write(file, file_format="vtu")
-
-
-def _in_space(vectors: Floats) -> Floats:
-    """Pad plane vectors with zeros to three components, shape (n, 3)."""
-    padded = np.zeros((len(vectors), 3))
-    padded[:, : vectors.shape[1]] = vectors
-    return padded
+    write_vtu(file, mesh.nodes, mesh.cells.items(), fields)

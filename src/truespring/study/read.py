@@ -40,6 +40,7 @@ from truespring.models import (
     Springs,
     Terzopoulos,
     UserStiffness,
+    material_constants,
     moduli,
     refuse_mechanism,
 )
@@ -478,7 +479,9 @@ def _springs(table: schema.SpringsTable) -> Springs:
 
 
 def _material(table: schema.MaterialTable) -> Material:
-    return Material(table.young, table.poisson, table.density)
+    constants = {name: getattr(table, name, None) for name in material_constants()}
+    known = {name: value for name, value in constants.items() if value is not None}
+    return Material(table.young, table.poisson, table.density, known)
 
 
 _OTHER_MESHES = "file = a mesh file, voxels = a label image, nodes and springs = CSV files"

@@ -1,6 +1,5 @@
 """Running studies: solve what a study asks, compare, and write what it leaves behind."""
 
-import dataclasses
 import json
 import shlex
 import time
@@ -304,6 +303,12 @@ def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
     return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])
 
 
+def _values(material: Material) -> dict[str, float | None]:
+    """The keys of `[material]` with their values [SI]."""
+    young, poisson, density = material.young, material.poisson, material.density
+    return {"young": young, "poisson": poisson, "density": density, **dict(material.constants)}
+
+
 def plan(study: Study) -> dict[str, Any]:
     """Return what would be run, solving nothing: sizes, loads, supports, and what the springs realise."""
     problem = study.problem
@@ -314,9 +319,9 @@ def plan(study: Study) -> dict[str, Any]:
         "n_nodes": mesh.n_nodes,
         "n_elements": len(mesh.elements),
         "mesh_notes": list(mesh.notes),
-        "material": dataclasses.asdict(problem.material) if problem.material else None,
+        "material": _values(problem.material) if problem.material else None,
         "regions": [
-            {**dataclasses.asdict(material), "n_elements": int((problem.material_numbers == number).sum())}
+            {**_values(material), "n_elements": int((problem.material_numbers == number).sum())}
             for number, material in enumerate(problem.materials[1:], start=1)
         ],
         "section": _section(problem),

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -23,7 +23,7 @@ from truespring.errors import TruespringError, nearest, shown
 from truespring.loading import LOADS, Load, LoadKind
 from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
-from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.models import ELEMENTS, LAWS, RULES, Constant, material_constants
 from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
 
 
@@ -79,6 +79,9 @@ Length = Annotated[float, _si("length"), _quantity("length")]
 Stress = Annotated[float, _si("stress"), _quantity("stress")]
 Density = Annotated[float, _si("density"), _quantity("density")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
+_QUANTITIES: dict[Dimension, Any] = {
+    dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
+}
 RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
 _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
 PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
@@ -225,12 +228,28 @@ MeshTable = Annotated[
 ]
 
 
-class MaterialTable(Table):
+class _PlainMaterialTable(Table):
     """What the body is made of."""
 
     young: Stress
     poisson: Number
     density: Density | None = None
+
+
+def with_constants(table: type[Table], name: str, constants: Mapping[str, Constant]) -> type[Table]:
+    """Return a table of this name that takes the constants of laws too, each an optional key with its unit."""
+    fields: dict[str, Any] = {}
+    for key, constant in constants.items():
+        quantity = Number if constant.dimension is None else _QUANTITIES[constant.dimension]
+        described = Field(default=None, description=f"{constant.meaning} [{constant.unit}]")
+        fields[key] = (quantity | None, described)
+    return create_model(name, __base__=table, __doc__=table.__doc__, **fields)
+
+
+if TYPE_CHECKING:
+    MaterialTable = _PlainMaterialTable
+else:
+    MaterialTable = with_constants(_PlainMaterialTable, "MaterialTable", material_constants())
 
 
 class RegionTable(MaterialTable):
@@ -308,7 +327,7 @@ def load_form(kinds: Mapping[str, LoadKind]) -> type[LoadTable]:
     keys = {key: one for name, kind in kinds.items() for key, one in kind.quantities(name).items()}
     fields: dict[str, Any] = {}
     for key, quantity in keys.items():
-        number = Annotated[float, _si(quantity.dimension), _quantity(quantity.dimension)]
+        number: Any = _QUANTITIES[quantity.dimension]
         form: Any = Annotated[list[number], Field(min_length=2, max_length=3)] if quantity.vector else number
         fields[key] = (form | None, Field(None, description=quantity.about))
     made: type[LoadTable] = create_model("LoadTable", __base__=LoadTable, __doc__=LoadTable.__doc__, **fields)

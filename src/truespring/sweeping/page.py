@@ -1,13 +1,12 @@
 """What a sweep tells: a table for a terminal, and one page of plots that loads nothing from anywhere."""
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.report.figures import Drawing
-from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent
+from truespring.report.shell import picture, render
 from truespring.report.style import figure_style
 from truespring.sweeping.figures import sweep_figures
 
@@ -66,19 +65,13 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         rows: a point each, as in the table.
         command: what does it again, where it was a command line.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    folder = files("truespring.report")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = close
     with figure_style():
         drawings = [Drawing(one.png(), one.svg(), one.title, one.width) for one in sweep_figures(keys, rows)]
     failed = [row for row in rows if row["status"] != "converged"]
     extremes = _extremes(rows)
-    template = environment.from_string((files("truespring.sweeping") / "page.html.j2").read_text(encoding="utf-8"))
-    return template.render(
-        # The look of all pages stands in that of studies.
-        style=(folder / "page.html.j2").read_text(encoding="utf-8").split("<style>")[1].split("</style>")[0],
+    return render(
+        "sweeping/page.html.j2",
+        command,
         title=title or file.stem,
         file=str(file),
         keys=keys,
@@ -89,8 +82,6 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         pictures=[picture(drawing) for drawing in drawings],
         references=list(extremes),
         rows=[_shown(row, keys, list(extremes)) for row in rows[:_MOST_ROWS]],
-        versions=versions(),
-        command=command,
     )
 
 

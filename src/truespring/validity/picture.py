@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models import LAWS
+from truespring.models import Fem
 from truespring.report.frame import EDGE, SIZE, round_numbers, written
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import tolerance_percent
@@ -92,7 +92,7 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
     if len(maps) == 1:
         _draw_title(validity, first, sheet, title)
     else:
-        draw_words(sheet, 0.1, sheet.height - 0.17, f"{title}: error against {LAWS[validity.law].label}", 9, bold=True)
+        draw_words(sheet, 0.1, sheet.height - 0.17, f"{title}: error against {Fem(validity.law).label}", 9, bold=True)
     scale = 100.0 / first.x[-1] if shared else first.load.scale if validity.x == "load" else 1.0
     end = scale * first.x[-1]
     bottom = _BOTTOM + room - height
@@ -266,7 +266,7 @@ def _draw_legend(sheet: Sheet, validity: Validity, one: Map, left: float, top: f
     from matplotlib.patches import Rectangle
 
     draw_words(sheet, left, top - 0.06, "error against", 7.5, EDGE)
-    draw_words(sheet, left, top - 0.2, LAWS[validity.law].label, 7.5, bold=True)
+    draw_words(sheet, left, top - 0.2, Fem(validity.law).label, 7.5, bold=True)
     bounds = [tolerance_percent(line) for line in LINES]
     words = [
         f"within {bounds[0]}",

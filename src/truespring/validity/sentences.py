@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models import LAWS
+from truespring.models import Fem
 from truespring.report.quantity import percent, tolerance_percent
 from truespring.validity.curve import Curve
 from truespring.validity.lines import spans
@@ -29,7 +29,7 @@ def verdict(validity: Validity, one: Map) -> str:
 
 def _by_load(validity: Validity, one: Map) -> str:
     """Up to which size on which rows."""
-    law, line = LAWS[validity.law].label, validity.tolerance
+    law, line = Fem(validity.law).label, validity.tolerance
     rows = [spans(one.x, errors, line) for errors in one.errors]
     begin = f"{one.load.did}{_moving(one)}, {one.rule.words} are"
     if not any(rows):
@@ -179,7 +179,7 @@ def _ends(one: Map) -> list[str]:
     said = []
     for reference in one.references.values():
         if reference.end:
-            law = LAWS[reference.law].label
+            law = Fem(reference.law).label
             said.append(
                 f"{law} itself ends at {one.load.told(reference.reached)} ({reference.end}): beyond it there is "
                 "nothing to compare with."
@@ -217,7 +217,7 @@ def unconverged(reference: Reference) -> str:
 
 def _by_mesh(validity: Validity, one: Map) -> str:
     """Where along x at the last size of the load, row by row if there are rows."""
-    law, line = LAWS[validity.law].label, validity.tolerance
+    law, line = Fem(validity.law).label, validity.tolerance
     size = max(reference.reached for reference in one.references.values())
     begin = f"{one.load.did}, at {one.load.told(size)}, {one.rule.words} are"
     rows = [spans(one.x, errors, line) for errors in one.errors]

@@ -5,17 +5,16 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from truespring.models import LAWS
+from truespring.models import Fem
 from truespring.outputs import Output
 from truespring.report.figures import Drawing
-from truespring.report.page import close, picture, versions
 from truespring.report.quantity import percent, significant
+from truespring.report.shell import picture, render, versions
 from truespring.report.style import figure_style
 from truespring.validity.curve import Curve
 from truespring.validity.lines import polylines
@@ -199,16 +198,11 @@ def _plain(value: Any) -> Any:
 
 
 def _page(validity: Validity, drawings: Mapping[str, Drawing], command: str | None) -> str:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["close"] = close
-    text = (files("truespring.validity") / "page.html.j2").read_text(encoding="utf-8")
-    look = (files("truespring.report") / "page.html.j2").read_text(encoding="utf-8")
-    return environment.from_string(text).render(
-        style=look.split("<style>")[1].split("</style>")[0],  # the look of all pages stands in that of studies
+    return render(
+        "validity/page.html.j2",
+        command,
         title=validity.title,
-        law=LAWS[validity.law].label,
+        law=Fem(validity.law).label,
         groups=list(_groups(validity, drawings)),
         several=len(validity.maps) > 1,
         converged=all(one.converged for one in validity.references),
@@ -220,8 +214,6 @@ def _page(validity: Validity, drawings: Mapping[str, Drawing], command: str | No
         solves=validity.solves,
         full=validity.full,
         seconds=significant(validity.seconds, 2),
-        versions=versions(),
-        command=command,
     )
 
 
@@ -249,7 +241,7 @@ def _warnings(validity: Validity) -> Iterator[str]:
             yield f"{one.load.did}: {unconverged(one)}"
         if one.end:
             yield (
-                f"{one.load.did}: {LAWS[one.law].label} ends at {one.load.told(one.reached)} of the "
+                f"{one.load.did}: {Fem(one.law).label} ends at {one.load.told(one.reached)} of the "
                 f"{one.load.told(one.asked)} asked for ({one.end}); what lies beyond is hatched"
             )
 

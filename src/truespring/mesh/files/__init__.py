@@ -1,4 +1,11 @@
-"""Meshes that other programs wrote: gmsh .msh, Abaqus and CalculiX .inp, VTK .vtu and .vtk."""
+"""Meshes that other programs wrote: gmsh .msh, Abaqus and CalculiX .inp, VTK .vtu and .vtk.
+
+These formats are read by code of this package, without meshio, gmsh's own library or VTK. meshio is unmaintained
+and drops what problems are stated with: the surfaces, parts and instances of .inp, and all but the last group of an
+element. VTK and gmsh are large binary packages, which a plain installation does without; VTK logs damage and returns
+what it has read so far. The readers here name the line or byte of a fault, count what they leave out, and are tested
+on files that those programs wrote.
+"""
 
 import math
 from collections.abc import Callable

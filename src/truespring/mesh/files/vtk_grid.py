@@ -61,8 +61,9 @@ _TYPES: dict[int, tuple[str, int | None]] = {
 _BEZIER = 75
 # Pixels and voxels number their nodes along x, then y, then z.
 _PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
-# The first triangle of VTK's linear wedge goes round as seen from outside, ours as seen from inside.
-_WEDGE = (0, 2, 1, 3, 5, 4)
+#: The nodes of VTK's linear wedge by ours, and back: its first triangle goes round as seen from outside, ours from
+#: inside.
+WEDGE = (0, 2, 1, 3, 5, 4)
 
 # More values than these are a quantity, not a choice of regions.
 _MOST_VALUES = 64
@@ -134,7 +135,7 @@ def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cell
     if n_nodes != wanted and (wanted is not None or n_nodes < CELL_KINDS[kind][1]):
         raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
     nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
-    order = {8: _PIXEL, 11: _VOXEL, 13: _WEDGE}.get(type_)
+    order = {8: _PIXEL, 11: _VOXEL, 13: WEDGE}.get(type_)
     if type_ >= _BEZIER:  # between the corners are control points, which lie on no edge
         nodes = nodes[:, : CELL_KINDS[kind][1]]
     return Cells(kind, nodes if order is None else nodes[:, order], numbers)

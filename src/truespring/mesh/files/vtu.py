@@ -21,7 +21,8 @@ from truespring.mesh.files.inflate import inflated, refuse_too_large
 from truespring.mesh.files.vtk_grid import Grid
 from truespring.mesh.files.vtk_shapes import Lists, faces, lattice, lattice_points
 
-_CODES = {
+#: The types of arrays and the NumPy codes of them.
+CODES = {
     **{"Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8"},
     **{"UInt8": "u1", "UInt16": "u2", "UInt32": "u4", "UInt64": "u8"},
     **{"Float32": "f4", "Float64": "f8"},
@@ -155,7 +156,7 @@ class Reader:
 
     def _integers(self, piece: ElementTree.Element, section: str, name: str, n_values: int) -> Ints:
         for element in piece.iterfind(f"{section}/DataArray"):
-            if element.get("Name") == name and _CODES.get(element.get("type", ""), "f")[0] in "iu":
+            if element.get("Name") == name and CODES.get(element.get("type", ""), "f")[0] in "iu":
                 values = self._array(element, section, n_values)
                 if values.ndim == 1:
                     return values.astype(np.int64)
@@ -166,7 +167,7 @@ class Reader:
         arrays = {}
         for element in piece.iterfind(f"{section}/DataArray"):
             name = element.get("Name", section)
-            if element.get("type", "") not in _CODES:
+            if element.get("type", "") not in CODES:
                 continue
             arrays[name] = self._array(element, section, n_rows)
             if len(arrays[name]) != n_rows:
@@ -176,7 +177,7 @@ class Reader:
     def _array(self, element: ElementTree.Element, section: str, n_rows: int) -> NDArray[Any]:
         """Return an array, whose rows its reader counts; compressed ones must have as many as are wanted."""
         try:
-            code = _CODES.get(element.get("type", ""))
+            code = CODES.get(element.get("type", ""))
             if code is None:
                 raise ValueError(f"its type is '{element.get('type', '')[:20]}'")
             n_components = int(element.get("NumberOfComponents") or 1)

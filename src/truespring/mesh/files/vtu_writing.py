@@ -1,0 +1,84 @@
+"""VTK's unstructured grids as .vtu files: base64 of zlib-compressed blocks, in the machine's byte order.
+
+Source: "VTK XML Formats", https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html
+"""
+
+import base64
+import sys
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.arrays import Floats, Ints, in_space
+from truespring.mesh.cells import CELL_SHAPES
+from truespring.mesh.files.vtk_grid import WEDGE
+from truespring.mesh.files.vtu import CODES
+
+_NAMES = {np.dtype(code): name for name, code in CODES.items()}
+_BLOCK = 1 << 20  # bytes that are compressed together
+
+
+def write_vtu(
+    file: Path,
+    points: Floats,
+    cells: Iterable[tuple[str, Ints]],
+    point_arrays: Mapping[str, NDArray[Any]] | None = None,
+    cell_arrays: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write an unstructured grid as a .vtu file.
+
+    Args:
+        file: the file.
+        points: shape (n_points, 1 to 3); missing components are 0.
+        cells: blocks of a key of CELL_SHAPES and the points of its cells in VTK's order, shape (n_cells, k); of
+            wedges of first order in the order of ELEMENT_KINDS, which VTK's differs from.
+        point_arrays, cell_arrays: by name, a row for each point, or for each cell of all blocks in their order; of
+            floating-point or integer types.
+    """
+    blocks = [(kind, nodes[:, WEDGE] if kind == "wedge" else nodes) for kind, nodes in cells]
+    sizes = [np.full(len(nodes), nodes.shape[1], dtype=np.int64) for _, nodes in blocks]
+    types = [np.full(len(nodes), CELL_SHAPES[kind].vtk_type, dtype=np.uint8) for kind, nodes in blocks]
+    none = np.zeros(0, dtype=np.int64)
+    listed = {
+        "connectivity": np.concatenate([none, *(nodes.ravel().astype(np.int64) for _, nodes in blocks)]),
+        "offsets": np.cumsum(np.concatenate([none, *sizes])),
+        "types": np.concatenate([none.astype(np.uint8), *types]),
+    }
+    order = {"little": "LittleEndian", "big": "BigEndian"}[sys.byteorder]
+    lines = [
+        f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{order}" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor">',
+        "<UnstructuredGrid>",
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(listed["types"])}">',
+        *_section("Points", {"Points": in_space(points)}),
+        *_section("Cells", listed),
+        *_section("PointData", point_arrays or {}),
+        *_section("CellData", cell_arrays or {}),
+        "</Piece>",
+        "</UnstructuredGrid>",
+        "</VTKFile>",
+    ]
+    file.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
+    return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
+
+
+def _array(name: str, values: NDArray[Any]) -> str:
+    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    kind = _NAMES[values.dtype.newbyteorder("=")]
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{components} format="binary">{_coded(values)}</DataArray>'
+
+
+def _coded(values: NDArray[Any]) -> str:
+    """Return the numbers of blocks and their sizes as one text in base64, then the compressed blocks as another."""
+    data = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("=")).tobytes()
+    blocks = [zlib.compress(data[first : first + _BLOCK]) for first in range(0, len(data), _BLOCK)]
+    header = np.array([len(blocks), _BLOCK, len(data) % _BLOCK, *map(len, blocks)], dtype=np.uint64)
+    return (base64.b64encode(header.tobytes()) + base64.b64encode(b"".join(blocks))).decode("ascii")

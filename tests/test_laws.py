@@ -1,0 +1,202 @@
+"""Constitutive laws: every entry of LAWS against its own closed form, and what a law with its own constants needs."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+import truespring as ts
+from tests.law_contract import CHECKS
+from truespring.arrays import Floats
+from truespring.material import Lame
+from truespring.models import LAWS, Constant, Law
+from truespring.models.law import Constants, Response
+from truespring.models.laws import material_constants, neo_hookean
+from truespring.models.symmetric import determinant, inverted
+from truespring.study import schema
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("law", LAWS)
+def test_contract(law: str, check: Callable[[Law], None]) -> None:
+    check(LAWS[law])
+
+
+def test_keys_of_a_material_are_one_thing_each() -> None:
+    """Laws that share the name of a constant mean the same; none takes a key that [material] has anyway."""
+    by_name: dict[str, set[str]] = {}
+    for law in LAWS.values():
+        for name, constant in law.constants.items():
+            by_name.setdefault(name, set()).add(constant.unit)
+            assert constant.smallest <= constant.example <= constant.largest
+            assert constant.meaning and name.isidentifier()
+    assert all(len(units) == 1 for units in by_name.values())
+    assert not by_name.keys() & {"young", "poisson", "density", "on"}
+
+
+# --- a law with constants of its own ----------------------------------------------------------------------------------
+
+
+def _of_c(c: Constants) -> Constants:
+    return Constants(c["c2"], 2 * np.asarray(c["c1"]), c.plane_stress)
+
+
+SCRATCH = Law(
+    lambda C, c: neo_hookean(C, _of_c(c)),
+    lambda stretch, c: LAWS["neo-hookean"].density(stretch, _of_c(c)),
+    label="scratch",
+    source="the neo-Hookean law by other constants",
+    finite=True,
+    barrier=True,
+    quadratic=False,
+    trace=None,
+    constants={
+        "c1": Constant("stress", "half of the shear modulus", example=0.4, smallest=0.0),
+        "c2": Constant("stress", "first Lame constant", example=0.9, default=1.2),
+        "exponent": Constant(None, "a number without use", example=2.0, default=2.0),
+    },
+    lame=lambda c: Lame(c["c2"], 2 * c["c1"]),
+)
+
+
+@pytest.fixture
+def scratch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LAWS with one more entry, wherever it is looked up."""
+    table = MappingProxyType({**LAWS, "scratch": SCRATCH})
+    for module in [module for name, module in sys.modules.items() if name.startswith("truespring")]:
+        if vars(module).get("LAWS") is LAWS:
+            monkeypatch.setattr(module, "LAWS", table)
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_a_new_law_passes_the_contract(check: Callable[[Law], None]) -> None:
+    check(SCRATCH)
+
+
+def _ten_times(law: Law) -> Law:
+    """The law ten times too stiff against a change of volume."""
+    return replace(law, respond=lambda C, c: law.respond(C, replace(c, lam=10 * np.asarray(c.lam))))
+
+
+def _wrong_formula_too(law: Law) -> Law:
+    return replace(_ten_times(law), density=lambda stretch, c: law.density(stretch, replace(c, lam=10 * c.lam)))
+
+
+def _at_finite_strain(law: Law) -> Law:
+    """The law with a term of fourth order in ln J, which nothing sees at small strain."""
+
+    def respond(C: Floats, c: Constants) -> Response:
+        plain, log_J = law.respond(C, c), np.log(determinant(C)) / 2
+        pressure = 2 * c.mu * log_J**3 * inverted(C)
+        return replace(plain, energy=plain.energy + c.mu / 2 * log_J**4, stress=plain.stress + pressure)
+
+    return replace(law, respond=respond)
+
+
+WRONG: dict[str, Law] = {
+    "ten times too stiff in volume": _ten_times(LAWS["neo-hookean"]),
+    "and so is its formula": _wrong_formula_too(LAWS["neo-hookean"]),
+    "at finite strain only": _at_finite_strain(LAWS["neo-hookean"]),
+    "without a formula": replace(LAWS["hencky"], density=None),  # type: ignore[arg-type]
+    "said to be quadratic": replace(LAWS["hencky"], quadratic=True),
+    "said to have no barrier": replace(LAWS["hencky"], barrier=False),
+    "another part of lambda": replace(LAWS["hencky"], trace="green"),
+    "another domain": replace(LAWS["saint-venant-kirchhoff"], domain=(0.0, np.inf)),
+    "other constants at small strain": replace(SCRATCH, lame=lambda c: Lame(c["c2"], 2.2 * c["c1"])),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_law_fails_the_contract(wrong: str) -> None:
+    failed = []
+    for check in CHECKS:
+        try:
+            check(WRONG[wrong])
+        except (AssertionError, TypeError, RuntimeWarning):
+            failed.append(check.__name__)
+    assert failed
+    if "ten times" in wrong or "formula too" in wrong:
+        assert "check_rest" in failed
+
+
+MATERIAL = ts.Material(2.07, 0.2647, constants={"c1": 0.41, "c2": 0.9})
+
+
+def body(material: ts.Material, region: ts.Material | None = None) -> ts.Problem:
+    regions = [] if region is None else [ts.Region([0, 1], region)]
+    load = ts.Force("right", (0.1, 0.0))
+    return ts.Problem(
+        ts.rectangle((2.0, 1.0), (2, 2)), material, ts.PlaneStrain(1.0), [ts.Fixed("left")], load, regions
+    )
+
+
+@pytest.mark.usefixtures("scratch")
+def test_a_model_takes_the_constants_of_its_law() -> None:
+    """A law by c1 and c2 is the neo-Hookean law of the same lam and mu, region by region."""
+    lam, mu = 0.9, 0.82
+    same = ts.Material(mu * (3 * lam + 2 * mu) / (lam + mu), lam / 2 / (lam + mu))
+    stiff = ts.Material(2 * same.young, same.poisson)
+    for region, plain in ((None, None), (replace(stiff, constants={"c1": 2 * mu / 2, "c2": 2 * lam}), stiff)):
+        ours = body(replace(same, constants={"c1": mu / 2, "c2": lam}), region)
+        potentials = ts.Fem("scratch").potential(ours), ts.Fem("neo-hookean").potential(body(same, plain))
+        positions = ours.mesh.nodes * [1.3, 0.9] + 0.05 * ours.mesh.nodes[:, ::-1] ** 2
+        forces = [potential.gradient(positions) for potential in potentials]
+        assert np.abs(forces[0]).max() > 0.01
+        assert forces[0] == pytest.approx(forces[1], rel=1e-12, abs=1e-13)
+
+
+@pytest.mark.usefixtures("scratch")
+@pytest.mark.parametrize(
+    ("constants", "named"),
+    [
+        ({}, ("c1", "Pa", "half of the shear modulus")),
+        ({"c1": -1.0}, ("c1 = -1 Pa", "0 to inf")),
+        ({"c1": 0.41, "c3": 1.0}, ("c3", "c1, c2, exponent")),
+        ({"c1": 4.1, "c2": 0.9}, ("young", "2.07", "0.2647")),
+    ],
+)
+def test_constants_that_do_not_fit(constants: dict[str, float], named: tuple[str, ...]) -> None:
+    with pytest.raises(ts.TruespringError) as error:
+        ts.Fem("scratch").potential(body(replace(MATERIAL, constants=constants)))
+    assert all(word in str(error.value) for word in named)
+
+
+@pytest.mark.usefixtures("scratch")
+def test_simplices_of_a_law_without_a_trace_are_quadratic() -> None:
+    mesh = ts.rectangle((1.0, 1.0), (1, 1), "triangle")
+    tight = ts.Material(1.0, 0.45)
+    problem = ts.Problem(mesh, tight, ts.PlaneStrain(1.0), [ts.Fixed("left")], [ts.Force("right", (0.1, 0.0))])
+    assert ts.Fem("scratch").chosen_element(problem) == "quadratic"
+    assert ts.Fem("hencky").chosen_element(problem) == "quadratic-mean-dilatation"
+    with pytest.raises(ts.TruespringError, match="quadratic-mean-dilatation"):
+        ts.Fem("scratch", "quadratic-mean-dilatation").potential(problem)
+
+
+def test_constants_of_a_material_are_values() -> None:
+    assert ts.Material(2.07, 0.2647, constants=(("c2", 0.9), ("c1", 0.41))) == MATERIAL
+    assert len({MATERIAL, replace(MATERIAL, constants={"c1": 0.41, "c2": 0.9}), replace(MATERIAL, constants={})}) == 2
+    with pytest.raises(ts.TruespringError, match="c1 = nan"):
+        ts.Material(1.0, 0.3, constants={"c1": np.nan})
+
+
+def test_a_study_takes_them_with_units() -> None:
+    table = schema.with_constants(schema.MaterialTable, "Material", SCRATCH.constants)
+    found = table.model_validate({"young": "2 kPa", "poisson": 0.3, "c1": "0.4 kPa", "exponent": 3})
+    assert found.model_dump() == {
+        "young": 2000.0,
+        "poisson": 0.3,
+        "density": None,
+        "c1": 400.0,
+        "c2": None,
+        "exponent": 3.0,
+    }
+    for key, value in (("c1", "0.4 mm"), ("c1", True), ("exponent", "2 Pa"), ("c3", 1.0)):
+        with pytest.raises(ValidationError):
+            table.model_validate({"young": 1.0, "poisson": 0.3, key: value})
+    described = table.model_json_schema()["properties"]["c1"]["description"]
+    assert "half of the shear modulus" in described and "[Pa]" in described
+    assert set(material_constants()) == set(schema.MaterialTable.model_fields) - {"young", "poisson", "density"}
