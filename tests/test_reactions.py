@@ -286,6 +286,13 @@ def test_loads_that_balance_drive_along_the_largest_of_them(large: str) -> None:
     assert found.axis == axis and found.name in (large, f"−{large}")
 
 
+@pytest.mark.parametrize(("total", "name"), [((0.001, 0.0, 0.0), "x"), ((0.0, 0.0, -0.001), "−z")])
+def test_what_is_left_of_the_loads_drives_however_small_it_is(total: tuple[float, ...], name: str) -> None:
+    loads = [ts.Force("top", (0.0, 0.02, 0.0)), ts.Force("bottom", (0.0, -0.02, 0.0)), ts.Force("right", total)]
+    path = ts.solve(block(ts.Fixed("left"), loads=loads), SPRINGS, Newton(1))
+    assert drive(result(path, path)).name == name
+
+
 def test_a_map_judges_as_a_comparison_does() -> None:
     """By the force and the torque of what is moved, each level as `compare` has it, and no better between them."""
     mesh, ends = ts.rectangle((LENGTH, SIDE), (3, 1)), [ts.Fixed("left"), ts.Fixed("right", rotation=0.4)]
