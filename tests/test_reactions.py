@@ -25,7 +25,7 @@ from truespring.report.style import figure_style
 from truespring.report.summary import difference, summary
 from truespring.report.verdict import drive, force_sentence, verdict
 from truespring.solvers import Newton
-from truespring.validity.curve import curve
+from truespring.validity.deviation import deviation_of
 from truespring.validity.solving import Task, run_task
 
 LENGTH, SIDE = 0.06, 0.02
@@ -299,7 +299,7 @@ def test_a_map_judges_as_a_comparison_does() -> None:
     problem = ts.Problem(mesh, ts.Material(20e3, 0.3), ts.PlaneStress(0.01), ends)
     mine, theirs = (run_task(Task(problem, model, 4)) for model in (SPRINGS, RUBBER))
     reference: Any = SimpleNamespace(solved=theirs, sizes=np.concatenate([[0.01], np.arange(1, 5) / 4]))
-    found = curve(mine, reference, np.linspace(0, 1, 41), None)
+    found = deviation_of(mine, reference, np.linspace(0, 1, 41), None)
     told = ts.compare(mine.path, theirs.path)
     assert found.rms_errors[1:] == pytest.approx(told.rms_errors, rel=1e-9)
     assert found.force_errors[1:] == pytest.approx(told.force_errors, rel=1e-9) and told.force_errors[0] > 0.05
