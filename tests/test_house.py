@@ -225,6 +225,30 @@ def test_the_picture_has_no_cycle() -> None:
             del left[room]
 
 
+def test_no_files_import_each_other() -> None:
+    """Also where they import inside functions; what a package only gathers in its __init__ is no file of its own."""
+    files = {
+        "truespring." + ".".join(file.relative_to(SOURCE).with_suffix("").parts): file
+        for several in rooms().values()
+        for file in several
+    }
+    left = {
+        name: (imported(file) & files.keys()) - {name}
+        for name, file in files.items()
+        if not name.startswith("truespring.models.")
+    }
+    assert len(left) > 200
+    while True:
+        others = {name for several in left.values() for name in several}
+        ends = [name for name, several in left.items() if not several & left.keys() or name not in others]
+        if not ends:
+            break
+        for name in ends:
+            del left[name]
+        left = {name: several & left.keys() for name, several in left.items()}
+    assert not left, f"a circle among {sorted(left)}"
+
+
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     for room, files in rooms().items():
         for file in files:

@@ -69,7 +69,7 @@ def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
     table = new_table("Stiffness rules", "rule", "", "uses nu", "")
     for name, rule in rules.items():
         uses = "yes" if rule["follows_poisson"] else "no"
-        words = f"{rule['realises']}\nSource: {rule['source']}"
+        words = f"{rule['idea']}\n{rule['realises']}\nSource: {rule['source']}"
         table.add_row(name, "\n".join(rule["elements"]), uses, words, end_section=True)
     return table
 

@@ -239,7 +239,9 @@ def rule_values() -> dict[str, dict[str, Any]]:
     return {
         name: {
             "elements": list(rule.elements),
+            "idea": rule.idea,
             "realises": rule.realises,
+            "shapes": dict(rule.shapes),
             "follows_poisson": follows_poisson(name),
             "coupled": rule.coupled,
             "parameters": list(rule.parameters),

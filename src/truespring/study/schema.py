@@ -82,10 +82,12 @@ Angle = Annotated[float, _si("angle"), _quantity("angle")]
 _QUANTITIES: dict[Dimension, Any] = {
     dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
 }
-RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
+_RULES = {"description": "; ".join(f"{name}: {rule.idea}" for name, rule in RULES.items())}
+RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)} | _RULES)]
 _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
 PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
-LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
+_LAWS = {"description": "; ".join(f"{name}: {law.source}" for name, law in LAWS.items())}
+LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
 FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
 PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
 SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
