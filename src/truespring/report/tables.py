@@ -13,6 +13,19 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+def moduli_line(title: str, moduli: Moduli) -> str:
+    """Return the effective moduli of springs in one line, beside those of the material in its section."""
+    (low, high), (least, most) = moduli.young_range, moduli.poisson_range
+    young = _span(f"{low:.4g}", f"{high:.4g}")
+    poisson = _span(f"{least:.3f}", f"{most:.3f}")
+    material = f"material {moduli.young_wanted:.4g} Pa, {moduli.poisson_wanted:.3f}"
+    return f"{title}: Young's modulus {young} Pa, Poisson's ratio {poisson} ({material})"
+
+
+def _span(first: str, last: str) -> str:
+    return first if first == last else f"{first} to {last}"
+
+
 def moduli_table(title: str, moduli: Moduli) -> "Table":
     """Return what springs realise beside what the material has in its section."""
     plane = moduli.dim == 2
