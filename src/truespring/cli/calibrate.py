@@ -28,10 +28,10 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.report.calibration import calibration_table
+    from truespring.calibration.page import calibration_table
+    from truespring.calibration.study import calibrate_study
+    from truespring.calibration.writing import calibrated_values, write_calibrated
     from truespring.study import read_studies
-    from truespring.study.calibrate import calibrate_study
-    from truespring.study.calibrated import calibrated_values, write_calibrated
 
     study, *others = read_studies([options.study, *options.case, *options.held_out])
     cases, held_out = others[: len(options.case)], others[len(options.case) :]

@@ -57,7 +57,7 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
 
 CHECK = Verb(
     "check",
-    "check a study, print and draw what would be solved: mesh, supports, loads, moduli; solves nothing",
+    "check a study and show mesh, supports, loads and moduli; solves nothing",
     _add,
     _run,
     (

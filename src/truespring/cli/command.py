@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _flushed(code: int, end: SystemExit | None = None) -> int:
-    """Flush standard output and return the exit code, that of a failed write in place of 0; else raise `end`, if any."""
+    """Return the exit code, or that of a failed write in place of 0, once all is written; raise `end`, if any."""
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -26,7 +26,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         nargs="+",
-        help="study, or folder that truespring wrote, with :MODEL for another than the compared model; or a result file: "
+        help="study, or folder that truespring wrote, with :MODEL for another than the compared model; or a result: "
         f"{', '.join(READERS)}",
     )
     add_out(parser)
@@ -49,9 +49,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from truespring.comparing import compare_sources, find_sources, read_probe, write_comparisons
+    from truespring.comparing.tables import difference_tables
     from truespring.report.summary import difference
-    from truespring.report.tables import difference_tables
-    from truespring.study import compare_sources, find_sources, read_probe, write_comparisons
 
     given = [(name, getattr(options, name)) for name in FILE_OPTIONS]
     sources = find_sources(options.source, given)

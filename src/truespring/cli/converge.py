@@ -8,7 +8,7 @@ from truespring.cli.printing import console, print_each, print_file, reserve, sa
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, positive, relative_error
 
 if TYPE_CHECKING:
-    from truespring.study import Refinement
+    from truespring.converging import Refinement
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -21,8 +21,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.report.tables import settling_table
-    from truespring.study import converge, read_studies, write_settling
+    from truespring.converging import converge, write_settling
+    from truespring.converging.page import settling_table
+    from truespring.study import read_studies
 
     studies = read_studies(options.study)
     reserve(options, studies)

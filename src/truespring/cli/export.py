@@ -18,7 +18,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
         metavar="TARGET",
         help=f"{', '.join(TARGETS)}; repeat for several targets",
     )
-    parser.add_argument("--model", metavar="NAME", help="model to write, default: the compared one, or the first springs")
+    parser.add_argument(
+        "--model", metavar="NAME", help="model to write, default: the compared one, or the first springs"
+    )
     add_out(parser)
 
 
@@ -52,7 +54,7 @@ def _run(options: argparse.Namespace) -> int:
 
 EXPORT = Verb(
     "export",
-    "write the springs of a study for another simulator, with the displacement to expect there",
+    "write springs for another simulator, with the displacement to expect there",
     _add,
     _run,
     (

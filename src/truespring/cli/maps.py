@@ -12,7 +12,10 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
     parser.add_argument("study", help="study file (TOML)")
     parser.add_argument(
-        "--law", default="neo-hookean", metavar="L", help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean"
+        "--law",
+        default="neo-hookean",
+        metavar="L",
+        help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean",
     )
     in_space = [name for name, load in LOADS.items() if load.dims == (3,)]
     parser.add_argument(

@@ -10,6 +10,7 @@ from truespring.cli.verb import CONVERGED, Verb, add_out, add_studies
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from truespring.models import Fitness
     from truespring.study import Realised
 
 
@@ -25,6 +26,15 @@ def print_moduli(screen: "Console", stem: str, several: "Iterable[Realised]", wh
             screen.print(moduli_table(f"{stem}: {title}", moduli) if whole else moduli_line(title, moduli))
         if whole:
             screen.print(f"{one.fitness.sentence}\n")
+        elif not one.fitness.fit:
+            screen.print(f"'{one.name}' does not fit the material{_better(one.fitness)}; use -v for the reasons")
+
+
+def _better(fitness: "Fitness") -> str:
+    better = fitness.better
+    if better is None:
+        return ""
+    return f', rule = "{better.rule}"{" with volume = true" if better.volume else ""} does better'
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +66,7 @@ def _run(options: argparse.Namespace) -> int:
 
 MODULI = Verb(
     "moduli",
-    "print and draw the effective moduli of the springs of a study, and which rule fits better; solves nothing",
+    "show the effective moduli of springs, and which rule fits better; solves nothing",
     _add,
     _run,
     (

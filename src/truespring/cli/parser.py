@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from truespring.cli import calibrate, check, compare, converge, export, maps, moduli, new, solve, sweep, table1, tables
 from truespring.cli.verb import COMMON, Verb
@@ -38,17 +38,19 @@ EXAMPLES = (
     "truespring verify --help              # options and examples of a verb",
 )
 
+_Action = TypeVar("_Action", bound=argparse.Action)
+
 SHELLS = ("bash", "zsh", "tcsh")
 
 
 class Parser(argparse.ArgumentParser):
     """An argparse parser that knows its own options, to name the nearest one."""
 
-    def __init__(self, *args: Any, **more: Any) -> None:
+    def __init__(self, **more: Any) -> None:
         self.option_names: list[str] = []
-        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **more)
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **more)
 
-    def _add_action(self, action: argparse.Action) -> argparse.Action:  # also called by groups of options
+    def _add_action(self, action: _Action) -> _Action:  # also called by groups of options
         self.option_names += [name for name in action.option_strings if name.startswith("--")]
         return super()._add_action(action)
 
@@ -83,7 +85,10 @@ def build_parser(filled: Collection[str]) -> tuple[Parser, dict[str, Parser]]:
     verbs = {}
     for name, verb in VERBS.items():
         one = subparsers.add_parser(
-            name, help=verb.summary, description=f"{verb.summary[:1].upper()}{verb.summary[1:]}.", epilog=_epilog(verb.examples)
+            name,
+            help=verb.summary,
+            description=f"{verb.summary[:1].upper()}{verb.summary[1:]}.",
+            epilog=_epilog(verb.examples),
         )
         one.set_defaults(run=verb.run, json=False, quiet=False, verbose=False, threads=None)
         if name in filled:
@@ -112,7 +117,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace | None:
         parser.error(f"a verb is missing; verbs: {', '.join(VERBS)}")
     if left:
         words = (f"{word}{nearest(word.partition('=')[0], verbs[options.verb].option_names)}" for word in left)
-        verbs[options.verb].error(f"unknown: {', '.join(words)}")
+        verbs[options.verb].error(f"unrecognized arguments: {', '.join(words)}")
     return options
 
 

@@ -89,7 +89,7 @@ def print_failures(result: "Result", out: Path, shown: bool) -> None:
 
 VERIFY = Verb(
     "verify",
-    "solve every model of a study, compare them, write curves, figures and a report",
+    "solve and compare the models of a study; write curves, figures and a report",
     _add,
     lambda options: _run(options, comparing=True),
     (
@@ -101,7 +101,7 @@ VERIFY = Verb(
 
 SOLVE = Verb(
     "solve",
-    "solve every model of a study and write curves and VTU files, without comparison, figures and report",
+    "solve the models of a study; write curves and VTU files only",
     _add,
     lambda options: _run(options, comparing=False),
     (

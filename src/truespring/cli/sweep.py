@@ -22,7 +22,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--lhs", type=positive, metavar="N", help="instead N points of a Latin hypercube over them")
     parser.add_argument("--seed", type=int, metavar="S", help="seed of the Latin hypercube, default: 0")
-    parser.add_argument("--points", type=Path, metavar="FILE", help="instead a CSV file: keys first, then a row a point")
+    parser.add_argument(
+        "--points", type=Path, metavar="FILE", help="instead a CSV file: keys first, then a row a point"
+    )
     parser.add_argument("--retry-failed", action="store_true", help="solve points again that failed before")
     add_workers(parser, "all cores")
     add_timeout(parser)
@@ -30,8 +32,8 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.report.sweeps import sweep_table
     from truespring.sweeping import plan_sweep, read_vary, run_sweep, write_sweep
+    from truespring.sweeping.page import sweep_table
 
     vary = dict[str, Any]()
     for key, values in map(read_vary, options.vary):

@@ -39,7 +39,7 @@ RULES = Verb(
 
 SCHEMA = Verb(
     "schema",
-    "print the JSON Schema of a study file: every key, its type and what it means",
+    "print the JSON Schema of study files, which describes every key",
     _add,
     _schema,
     ("truespring schema", "truespring schema > study.schema.json"),

@@ -99,4 +99,6 @@ def add_workers(parser: argparse.ArgumentParser, default: str) -> None:
     """Add --workers and --scheduler, which processes solve; one or the other."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--workers", type=positive, metavar="N", help=f"processes on this machine, default: {default}")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask cluster to use instead, such as tcp://10.0.0.1:8786")
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help="Dask cluster to use instead, such as tcp://10.0.0.1:8786"
+    )
