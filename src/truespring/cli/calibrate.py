@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from truespring.cli.printing import console, print_file, print_json, progress, reserve, say, writing
-from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -15,7 +15,13 @@ def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--held-out", nargs="+", default=[], metavar="CASE", help="studies whose loads are used for testing only"
     )
-    parser.add_argument("--unknowns", default="class", metavar="KIND", help=f"{', '.join(UNKNOWNS)}; default: class")
+    parser.add_argument(
+        "--unknowns",
+        default="class",
+        metavar="KIND",
+        **one_of(UNKNOWNS),
+        help=f"what one unknown stiffness is for: {', '.join(UNKNOWNS)}; default: class",
+    )
     parser.add_argument("--to", metavar="NAME", help="reference in the studies, default: neo-Hookean FEM, if there")
     parser.add_argument("--markers", type=Path, metavar="FILE", help="markers (.csv) measured under the study's load")
     parser.add_argument(

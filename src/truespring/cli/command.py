@@ -30,20 +30,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         code = _run_verb(sys.argv[1:] if arguments is None else list(arguments))
-    except SystemExit as end:  # from the parser, which has printed why
-        return _flushed(end.code if isinstance(end.code, int) else WRONG_INPUT, end)
-    return _flushed(code)
-
-
-def _flushed(code: int, end: SystemExit | None = None) -> int:
-    """Return the exit code, or that of a failed write in place of 0, once all is written; raise `end`, if any."""
+    except SystemExit as end:  # from the parser, which has printed help or what is wrong
+        code = end.code if isinstance(end.code, int) else CONVERGED
     try:
         sys.stdout.flush()
     except OSError as error:
         failed = _output_failed(error)
         return code or failed
-    if end is not None:
-        raise end
     return code
 
 
@@ -64,7 +57,7 @@ def _run_verb(arguments: list[str]) -> int:
     try:
         options = parse(arguments)
         if options is None:
-            return CONVERGED
+            return WRONG_INPUT
         options.command = shlex.join(["truespring", *(one for one in arguments if one not in _ONLY_PRINTING)])
         _load(options)
         with _threads(options.threads), ExitStack() as options.reserved:

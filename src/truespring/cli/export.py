@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from truespring.cli.printing import console, print_each, progress, reserve, say, writing
-from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -16,6 +16,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="TARGET",
+        **one_of(TARGETS),
         help=f"{', '.join(TARGETS)}; repeat for several targets",
     )
     parser.add_argument(

@@ -3,7 +3,7 @@
 import argparse
 
 from truespring.cli.printing import console, counting, print_file, print_json, reserve, writing
-from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_workers
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_workers, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -15,6 +15,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--law",
         default="neo-hookean",
         metavar="L",
+        **one_of(LAWS),
         help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean",
     )
     in_space = [name for name, load in LOADS.items() if load.dims == (3,)]
@@ -22,6 +23,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--load",
         action="append",
         metavar="TYPE",
+        **one_of((*LOADS, "all")),
         help=f"{', '.join(LOADS)} or all ({', '.join(in_space)}: in 3D only; own: the load of the study); "
         "may be repeated; default: own",
     )

@@ -7,7 +7,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from truespring.cli.printing import print_json
-from truespring.cli.verb import CONVERGED, Verb
+from truespring.cli.verb import CONVERGED, Verb, one_of
 from truespring.errors import TruespringError
 
 
@@ -26,7 +26,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
     about = {kind: study.read_text(encoding="utf-8").splitlines()[0].strip("# ") for kind, study in kinds.items()}
     what = "\n".join(f"  {kind:10}{text}" for kind, text in about.items())
     parser.description = f"{parser.description}\n\nkinds:\n{what}"
-    parser.add_argument("kind", choices=kinds, help="what the body is")
+    parser.add_argument("kind", **one_of(kinds), metavar="KIND", help=f"{', '.join(kinds)}")
     parser.add_argument(
         "file", nargs="?", type=Path, metavar="FILE", help="file to write, default: KIND.toml; no file is overwritten"
     )

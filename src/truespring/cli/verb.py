@@ -2,10 +2,12 @@
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from truespring.errors import nearest
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 141
 
@@ -53,6 +55,20 @@ def relative_error(text: str) -> float:
     if not 0 < number < 1:
         raise argparse.ArgumentTypeError(f"{text} is not a relative error between 0 and 1")
     return number
+
+
+def one_of(names: Iterable[str]) -> dict[str, Any]:
+    """Return the arguments of add_argument for an option whose values are `names`; an error names the nearest."""
+    allowed = tuple(names)
+
+    def known(text: str) -> str:
+        if text not in allowed:
+            raise argparse.ArgumentTypeError(
+                f"'{text}' is unknown{nearest(text, allowed)}; allowed: {', '.join(allowed)}"
+            )
+        return text
+
+    return {"type": known, "choices": allowed}
 
 
 #: Options that several verbs share, by the name of their value.
