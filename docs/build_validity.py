@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
 from truespring.report.sheet import Sheet  # noqa: E402
-from truespring.validity import LOADS, Validity, map_validity  # noqa: E402
+from truespring.validity import LOAD_TYPES, Validity, map_validity  # noqa: E402
 
 IMAGES = "images/validity"
 
@@ -146,7 +146,7 @@ def section(shown: Shown, found: Validity, folder: Path) -> Iterator[str]:
         yield f"(in a copy of the study with {changed})\n"
     pictures = found.figures()
     for load in dict.fromkeys(one.load.name for one in found.maps):
-        yield f"### {LOADS[load].did}\n"
+        yield f"### {LOAD_TYPES[load].did}\n"
         for one, sentence in zip(found.maps, found.verdicts, strict=True):
             if one.load.name == load:
                 yield f"* {sentence.replace(one.rule.words, f'**{one.rule.words}**', 1)}"
@@ -195,7 +195,7 @@ def main() -> None:
         f"\nAll in {seconds / 60:.1f} minutes, truespring {version('truespring')}, {options.workers} "
         f"process{'es' if options.workers > 1 else ''}. Rebuilt by `make validity`.\n"
     )
-    loads = "".join(f"| `{one.name}` | {one.how} |\n" for one in LOADS.values())
+    loads = "".join(f"| `{one.name}` | {one.how} |\n" for one in LOAD_TYPES.values())
     table = f"{REBUILT}\n\n| load type | supports and load |\n|---|---|\n{loads}"
     page.write_text("\n".join([head + table, *text, took + foot]), encoding="utf-8")
 

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from truespring.cli import main
+from truespring.loading import LOADS
+from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS
 from truespring.models import ELEMENTS, LAWS, RULES
 from truespring.study import schema
@@ -72,7 +74,7 @@ def valid(rng: random.Random) -> Tables:
         if rng.random() < 0.5:
             tables["region"][0]["on"] = {"box": [*[0.0] * dim, *size]}
     if dim == 2:
-        tables["section"] = {"kind": rng.choice(words(schema.SectionTable, "kind")), "thickness": _length(rng, 0.01)}
+        tables["section"] = {"kind": rng.choice(list(SECTIONS)), "thickness": _length(rng, 0.01)}
     tables["support"] = [{"on": "left"}]
     driven = rng.random() < 0.25
     if driven:
@@ -149,7 +151,7 @@ def _moved(rng: random.Random, dim: int, size: list[float]) -> Tables:
 
 
 def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tables:
-    key = rng.choice([*schema.LOADS, "force", "traction"])
+    key = rng.choice([*LOADS, "force", "traction"])
     key = "force" if dim == 3 and key == "moment" else key  # in space it has no potential
     strain = rng.uniform(-5, -1) if rng.random() < 0.85 else rng.uniform(-14, 2)
     stress = young * 10**strain * rng.choice((1, -1))

@@ -405,7 +405,7 @@ def test_what_acts_inside_a_block_is_refused() -> None:
     with pytest.raises(ts.TruespringError, match=f"a load acts at 1 nodes, first node {inner}, within it"):
         model.check(loaded)
     heavy = replace(problem, material=ts.Material(1.0, 0.3, 1000.0), loads=[ts.Gravity((0.0, -1e-6))])
-    with pytest.raises(ts.TruespringError, match="gravity acts within it"):
+    with pytest.raises(ts.TruespringError, match=r"gravity .* acts within it"):
         model.check(heavy)
     held = replace(problem, supports=[ts.Fixed("left"), ts.Fixed([inner], ["y"])])
     with pytest.raises(ts.TruespringError, match=f"a support holds 1 of its nodes inside, the first node {inner}"):

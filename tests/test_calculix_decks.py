@@ -16,7 +16,7 @@ from truespring.arrays import Floats
 from truespring.errors import ExportError
 from truespring.exports import Exported, solve_springs, target_files
 from truespring.exports.calculix import fem_deck, spring_deck
-from truespring.loading.following import SurfacePressure
+from truespring.loading.pressure import SurfacePressure
 from truespring.mesh import read_mesh
 from truespring.mesh.files.inp import read_inp
 from truespring.reference.ccx import run_ccx
@@ -408,8 +408,8 @@ def test_what_springs_cannot_be_is_refused_with_the_way_out(target: str) -> None
     refused = [
         (bent(ts.Springs("isotropic", volume=True), force), "volume = true.*npz"),
         (bent(ts.Springs("biquadratic"), force), "each other's lengths.*another rule"),
-        (bent(ts.Springs("lloyd"), moment), "a moment follows a face.*rotation of a support"),
-        (exported("pressed"), "a pressure follows a face.*traction"),
+        (bent(ts.Springs("lloyd"), moment), r"moment .* follows a face.*rotation of a support"),
+        (exported("pressed"), r"pressure .* follows a face.*traction"),
         (exported("prestressed"), "2 springs have another, the first, number 0, 9 m instead of 10 m.*mujoco"),
     ]
     for one, words in refused:

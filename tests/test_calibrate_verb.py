@@ -129,7 +129,7 @@ def test_markers_are_fitted_and_nothing_is_held_out_which_is_said(tmp_path: Path
         (["{study}", "--to", "neos"], "did you mean 'neo'"),
         (["{study}", "{fine}"], "its mesh is another"),
         (["{study}", "--held-out", "{stiff}"], "its material is another"),
-        (["{study}", "--unknowns", "row"], "unknowns = 'row' is unknown"),
+        (["{study}", "--unknowns", "row"], "'row' is unknown"),
         (["{study}", "--unknowns", "region"], "several materials"),
         (["{study}", "--regularisation", "-1"], "from 0 on"),
         (["{alone}"], "no reference beside the springs"),

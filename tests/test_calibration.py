@@ -126,6 +126,20 @@ def test_a_combination_that_no_datum_sees_is_named() -> None:
     assert weak.determined and weak.weak == ("b",) and "regularisation" in weak.sentence
 
 
+def test_the_resolution_is_the_damped_projector() -> None:
+    """diag of (A^T A + r^2/n)^-1 A^T A, solved without singular values (Menke, Geophysical Data Analysis, 4)."""
+    random = np.random.default_rng(5)
+    for shape in ((7, 3), (3, 3), (2, 3)):
+        matrix, regularisation = random.normal(size=shape) * [2.0, 0.3, 0.05], 0.4
+        normal = matrix.T @ matrix
+        expected = np.linalg.solve(normal + regularisation**2 / 3 * np.eye(3), normal).diagonal()
+        found = identifiability(matrix, ("a", "b", "c"), regularisation, "")
+        assert found.resolution == pytest.approx(expected, rel=1e-9)
+        assert found.weak == tuple(name for name, share in zip("abc", expected, strict=True) if share < 0.5) != ()
+    free = identifiability(np.diag([1.0, 1e-3]), ("a", "b"), 0.0, "")
+    assert free.resolution == pytest.approx([1.0, 1.0]) and free.weak == ()
+
+
 # --- Gradients --------------------------------------------------------------------------------------------------------
 
 

@@ -45,6 +45,8 @@ def test_shallow_truss_all_the_way_through(rise: float, control: str) -> None:
         force = shallow_truss_force(sunk, 1.0, rise, stiffness)
         assert 1.5 * limit * state.load_factor == pytest.approx(force, rel=1e-8, abs=1e-9 * limit)
     first, second = critical(path, "limit point")
+    # One eigenvalue is negative between the limits: at both of them none is, the fewer of the two sides.
+    assert first.negative_eigenvalues == second.negative_eigenvalues == 0
     assert 1.5 * limit * first.load_factor == pytest.approx(limit, rel=1e-6)
     assert 1.5 * limit * second.load_factor == pytest.approx(-limit, rel=1e-6)
     assert -first.displacement[1, 1] == pytest.approx(sunk_at_limit, rel=1e-4)

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.names import missing
 from tests.test_examples import EXAMPLES
-from truespring.models import LAWS, RULES
+from truespring.mesh import ELEMENT_KINDS
+from truespring.models import ELEMENTS, LAWS, RULES
 from truespring.study import read_study, run
-from truespring.study.schema import StudyTable
+from truespring.study.schema import MODEL_KINDS, StudyTable
 
 ROOT = EXAMPLES.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "export").glob("*.md"))]
@@ -52,10 +54,32 @@ def test_every_key_rule_and_law_is_documented() -> None:
     tables = StudyTable.model_json_schema()
     keys = set(tables["properties"]) | {key for one in tables["$defs"].values() for key in one["properties"]}
     assert len(keys) > 25
-    for key in keys:
-        assert re.search(rf"\b{key}\b", study), f"{key} is not in docs/study.md"
-    for name in (*RULES, *LAWS):
-        assert f"`{name}`" in models
+    assert not missing(keys, study)
+    quoted = set(re.findall(r"`([^`\n]+)`", models))
+    assert not {*RULES, *LAWS, *ELEMENTS} - quoted
+    assert not missing({*ELEMENT_KINDS} - {"line"}, study)
+
+
+def test_the_schema_names_what_the_tables_hold() -> None:
+    """Rules and laws with their description, elements and kinds of model: as values, each a word of its own."""
+    tables = StudyTable.model_json_schema()["$defs"]
+    for table, key, names in (
+        ("SpringsTable", "rule", RULES),
+        ("FemTable", "law", LAWS),
+        ("FemTable", "element", ELEMENTS),
+    ):
+        found = tables[table]["properties"][key]
+        forms = found.get("anyOf", [found])
+        assert {name for form in forms for name in form.get("enum", ())} == set(names)
+        if key != "element":
+            assert not missing(names, " ".join(form.get("description", "") for form in forms))
+    kinds = {table["properties"]["kind"].get("const") for table in tables.values() if "kind" in table["properties"]}
+    assert set(MODEL_KINDS) <= kinds
+
+
+def test_a_short_name_is_not_found_in_a_longer_word() -> None:
+    assert missing(["obj", "stl"], "objects as stl files") == {"obj"}
+    assert missing(["linear", "quadratic"], "nonlinear, bi-quadratic, `quadratic`") == {"linear"}
 
 
 def test_the_table_of_the_readme_is_against_the_truth_of_each_law() -> None:

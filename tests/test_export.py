@@ -631,7 +631,5 @@ def test_the_verb_refuses_in_words(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["export", study, "--to", "calculix", "--to", "abaqus", "--out", str(tmp_path)]) == 2
     assert "both write springs.inp" in capsys.readouterr().err
     assert not (tmp_path / "study").exists()
-    with pytest.raises(SystemExit):
-        main(["export", "--help"])
-    told = " ".join(capsys.readouterr().out.split())
-    assert all(target in told for target in TARGETS)
+    assert main(["export", "--help"]) == 0
+    assert set(TARGETS) <= set(re.findall(r"[\w-]+", capsys.readouterr().out))

@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 import truespring as ts
 from tests.closed_forms import VOIGT, lame, material_of, principal_state
 from truespring.arrays import Floats
-from truespring.models import LAWS
-from truespring.models import ELEMENTS, FemPotential
+from truespring.models import ELEMENTS, LAWS, FemPotential
 from truespring.models.quadratic import QuadraticPotential
 
 SECTIONS = {"plane-stress": ts.PlaneStress, "plane-strain": ts.PlaneStrain}

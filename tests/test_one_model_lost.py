@@ -201,9 +201,7 @@ def test_a_model_whose_time_is_up(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert {model["status"] for model in summary_of(tmp_path / "out").values()} == {"not-converged"}
     assert main(["solve", file, "--out", out, "--quiet", "--timeout", "1000"]) == 0
     for wrong in ("0", "-1", "nan", "inf", "soon"):
-        with pytest.raises(SystemExit) as ended:
-            main(["solve", file, "--timeout", wrong])
-        assert ended.value.code == 2
+        assert main(["solve", file, "--timeout", wrong]) == 2
 
 
 @needs_ccx

@@ -109,12 +109,12 @@ def test_a_damaged_list_names_no_file_of_others(tmp_path: Path) -> None:
 
 def test_a_second_run_in_the_same_folder_is_an_error(tmp_path: Path) -> None:
     with Lock(tmp_path / "out"):
-        with pytest.raises(TruespringError, match="another run writes here now: wait until it has ended"):
+        with pytest.raises(TruespringError, match="another run is writing"):
             Lock(tmp_path / "out")
         told = [sys.executable, "-m", "truespring", "solve", str(written(tmp_path)), "--out", str(tmp_path), "--quiet"]
         with Lock(tmp_path / "study"):
             process = subprocess.run(told, capture_output=True, text=True)
-        assert process.returncode == 2 and "another run writes here now" in process.stderr
+        assert process.returncode == 2 and "another run is writing" in process.stderr
     assert not (tmp_path / "out").exists() and not (tmp_path / "study").exists(), "nothing is left behind"
     Lock(tmp_path / "out").release()
 

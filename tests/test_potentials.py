@@ -139,7 +139,7 @@ def _springs() -> dict[str, Case]:
             if (rule, element) == ("least-squares", "solid of four kinds"):
                 continue  # a spring is negative where wedges and pyramids meet
             model = ts.Springs(rule)
-            regular = element not in ("triangle", "tetrahedron", "wedge") and rule in ("lloyd", "isotropic")
+            regular = element in entry.shapes or (element in MIXED and bool(entry.shapes))
             regular |= element in ("pyramid", *MIXED) and not entry.coupled
             problem = body(shape(element), distorted=not regular)
             cases[f"{rule}, {element}"] = _spring_case(model, problem)

@@ -25,7 +25,7 @@ from truespring.report.style import figure_style
 from truespring.report.summary import difference, summary
 from truespring.report.verdict import drive, force_sentence, verdict
 from truespring.solvers import Newton
-from truespring.validity.curve import curve
+from truespring.validity.deviation import deviation_of
 from truespring.validity.solving import Task, run_task
 
 LENGTH, SIDE = 0.06, 0.02
@@ -286,13 +286,20 @@ def test_loads_that_balance_drive_along_the_largest_of_them(large: str) -> None:
     assert found.axis == axis and found.name in (large, f"−{large}")
 
 
+@pytest.mark.parametrize(("total", "name"), [((0.001, 0.0, 0.0), "x"), ((0.0, 0.0, -0.001), "−z")])
+def test_what_is_left_of_the_loads_drives_however_small_it_is(total: tuple[float, ...], name: str) -> None:
+    loads = [ts.Force("top", (0.0, 0.02, 0.0)), ts.Force("bottom", (0.0, -0.02, 0.0)), ts.Force("right", total)]
+    path = ts.solve(block(ts.Fixed("left"), loads=loads), SPRINGS, Newton(1))
+    assert drive(result(path, path)).name == name
+
+
 def test_a_map_judges_as_a_comparison_does() -> None:
     """By the force and the torque of what is moved, each level as `compare` has it, and no better between them."""
     mesh, ends = ts.rectangle((LENGTH, SIDE), (3, 1)), [ts.Fixed("left"), ts.Fixed("right", rotation=0.4)]
     problem = ts.Problem(mesh, ts.Material(20e3, 0.3), ts.PlaneStress(0.01), ends)
     mine, theirs = (run_task(Task(problem, model, 4)) for model in (SPRINGS, RUBBER))
     reference: Any = SimpleNamespace(solved=theirs, sizes=np.concatenate([[0.01], np.arange(1, 5) / 4]))
-    found = curve(mine, reference, np.linspace(0, 1, 41), None)
+    found = deviation_of(mine, reference, np.linspace(0, 1, 41), None)
     told = ts.compare(mine.path, theirs.path)
     assert found.rms_errors[1:] == pytest.approx(told.rms_errors, rel=1e-9)
     assert found.force_errors[1:] == pytest.approx(told.force_errors, rel=1e-9) and told.force_errors[0] > 0.05

@@ -20,7 +20,8 @@ import truespring as ts
 from truespring.mesh import Surface
 from truespring.report.bodies import undeformed_figure
 from truespring.report.curves import write_reactions
-from truespring.report.figures import Drawing, draw_figures, over_name, save_figures
+from truespring.report.drawing import Drawing
+from truespring.report.figures import draw_figures, over_name, save_figures
 from truespring.report.frame import round_numbers, written
 from truespring.report.page import render_page, write_page
 from truespring.report.plots import _apart, _uncrossed

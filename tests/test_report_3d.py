@@ -21,7 +21,8 @@ from truespring.mesh import Mesh
 from truespring.report import render as rendering
 from truespring.report.bodies import path_lines
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
-from truespring.report.figures import Drawing, draw_figures, save_figures
+from truespring.report.drawing import Drawing
+from truespring.report.figures import draw_figures, save_figures
 from truespring.report.frame3d import figure_of, shot
 from truespring.report.page import render_page
 from truespring.report.render import Image, Layer, Shot, draw, read_job, render, rgb, stacked, write_job

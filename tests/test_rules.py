@@ -1,6 +1,7 @@
 """Stiffness rules, element by element: their published numbers, what they fit, and what they are not made for."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import truespring as ts
+from tests.names import words
 from truespring.arrays import Floats
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.models import RULES
+from truespring.models.lattices import LATTICES
+from truespring.models.rules import ANY_MESH, Realised, Rule
 
 THIRD = 1 / 3
 
@@ -281,39 +285,109 @@ def random_element(element: str, seed: int) -> ts.Problem:
 # --- what rules are not made for ------------------------------------------------------------------
 
 
+REGULAR = {
+    "triangle": one_element([[0.0, 0], [1, 0], [0, 1]], "triangle", 0.3),
+    "quadrilateral": brick(1.0, 1.0, poisson=0.3),
+    "tetrahedron": tetrahedron(1.0, 0.3),
+    "pyramid": random_element("pyramid", 1),
+    "wedge": random_element("wedge", 1),
+    "hexahedron": brick(1.0, 1.0, 1.0, poisson=0.3),
+}
+SHAPES = {
+    "square": brick(1.3, 1.3, poisson=0.3),
+    "rectangle": brick(1.0, 1.2, poisson=0.3),
+    "brick": brick(1.0, 1.1, 0.9, poisson=0.3),
+}
+
+
+@pytest.mark.parametrize("element", ELEMENT_KINDS.keys() - {"line"})
 @pytest.mark.parametrize("rule", RULES)
-def test_a_rule_declares_its_elements(rule: str) -> None:
-    """Every rule says what it realises and where it comes from, works on the elements named and refuses others."""
-    entry = RULES[rule]
-    assert entry.realises and entry.source and set(entry.elements) <= set(ELEMENT_KINDS) - {"line"}
-    regular = {
-        "triangle": one_element([[0.0, 0], [1, 0], [0, 1]], "triangle", 0.3),
-        "quadrilateral": brick(1.0, 1.0, poisson=0.3),
-        "tetrahedron": tetrahedron(1.0, 0.3),
-        "pyramid": random_element("pyramid", 1),
-        "wedge": random_element("wedge", 1),
-        "hexahedron": brick(1.0, 1.0, 1.0, poisson=0.3),
-    }
-    assert regular.keys() == ELEMENT_KINDS.keys() - {"line"}
-    for element, problem in regular.items():
-        if element in entry.elements:
-            stiffness = ts.Springs(rule).element_stiffness(problem)
-            assert stiffness.shape == (1, len(problem.mesh.kind.links))
-            assert np.isfinite(stiffness).all()
-        else:
-            with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' is for .*{element} elements there are"):
-                ts.Springs(rule).element_stiffness(problem)
+def test_a_rule_takes_the_elements_that_it_declares(rule: str, element: str) -> None:
+    """It works on elements of its shape, on any where it names none, and refuses other kinds and shapes."""
+    entry, problem = RULES[rule], REGULAR[element]
+    if element not in entry.elements:
+        with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' is for .*{element} elements there are"):
+            ts.Springs(rule).element_stiffness(problem)
+        return
+    shape = entry.shapes.get(element)
+    taken = [problem, random_element(element, 5) if shape is None else SHAPES[shape]]
+    for one in taken:
+        stiffness = ts.Springs(rule).element_stiffness(one)
+        assert stiffness.shape == (1, len(one.mesh.kind.links))
+        assert np.isfinite(stiffness).all()
+    if shape is not None:
+        others = [random_element(element, 5), *([SHAPES["rectangle"]] if shape == "square" else [])]
+        for other in others:
+            with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' is made for") as error:
+                ts.Springs(rule).element_stiffness(other)
+            named = words(str(error.value)) & RULES.keys()
+            assert named > {rule}, "the rules that take such elements are named"
+            for one in named - {rule}:
+                ts.Springs(one).element_stiffness(other)
+
+
+def test_a_rule_declares_elements_and_shapes_that_there_are() -> None:
+    for entry in RULES.values():
+        assert entry.idea and entry.source
+        assert set(entry.elements) <= set(ELEMENT_KINDS) - {"line"}
+        assert entry.shapes.keys() <= set(entry.elements)
+
+
+def realised(entry: Rule, element: str) -> list[tuple[str, Realised]]:
+    """The lattices of a kind of element for which a rule states its moduli."""
+    of_element = [name for name, make in LATTICES.items() if make().element == element]
+    return [(name, one) for one in entry.moduli for name in of_element if one.lattice in (name, ANY_MESH)]
+
+
+def check_moduli(rule: str, entry: Rule, element: str) -> None:
+    """The stated moduli are those that `moduli` computes, on a lattice at least of each kind of element."""
+    stated = realised(entry, element)
+    assert stated, f"{rule} states no moduli on {element} elements"
+    for lattice, one in stated:
+        mesh = LATTICES[lattice]()
+        for poisson in (0.1, 0.3) if one.at is None else (one.at,):
+            problem = held(mesh, poisson)
+            found = ts.moduli(problem, ts.Springs(rule, allow_negative=True))
+            assert found.lattice, lattice
+            expected = (poisson, poisson) if one.poisson is None else one.poisson
+            assert found.young_range == pytest.approx(one.young, abs=6e-5), f"E of {rule} on {lattice}"
+            assert found.poisson_range == pytest.approx(expected, abs=6e-5), f"Poisson's ratio of {rule} on {lattice}"
+
+
+def held(mesh: ts.Mesh, poisson: float) -> ts.Problem:
+    """A body with E = 1, held and loaded only because a problem must be."""
+    last = mesh.n_nodes - 1
+    section = ts.PlaneStress(1.0) if mesh.dim == 2 else None
+    supports, load = [ts.Fixed(on=range(last))], ts.Force(on=[last], total=[1.0] * mesh.dim)
+    return ts.Problem(mesh, ts.Material(1.0, poisson), section, supports, load)
+
+
+@pytest.mark.parametrize(("rule", "element"), [(rule, one) for rule in RULES for one in RULES[rule].elements])
+def test_stated_moduli_are_the_computed_ones(rule: str, element: str) -> None:
+    check_moduli(rule, RULES[rule], element)
+
+
+def test_wrong_statements_fail() -> None:
+    squares = Realised("squares", (0.9, 21 / 19), (5 / 19, 7 / 17))
+    with pytest.raises(AssertionError, match="E of lloyd on squares"):
+        check_moduli("lloyd", replace(RULES["lloyd"], moduli=(squares,)), "quadrilateral")
+    with pytest.raises(AssertionError, match="states no moduli"):
+        check_moduli("lloyd", replace(RULES["lloyd"], moduli=(squares,)), "triangle")
+
+
+def test_stated_moduli_in_words() -> None:
+    squares = Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17))
+    assert str(squares) == "squares: 0.882 to 1.105 E, Poisson's ratio 0.263 to 0.412"
+    assert str(Realised("cubes", poisson=(0.25, 0.25), at=1 / 3)) == "cubes (nu = 1/3): E, Poisson's ratio 1/4"
+    assert str(Realised(ANY_MESH)) == "any mesh: E, the material's Poisson's ratio"
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(factor=st.floats(1e-3, 1e3), size=st.floats(1e-3, 1e3), rule=st.sampled_from(sorted(RULES)))
 def test_stiffness_scales_with_young_and_in_space_with_size(factor: float, size: float, rule: str) -> None:
     for element in RULES[rule].elements:
-        if rule in ("lloyd", "isotropic") and element in ("quadrilateral", "hexahedron"):
-            sides = (1.0, 1.0) if element == "quadrilateral" else (1.0, 1.1, 0.9)
-            one = brick(*sides, poisson=0.3)
-        else:
-            one = random_element(element, 5)
+        shape = RULES[rule].shapes.get(element)
+        one = random_element(element, 5) if shape is None else SHAPES[shape]
         assert one.material is not None
         grown = one_element(one.mesh.nodes * size, element, one.material.poisson, young=factor)
         expected = given_by(rule, one) * factor * (size if one.mesh.dim == 3 else 1.0)

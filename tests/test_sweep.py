@@ -36,11 +36,12 @@ from tests.sweeps import (
 )
 from truespring.cli import main
 from truespring.errors import TruespringError
+from truespring.report.rows import table_of
 from truespring.study import read_study, read_text, run, value_at
 from truespring.sweeping import Failure, Pool, plan_sweep, run_sweep
 from truespring.sweeping.store import FAILED, Store
 from truespring.sweeping.sweep import _outcome, solve_point
-from truespring.sweeping.table import rows_of, table_of
+from truespring.sweeping.table import rows_of
 from truespring.sweeping.values import choose, read_points, read_value, read_values, read_vary
 
 FAST = changed(("load_steps = 2", "load_steps = 1"))

@@ -21,7 +21,7 @@ from truespring.study import read_study
 from truespring.validity import Validity, map_validity, reference
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.lines import polylines, spans
-from truespring.validity.loads import LOADS, scaled
+from truespring.validity.loads import LOAD_TYPES
 from truespring.validity.refine import LINES, Cells, Rows, crossings
 from truespring.validity.sentences import headline, verdict
 from truespring.validity.solving import Task, run_task
@@ -64,13 +64,13 @@ def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) ->
     assert corners.sum() == 2
     along, across = (nodes[~corners] ** 2).mean(axis=0)
     for one in found.maps:
-        (curve,) = one.curves.values()
+        (deviation,) = one.deviations.values()
         for strain in (0.1, 0.2, 0.3, 0.5):
             stretch, stress = principal_state(law, 1.0, 1 / 3, (1 + strain, None, None))
             force, narrow = _lattice(strain, one.rule.name)
             place = int(np.abs(one.x - strain).argmin())
             assert one.x[place] == pytest.approx(strain)
-            assert curve.stiffness_on_grid[place] == pytest.approx(force / stress[0] - 1, abs=1e-5)
+            assert deviation.stiffness_on_grid[place] == pytest.approx(force / stress[0] - 1, abs=1e-5)
             moved = strain**2 * along + (stretch[1] - 1) ** 2 * across
             rms = np.sqrt((narrow - stretch[1]) ** 2 * across / moved)
             assert one.errors[0, place] == pytest.approx(max(abs(force / stress[0] - 1), rms), abs=1e-5)
@@ -79,21 +79,21 @@ def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) ->
 def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(study: Path) -> None:
     """15/17 of E along the mesh; its hardening crosses the straight line where P = 0.3 E."""
     (one,) = map_validity(study, law="linear", loads=["stretch"], rules=["lloyd"], y=None).maps
-    (curve,) = one.curves.values()
-    assert curve.stiffness_on_grid[0] == pytest.approx(-2 / 17, abs=1e-5)
+    (deviation,) = one.deviations.values()
+    assert deviation.stiffness_on_grid[0] == pytest.approx(-2 / 17, abs=1e-5)
     assert one.errors[0, 0] == pytest.approx(0.118, abs=5e-4)
-    crossing = float(np.interp(0.0, curve.stiffness_on_grid, one.x))
+    crossing = float(np.interp(0.0, deviation.stiffness_on_grid, one.x))
     exact = brentq(lambda strain: _lattice(strain, "lloyd")[0] - strain, 0.25, 0.35)
     assert crossing == pytest.approx(exact, abs=1e-4)
     assert crossing == pytest.approx(0.3, abs=3e-3)
     at = int(np.abs(one.x - 0.3).argmin())
-    assert 1 + curve.stiffness_on_grid[at] == pytest.approx(0.29976 / 0.3, abs=1e-4)
+    assert 1 + deviation.stiffness_on_grid[at] == pytest.approx(0.29976 / 0.3, abs=1e-4)
 
 
 def test_bending_is_best_at_three_elements_for_lloyd_and_falls_for_isotropic(bent: Validity) -> None:
     lloyd, isotropic = bent.maps
     assert lloyd.y[int(lloyd.errors[:, 0].argmin())] == 3
-    small = {spot.depth: float(curve.stiffness_on_grid[0]) for spot, curve in lloyd.curves.items()}
+    small = {spot.depth: float(deviation.stiffness_on_grid[0]) for spot, deviation in lloyd.deviations.items()}
     for depth in (3, 4):  # in EI alone: clamp and shear are the same to both but for what meshes add
         factor = bending_factor(5 / 16, 7 / 16, depth) / bending_factor(5 / 16, 7 / 16, 2)
         assert (1 + small[depth]) / (1 + small[2]) == pytest.approx(factor, rel=0.02)
@@ -105,14 +105,14 @@ def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
     """What a map tells of a level is what `compare` tells of the two paths there."""
     lloyd, found = bent.maps[0], bent.references[0]
     body = Body.of(read_study(study))
-    problem = body.springs_problem(LOADS["bend"], found.factor, Spot(depth=3))
+    problem = body.springs_problem(LOAD_TYPES["bend"], found.factor, Spot(depth=3))
     path = ts.solve(problem, ts.Springs("lloyd"), ts.Newton(load_steps=10))
     whole = ts.compare(path, found.solved.path, [0.04, 0.005])
-    curve = lloyd.curves[Spot(depth=3)]
-    assert curve.rms_errors[1:] == pytest.approx(whole.rms_errors, rel=1e-9)
-    assert curve.probe_errors[1:] == pytest.approx(whole.probe_errors, rel=1e-9)
-    between = np.interp(curve.sizes, curve.grid, lloyd.errors[2])
-    assert curve.rms_errors == pytest.approx(between, abs=2e-4)
+    deviation = lloyd.deviations[Spot(depth=3)]
+    assert deviation.rms_errors[1:] == pytest.approx(whole.rms_errors, rel=1e-9)
+    assert deviation.probe_errors[1:] == pytest.approx(whole.probe_errors, rel=1e-9)
+    between = np.interp(deviation.sizes, deviation.grid, lloyd.errors[2])
+    assert deviation.rms_errors == pytest.approx(between, abs=2e-4)
 
 
 def test_the_reference_is_converged_and_says_to_what(bent: Validity, study: Path) -> None:
@@ -138,7 +138,7 @@ def test_what_a_clamp_leaves_is_told_of_meshes_that_are_not_fine(study: Path, mo
     file = study.with_name("clamped.toml")
     file.write_text(text)
     body = Body.of(read_study(file))
-    found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+    found = reference.solve_reference(body, LOAD_TYPES["bend"], "linear", last=0.3, steps=1)
     assert len(found.n_nodes) == 3 and not found.converged
     apart = _two_refinements_finer(found, body)
     assert apart < found.error < 6 * apart
@@ -151,7 +151,7 @@ def test_what_a_clamp_leaves_is_told_of_cubes() -> None:
     body = Body.of(read_study(study))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference, "_MOST_UNKNOWNS", {3: 10_000})
-        found = reference.solve_reference(body, LOADS["bend"], "linear", last=0.3, steps=1)
+        found = reference.solve_reference(body, LOAD_TYPES["bend"], "linear", last=0.3, steps=1)
     assert found.elements == 4
     apart = _two_refinements_finer(found, body)
     assert apart < found.error < 8 * apart  # of three meshes no order is believed: it is told with the first
@@ -258,7 +258,7 @@ def test_sentences_follow_from_the_numbers(bent: Validity) -> None:
     part = _with_errors(bent, dict.fromkeys(range(1, 9), (0.1, 0.0)))
     assert "within 5 % of neo-Hookean FEM from 15 to 30 % of the length on every mesh" in verdict(part, part.maps[0])
     assert headline(part, part.maps[0]).startswith("Within 5 % of neo-Hookean FEM from 15 to 30 %")
-    small = {spot.depth: curve.stiffness_on_grid[0] for spot, curve in bent.maps[0].curves.items()}
+    small = {spot.depth: deviation.stiffness_on_grid[0] for spot, deviation in bent.maps[0].deviations.items()}
     assert f"{100 * small[1]:.0f} % too stiff (1 element)" in said.replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -340,7 +340,7 @@ def test_loads_are_scaled_one_and_all() -> None:
         supports=[ts.Fixed("left"), ts.Fixed("right-middle", ["x"], displacement=(0.1, 0.0))],
         loads=[ts.Force("top", (0.0, 1.0)), ts.Traction("top", (0.0, 2.0)), ts.Gravity((0.0, 3.0))],
     )
-    half, whole = scaled(problem, 0.5).loading, problem.loading
+    half, whole = problem.scaled(0.5).loading, problem.loading
     assert half.external_force == pytest.approx(0.5 * whole.external_force)
     assert half.motion() == pytest.approx(0.5 * whole.motion())
     turned = ts.Problem(
@@ -350,8 +350,8 @@ def test_loads_are_scaled_one_and_all() -> None:
         supports=[ts.Fixed("left", rotation=0.2)],
         loads=[ts.Moment("right", 1.0), ts.Pressure("top", 1.0)][:1],
     )
-    assert scaled(turned, 0.5).supports[0].rotation == pytest.approx(0.1)
-    assert scaled(turned, 0.5).loads[0].moment == pytest.approx(0.5)  # type: ignore[union-attr]
+    assert turned.scaled(0.5).supports[0].rotation == pytest.approx(0.1)
+    assert turned.scaled(0.5).loads[0].moment == pytest.approx(0.5)  # type: ignore[union-attr]
 
 
 def test_the_verb_leaves_a_table_pictures_and_a_page(
@@ -411,8 +411,12 @@ def test_a_mesh_from_a_file_is_mapped_as_it_is() -> None:
 
 def test_the_table_has_a_row_for_each_level(bent: Validity) -> None:
     table = bent.table()
-    assert table.height == len(bent.rows) == sum(len(curve.sizes) for one in bent.maps for curve in one.curves.values())
-    assert table["rms_error"].max() == max(curve.rms_errors.max() for curve in bent.maps[1].curves.values())
+    assert (
+        table.height
+        == len(bent.rows)
+        == sum(len(deviation.sizes) for one in bent.maps for deviation in one.deviations.values())
+    )
+    assert table["rms_error"].max() == max(deviation.rms_errors.max() for deviation in bent.maps[1].deviations.values())
 
 
 @pytest.mark.verification
@@ -420,7 +424,7 @@ def test_workers_find_what_one_process_finds(bent: Validity, study: Path) -> Non
     asked = {"depth": (1, 8), "load": (0, 0.3)}
     several = map_validity(study, loads=["bend"], rules=list(LATTICES), ranges=asked, workers=2)
     for one, other in zip(bent.maps, several.maps, strict=True):
-        assert one.curves.keys() == other.curves.keys()
+        assert one.deviations.keys() == other.deviations.keys()
         assert other.errors == pytest.approx(one.errors, rel=1e-9)
 
 

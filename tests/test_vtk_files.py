@@ -264,7 +264,7 @@ def test_files_elsewhere_are_not_read(name: str, form: str, tmp_path: Path) -> N
         file = folder / "body.pvtu"
         piece = f'<Piece Source="{name}"/>'
         file.write_text(f'<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid>{piece}</PUnstructuredGrid></VTKFile>')
-    with pytest.raises(ReferenceFileError, match=r"body\.pvt?[du].* names '.*(own folder or below|that end in)"):
+    with pytest.raises(ReferenceFileError, match=r"body\.pvt?[du].* names '.*(same folder or below|that end in)"):
         read_record(file)
 
 

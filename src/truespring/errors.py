@@ -1,11 +1,11 @@
-"""The one family of errors that truespring raises on purpose."""
+"""Exceptions of truespring, and helpers for their messages."""
 
 import difflib
 from collections.abc import Iterable
 
 
 class TruespringError(Exception):
-    """The input is wrong; the message names the value, where it stands and the way out."""
+    """Base class: the input is wrong; the message names the value, its place and a remedy."""
 
 
 class StudyError(TruespringError):
@@ -17,15 +17,15 @@ class MeshError(TruespringError):
 
 
 class ProblemError(TruespringError):
-    """What is asked cannot be solved as it stands: supports, loads, material or section."""
+    """A problem cannot be solved as stated: supports, loads, material or section."""
 
 
 class NoLoadError(ProblemError):
-    """Nothing loads the body."""
+    """A problem has no load."""
 
 
 class LoadError(ProblemError):
-    """A load does not fit the body: its place among the loads, and why."""
+    """A load does not fit the body; `number` is its index among the loads."""
 
     def __init__(self, number: int, text: str) -> None:
         super().__init__(f"loads[{number}]: {text}")
@@ -33,37 +33,37 @@ class LoadError(ProblemError):
 
 
 class ModelError(TruespringError):
-    """A model cannot be built for this problem: an unknown rule or law, or one that does not fit."""
+    """A model cannot be built for a problem: its rule or law is unknown or does not fit."""
 
 
 class ReferenceFileError(TruespringError):
-    """A result of another program cannot be read."""
+    """A result file of another program cannot be read."""
 
 
 class ExportError(TruespringError):
-    """A target cannot express what is to be exported."""
+    """A target of export cannot represent the model or its loads."""
 
 
 def nearest(word: str, allowed: Iterable[str]) -> str:
-    """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, else nothing."""
+    """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, empty if none is near."""
     close = close_words(word, allowed)
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
 def close_words(word: str, allowed: Iterable[str]) -> list[str]:
-    """Return the allowed word nearest to `word` in a list of one, an empty list where none is near."""
+    """Return a list of the allowed word nearest to `word`, empty if none is near."""
     return difflib.get_close_matches(word, list(allowed), n=1, cutoff=0.5)
 
 
 def shown(value: object, most: int = 80) -> str:
-    """Return a value as Python writes it, for a message: cut in the middle where it is longer than `most`."""
-    if isinstance(value, int) and abs(value) >= 10**most:  # Python refuses to write integers of thousands of digits
+    """Return the `repr` of a value for a message, shortened in the middle to about `most` characters."""
+    if isinstance(value, int) and abs(value) >= 10**most:  # Python does not convert integers of thousands of digits
         return f"an integer of more than {most} digits"
     return _cut(repr(value), most)
 
 
 def one_line(text: str, most: int = 1000) -> str:
-    """Return a message as one line: what does not print is escaped, and it is cut in the middle beyond `most`."""
+    """Return a message as one line: escape unprintable characters, shorten it in the middle to about `most`."""
     printed = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
     return _cut(printed, most)
 

@@ -4,7 +4,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple
 
 from truespring.errors import ProblemError
 
@@ -57,9 +58,22 @@ class Material:
 
 @dataclass(frozen=True, slots=True)
 class Section(ABC):
-    """How a body carries the direction that its mesh does not have; `thickness` [m], 1 for a solid."""
+    """How a body carries the direction that its mesh does not have; `thickness` [m], 1 for a solid.
+
+    Attributes:
+        key: its kind in `[section]`, empty for a body in space.
+        dim: number of dimensions of the bodies that it is for.
+        free_thickness: whether the thickness changes freely, so that there is no stress across the plane.
+        moduli_words: how its apparent moduli follow from the material's, empty where they are the same.
+        elements: the letters before the number of nodes in the names of its elements in CalculiX and Abaqus.
+    """
 
     thickness: float
+    key: ClassVar[str] = ""
+    dim: ClassVar[int] = 2
+    free_thickness: ClassVar[bool] = False
+    moduli_words: ClassVar[str] = ""
+    elements: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.thickness) and self.thickness > 0):
@@ -73,17 +87,31 @@ class Section(ABC):
         """Return the Lamé constants of Hooke's law within the mesh's directions [Pa]."""
         return material.lame
 
+    @property
+    def words(self) -> str:
+        """The section in a sentence: "plane stress"; empty for a body in space."""
+        return self.key.replace("-", " ")
+
+    @property
+    def within(self) -> str:
+        """The words " in plane strain" where the apparent moduli are not the material's, else "", to follow a noun."""
+        return f" in {self.words}" if self.moduli_words else ""
+
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Section):
     """A thin body, free to change its thickness."""
 
+    key: ClassVar[str] = "plane-stress"
+    free_thickness: ClassVar[bool] = True
+    elements: ClassVar[str] = "CPS"
+
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Those of the material itself."""
+        """Return those of the material itself."""
         return material.young, material.poisson
 
     def lame_within(self, material: Material) -> Lame:
-        """2 lam mu / (lam + 2 mu) and mu."""
+        """Return 2 lam mu / (lam + 2 mu) and mu."""
         lam, mu = material.lame
         return Lame(2 * lam * mu / (lam + 2 * mu), mu)
 
@@ -92,17 +120,27 @@ class PlaneStress(Section):
 class PlaneStrain(Section):
     """A slice of a long body, held at its thickness."""
 
+    key: ClassVar[str] = "plane-strain"
+    moduli_words: ClassVar[str] = "E / (1 - nu^2) and nu / (1 - nu)"
+    elements: ClassVar[str] = "CPE"
+
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """E / (1 - nu^2) and nu / (1 - nu)."""
+        """Return E / (1 - nu^2) and nu / (1 - nu)."""
         return material.young / (1 - material.poisson**2), material.poisson / (1 - material.poisson)
 
 
 @dataclass(frozen=True, slots=True)
 class Solid(Section):
-    """A body in three dimensions, which needs no section: what a Problem in 3D has by itself."""
+    """A body in three dimensions: the section that a Problem in 3D has by default."""
 
     thickness: float = 1.0
+    dim: ClassVar[int] = 3
+    elements: ClassVar[str] = "C3D"
 
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Those of the material itself."""
+        """Return those of the material itself."""
         return material.young, material.poisson
+
+
+#: The sections of plane bodies by their kind in `[section]`.
+SECTIONS: Mapping[str, type[Section]] = MappingProxyType({one.key: one for one in (PlaneStress, PlaneStrain)})

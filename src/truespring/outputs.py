@@ -1,4 +1,4 @@
-"""Output folders: each is whole or plainly unfinished, and never holds two runs of one command."""
+"""Output folders: each is complete or clearly unfinished, and holds one run of a command."""
 
 import json
 import os
@@ -10,26 +10,26 @@ from types import TracebackType
 
 from truespring.errors import TruespringError
 
-#: The folder, within the one for the results, that they are written to until all are there.
+#: Subfolder of the output folder for the results of a run that has not ended.
 UNFINISHED = "truespring-unfinished"
 
-# Within the folder for the results: which files the last run of each command left, by the name of its summary.
+# File in the output folder that lists the files of the last run of each command, by the name of its summary.
 _LISTED = ".truespring.json"
 
 
 class Output:
-    """The results of one run on their way into `folder`.
+    """Write the results of one run to `folder`, all or none.
 
-    They are written to `staging`, the folder UNFINISHED within it. `publish` moves them into their places and removes
-    what the former run of the same command left; files of others stay. The `summary` goes first and comes last:
-    where it stands, all that it tells of stands beside it. A run that is killed leaves the results of the former one,
-    or no summary; a file that cannot be moved leaves those of the former run as they were.
+    Write the files to `staging`, the subfolder UNFINISHED; `publish` moves them to `folder` and removes the files of
+    the previous run of the same command. Other files are kept. The `summary` is removed first and moved last: a folder
+    with a summary has all files of that run. If a run is killed, the results of the previous run remain, or the
+    summary is missing; if a file cannot be moved, the results of the previous run remain unchanged.
 
-    Raises TruespringError where another run writes into the folder now, OSError where nothing can be written.
+    Raises TruespringError if another run is writing to the folder, OSError if the folder cannot be written.
     """
 
     def __init__(self, folder: Path, summary: str) -> None:
-        """Make the folder where there is none, and keep other runs out of it until `close`."""
+        """Create the folder if it does not exist, and lock it until `close`."""
         self.folder, self.summary = folder, summary
         self.staging = folder / UNFINISHED
         self._lock = Lock(self.staging)
@@ -50,17 +50,17 @@ class Output:
         self.close()
 
     def close(self) -> None:
-        """Let other runs in; what was written and not published stays in `staging`."""
+        """Unlock the folder; files that were not published stay in `staging`."""
         with suppress(OSError):
-            self.staging.rmdir()  # where it is empty
+            self.staging.rmdir()  # fails if not empty
         self._lock.release()
 
     def publish(self) -> None:
-        """Move what was written into its place."""
+        """Move the files from `staging` to the output folder."""
         new = [file.relative_to(self.staging) for file in sorted(self.staging.rglob("*")) if not file.is_dir()]
         listed = self._listed()
         former = [Path(name) for name in listed.get(self.summary, ())]
-        # Whatever happens from here on, the next run knows what to remove.
+        # If this run is killed from here on, the next run can still remove its files.
         self._list({**listed, self.summary: sorted({one.as_posix() for one in (*former, *new)})})
         with _Moves() as moves:
             for file in sorted({*former, *new}, key=lambda file: file.name != self.summary):
@@ -75,7 +75,7 @@ class Output:
         _empty(self.staging)
 
     def _listed(self) -> dict[str, list[str]]:
-        """The files of the last run of each command; none where the list is damaged or names others."""
+        """Return the files of the last run of each command; empty if the list is damaged or has paths outside."""
         try:
             listed = json.loads((self.folder / _LISTED).read_text(encoding="utf-8"))
             return {
@@ -90,9 +90,9 @@ class Output:
 
 
 class Lock:
-    """Keeps other runs out of a folder, which is made, until it is released or the process ends, however it ends.
+    """Create and lock a folder until `release` or the end of the process.
 
-    Raises TruespringError where another run is in it. Where the system has no such locks nobody is kept out.
+    Raises TruespringError if another run has locked it. Does nothing on systems without such locks.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -104,7 +104,7 @@ class Lock:
             descriptor = _locked(folder)
             if descriptor is None:
                 return
-            try:  # the run that was in it may have removed it meanwhile
+            try:  # the previous run may have removed the folder meanwhile
                 if os.path.samestat(os.fstat(descriptor), folder.stat()):
                     self._descriptor = descriptor
                     return
@@ -123,7 +123,7 @@ class Lock:
         self.release()
 
     def release(self) -> None:
-        """Let others in; folders that it made and that are empty go."""
+        """Release the lock, and remove the folders that it created if they are empty."""
         for folder in self._made:
             with suppress(OSError):
                 folder.rmdir()
@@ -133,7 +133,7 @@ class Lock:
 
 
 def _locked(folder: Path) -> int | None:
-    """A descriptor that holds the lock of a folder; None where the file system has no locks."""
+    """Return a descriptor that holds the lock of a folder; None if the file system has no locks."""
     import fcntl
 
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -142,7 +142,7 @@ def _locked(folder: Path) -> int | None:
     except BlockingIOError:
         os.close(descriptor)
         raise TruespringError(
-            f"{folder}: another run writes here now: wait until it has ended, or give another --out"
+            f"{folder}: another run is writing to this folder: wait until it ends, or choose another --out"
         ) from None
     except OSError:
         os.close(descriptor)
@@ -151,7 +151,7 @@ def _locked(folder: Path) -> int | None:
 
 
 class _Moves:
-    """Moves of files that are all taken back where one of them fails."""
+    """Move files, and move all of them back if one fails."""
 
     def __init__(self) -> None:
         self._done: list[tuple[Path, Path]] = []
@@ -160,7 +160,7 @@ class _Moves:
         return self
 
     def move(self, file: Path, to: Path) -> None:
-        """Move a file, if it is there, to where none is."""
+        """Move a file, if it exists, to a path that does not exist."""
         if not file.is_symlink() and not file.exists():
             return
         to.parent.mkdir(parents=True, exist_ok=True)
@@ -179,7 +179,7 @@ class _Moves:
 
 
 def write_whole(file: Path, content: bytes) -> None:
-    """Write a file whole: under another name in its folder, down to the disk, then renamed."""
+    """Write a file atomically: write a temporary file in the same folder, flush it to disk, rename it."""
     beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
         with beside.open("wb") as stream:
@@ -191,7 +191,7 @@ def write_whole(file: Path, content: bytes) -> None:
         with suppress(OSError):
             beside.unlink(missing_ok=True)
         raise
-    if hasattr(os, "O_DIRECTORY"):  # the name, too, is to outlive the machine
+    if hasattr(os, "O_DIRECTORY"):  # flush the new name to disk as well
         folder = os.open(file.parent, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(folder)
@@ -212,7 +212,7 @@ def _empty(folder: Path) -> None:
 
 
 def _remove_empty(folder: Path, former: list[Path]) -> None:
-    """Remove the folders of former files that have none any more."""
+    """Remove the folders of former files that are empty now."""
     for parent in sorted({parent for file in former for parent in file.parents if parent.parts}, reverse=True):
         with suppress(OSError):
             (folder / parent).rmdir()

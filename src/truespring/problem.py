@@ -1,38 +1,22 @@
 """The problem: what is asked, stated once and frozen. Mesh, material, section, supports, loads."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, TypeVar
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
-from truespring.loading import (
-    Body,
-    DeadLoad,
-    Fixed,
-    FollowingLoad,
-    Force,
-    Gravity,
-    Held,
-    Moment,
-    Pressure,
-    Spread,
-    Traction,
-    held_by,
-    nodal_force,
-)
+from truespring.loading import LOADS, Body, Fixed, Held, Load, Spread, held_by, nodal_force
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
 from truespring.potential import Loading, Potential
 
-#: A load: dead, or following the body.
-Load = Force | Traction | Gravity | Pressure | Moment
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True)
@@ -67,14 +51,14 @@ class Problem:
     stated: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "regions", _several(self.regions, Region, "regions"))
-        object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports"))
-        object.__setattr__(self, "loads", _several(self.loads, Load, "loads"))
+        object.__setattr__(self, "regions", _several(self.regions, Region, "regions", "Region"))
+        object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports", "Fixed"))
+        object.__setattr__(self, "loads", _several(self.loads, Load, "loads", _LOADS))
         if self.material is not None and self.mesh.element_dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
         if self.mesh.element_dim == 3 and self.section is None:
             object.__setattr__(self, "section", Solid())
-        if isinstance(self.section, Solid) != (self.mesh.element_dim == 3) and self.section is not None:
+        if self.section is not None and (self.section.dim == 3) != (self.mesh.element_dim == 3):
             raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.kinds} elements")
         if self.regions and self.material is None:
             raise ProblemError("regions of another material need a material for the rest")
@@ -174,27 +158,31 @@ class Problem:
 
     def spreads(self, body: Body) -> tuple[Spread, ...]:
         """Return the dead loads over the cells of `body` that carry them; it may have more nodes than the mesh."""
-        found = []
-        for number, load in enumerate(self.loads):
-            if isinstance(load, DeadLoad):
-                with _named(number):
-                    found.append(load.spread(body))
-        return tuple(found)
+        return tuple(self._of_each_load(lambda load: load.spread(body)))
 
     def following(self, body: Body, held: Bools) -> tuple[Potential, ...]:
         """Return the loads that follow `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
-        found: list[Potential] = []
+        return tuple(self._of_each_load(lambda load: load.following(body, held)))
+
+    def _of_each_load(self, ask: Callable[[Load], _Found | None]) -> Iterator[_Found]:
+        """Yield what each load answers, if anything; an error names the load."""
         for number, load in enumerate(self.loads):
-            if isinstance(load, FollowingLoad):
-                with _named(number):
-                    found.append(load.following(body, held))
-        return tuple(found)
+            try:
+                found = ask(load)
+            except TruespringError as error:
+                raise LoadError(number, str(error)) from None
+            if found is not None:
+                yield found
 
     @property
     def rims(self) -> Ints:
-        """The edges around the surfaces that a pressure acts on, by their ends, shape (n, 2)."""
-        none = np.zeros((0, 2), dtype=np.int64)
-        return np.concatenate([none, *(load.rim(self.mesh) for load in self.loads if isinstance(load, FollowingLoad))])
+        """The edges that loads in space need held around their surfaces, by their ends, shape (n, 2)."""
+        return np.concatenate([np.zeros((0, 2), dtype=np.int64), *(load.rim(self.mesh) for load in self.loads)])
+
+    def scaled(self, factor: float) -> "Problem":
+        """Return the problem with every load and every prescribed motion times a factor."""
+        loads = [load.scaled(factor) for load in self.loads]
+        return replace(self, loads=loads, supports=[support.scaled(factor) for support in self.supports])
 
     def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
         clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))
@@ -224,15 +212,6 @@ class Problem:
             raise ProblemError(
                 f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
             )
-
-
-@contextmanager
-def _named(number: int) -> Iterator[None]:
-    """Tell which load does not fit."""
-    try:
-        yield
-    except TruespringError as error:
-        raise LoadError(number, str(error)) from None
 
 
 def sample(problem: Problem, elements: Ints) -> Problem:
@@ -281,16 +260,15 @@ def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
     return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
 
-def _several(given: object, kind: Any, name: str) -> tuple[Any, ...]:
-    """Return one or several of a kind as a tuple."""
+def _several(given: object, kind: type, name: str, allowed: str) -> tuple[Any, ...]:
+    """Return one or several of a kind as a tuple; raise ProblemError for anything else."""
     several = (given,) if isinstance(given, kind) else given
     if not isinstance(several, Sequence) or not all(isinstance(one, kind) for one in several):
-        raise ProblemError(f"{name} = {given!r}: a list of {_name(kind)} is wanted")
+        raise ProblemError(f"{name} = {given!r}: must be a list of {allowed}")
     return tuple(several)
 
 
-def _name(kind: Any) -> str:
-    return " or ".join(one.__name__ for one in get_args(kind)) or str(kind.__name__)
+_LOADS = " or ".join(kind.load.__name__ for kind in LOADS.values())
 
 
 def _n_modes(nodes: Floats) -> int:

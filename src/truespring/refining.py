@@ -237,7 +237,7 @@ def coarser_problem(problem: Problem) -> Problem:
     elements or facets, node numbers or regions.
     """
     mesh, counts = problem.mesh, cell_counts(problem.mesh)
-    chosen = [getattr(one, "on", None) for one in (*problem.supports, *problem.loads)]
+    chosen = [one.on for one in problem.supports] + [one.on for one in problem.loads]
     plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
     if counts is None or any(count % 2 for count in counts) or not plain or mesh.element_groups or mesh.facet_groups:
         raise MeshError("there is no mesh of twice the size")
@@ -261,11 +261,10 @@ def _by_groups(problem: Problem) -> Problem:
     def named(ones: Sequence[Any]) -> list[Any]:
         found = []
         for one in ones:
-            on = getattr(one, "on", None)
-            if on is not None and not isinstance(on, str | Plane | Box | Near):
+            if one.on is not None and not isinstance(one.on, str | Plane | Box | Near):
                 name = f"nodes {len(nodes) + 1}"
-                nodes[name] = np.unique(np.asarray(on))
-                one = replace(one, on=name)
+                nodes[name] = np.unique(np.asarray(one.on))
+                one = one.moved_to(name)
             found.append(one)
         return found
 

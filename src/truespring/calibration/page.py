@@ -7,7 +7,7 @@ import numpy as np
 
 from truespring.calibration.calibration import Calibration, CaseResult
 from truespring.calibration.figures import calibration_figures
-from truespring.report.figures import Drawing
+from truespring.report.drawing import Drawing
 from truespring.report.quantity import percent
 from truespring.report.shell import picture, render
 from truespring.report.style import figure_style

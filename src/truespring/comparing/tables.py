@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def difference_tables(result: Result) -> "Iterator[Table | str]":
-    """Yield how far two results are apart at the last load level that both have, and what should be known of them."""
+    """Yield the verdict on two results, their differences at the last common load level, and warnings."""
     (one,) = result.comparisons.values()
     values = difference(result)
     table = new_table(result.title, "", "")
@@ -23,11 +23,11 @@ def difference_tables(result: Result) -> "Iterator[Table | str]":
             table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")
     table.add_row("compared", "node by node" if one.node_by_node else "at nodes of one, carried from the other")
     table.add_row("nodes", f"{len(one.outside):,}, {one.n_outside:,} outside")
+    yield verdict(result)
     yield table
     supports = support_table(result)
     if supports is not None:
         yield supports
-    yield verdict(result)
     for warning in values["warnings"]:
         yield f"warning: {warning}"
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truespring.converging.settling import Refinement, Settling
-from truespring.report.figures import Drawing
+from truespring.report.drawing import Drawing
 from truespring.report.plots import Curve, plot
 from truespring.report.shell import picture, render
 from truespring.report.style import SPRING_STYLES, figure_style

@@ -13,13 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Bools, Floats, Ints
+from truespring.arrays import Floats, Ints
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
-from truespring.loading import Gravity, Moment, Pressure, nodal_force
-from truespring.loading.following import FaceMoment
-from truespring.material import PlaneStrain
-from truespring.mesh import outer_facets, plural
+from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
+from truespring.mesh import Mesh, plural
 from truespring.mesh.facets import facet_keys
 from truespring.mesh.files.inp_elements import FACES
 from truespring.models import Fem, SpringNetwork
@@ -196,14 +194,17 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
     """
     check_fem(problem, law, element)
     nodes, blocks = problem.mesh.nodes, _blocks(problem)
-    own = list(_own_loads(problem, force_unit))
-    loading = replace(problem.loading, external_force=_spread_by_us(problem), following=())
     finer = second_order(problem, element)
-    if finer is not None:
+    own: list[Load] = []
+    on_nodes: list[Load] = []
+    for load in problem.loads:
+        by_program = load.cards(problem.mesh) and (finer is None or load.follows)
+        (own if by_program else on_nodes).append(load)
+    if finer is None:
+        loading = _on_nodes(problem.loading, on_nodes, problem.body, nodes)
+    else:
         nodes, blocks = finer.nodes, [(fem_element(problem, element), np.arange(len(finer.elements)), finer.elements)]
-        at_rest = [one for one in finer.loading.following if isinstance(one, FaceMoment)]
-        loading = replace(replace(finer.loading, following=tuple(at_rest)).at_rest(nodes), following=())
-        own = [one for one in own if one.type != "GRAV"]  # which is among our forces
+        loading = _on_nodes(finer.loading, on_nodes, finer.body, nodes)
     bricks = any(kind in _AS_BRICKS for kind in problem.mesh.element_kinds)
     lines = [_BRICKS_EXPLAINED] if bricks else []
     for kind, numbers, elements in blocks:
@@ -212,7 +213,7 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
         lines += map(joined, rows.tolist())
     for number in range(len(problem.materials)):
         lines += _material(problem, number, force_unit)
-    return Twin(nodes, lines, loading, own)
+    return Twin(nodes, lines, loading, [line for load in own for line in _dload(problem.mesh, load, force_unit)])
 
 
 def usual_element(problem: Problem) -> str:
@@ -230,11 +231,12 @@ def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
     """Raise ExportError where a problem has no continuum, a load that none can have, or no such elements."""
     if problem.material is None or problem.section is None:
         raise ExportError("a plain network of springs has no continuum: give its mesh elements and a material")
-    if law != "linear" and any(isinstance(load, Moment) for load in problem.loads):
-        raise ExportError(
-            "a moment that turns with a face has no keyword: prescribe the rotation of the face instead (a support "
-            "with rotation), or take the linear law, where it is forces on nodes"
-        )
+    for load in problem.loads:
+        if law != "linear" and load.follows and not load.cards(problem.mesh):
+            raise ExportError(
+                f"{load.words()} follows the body, and no keyword has it: use {load.instead} instead, or the linear "
+                "law, where it is forces on nodes"
+            )
     if element not in ELEMENTS or (element == "quadratic" and problem.mesh.element not in _SECOND_ORDER):
         raise ExportError(
             f"element = '{element}' cannot be written for a mesh of {problem.mesh.element} elements: \"linear\" is for "
@@ -251,7 +253,7 @@ def fem_element(problem: Problem, element: str = "linear") -> str:
 
 
 def _plane(problem: Problem) -> str:
-    return "CPE" if isinstance(problem.section, PlaneStrain) else "CPS"
+    return "" if problem.section is None else problem.section.elements
 
 
 def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
@@ -281,23 +283,29 @@ def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]
         yield real(problem.section.thickness)
 
 
-def _own_loads(problem: Problem, force_unit: float) -> Iterator[OwnLoad]:
-    """Pressure on faces, which follows them where the deck is nonlinear, and gravity."""
-    mesh = problem.mesh
-    for load in problem.loads:
-        if isinstance(load, Gravity):
-            size = float(np.linalg.norm(load.acceleration))
-            direction = [*(np.array(load.acceleration) / (size or 1.0)), 0.0][:3]
-            yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
-        elif isinstance(load, Pressure):
-            pressed = _face_keys(outer_facets(mesh, load.on))
-            for numbers, part in mesh.blocks:
-                bricks = part.element in _AS_BRICKS
-                nodes = part.elements[:, part.kind.merged] if bricks else part.elements
-                for face, local in enumerate(FACES["hexahedron" if bricks else part.element], 1):
-                    theirs = _face_keys(nodes[:, local])
-                    for number in numbers[_rows_in(theirs, pressed)].tolist():
-                        yield OwnLoad(str(number + 1), f"P{face}", load.pressure / force_unit)
+def _dload(mesh: Mesh, load: Load, force_unit: float) -> Iterator[OwnLoad]:
+    """Yield the *DLOAD of a load: weight, or pressure on faces, which follows them in nonlinear decks."""
+    for card in load.cards(mesh):
+        match card:
+            case BodyForce(acceleration):
+                size = float(np.linalg.norm(acceleration))
+                direction = [*(acceleration / (size or 1.0)), 0.0][:3]
+                yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
+            case FacePressure(facets, pressure):
+                for number, face, pressed in _faces(mesh, facets):
+                    yield OwnLoad(str(number + 1), f"P{face}", float(pressure[pressed]) / force_unit)
+
+
+def _faces(mesh: Mesh, facets: Ints) -> Iterator[tuple[int, int, int]]:
+    """Yield the element, the number of its face from 1, and the facet that this is, for all that are `facets`."""
+    keys = _face_keys(facets)
+    for numbers, part in mesh.blocks:
+        bricks = part.element in _AS_BRICKS
+        nodes = part.elements[:, part.kind.merged] if bricks else part.elements
+        for face, local in enumerate(FACES["hexahedron" if bricks else part.element], 1):
+            places = _places(_face_keys(nodes[:, local]), keys)
+            for element in np.flatnonzero(places >= 0).tolist():
+                yield int(numbers[element]), face, int(places[element])
 
 
 def _face_keys(faces: Ints) -> Ints:
@@ -306,19 +314,23 @@ def _face_keys(faces: Ints) -> Ints:
     return np.stack(facet_keys(padded.T), axis=1)
 
 
-def _rows_in(rows: Ints, others: Ints) -> Bools:
-    """Which rows of numbers are among the others."""
+def _places(rows: Ints, others: Ints) -> Ints:
+    """Return the place of each row of numbers among the others, -1 where it is not there, shape (n_rows,)."""
     both = np.unique(np.concatenate([others, rows]), axis=0, return_inverse=True)[1].ravel()
-    return np.isin(both[len(others) :], both[: len(others)])
+    place = np.full(len(both), -1)
+    place[both[: len(others)]] = np.arange(len(others))
+    return np.asarray(place[both[len(others) :]])
 
 
-def _spread_by_us(problem: Problem) -> Floats:
-    """Forces on nodes [N]: the dead loads without gravity and, in a linear theory, moments as they are at rest."""
-    loading, shape = problem.loading, problem.mesh.nodes.shape
-    weight = nodal_force((load.spread(problem.body) for load in problem.loads if isinstance(load, Gravity)), shape)
-    dead = replace(loading, external_force=loading.external_force - weight)
-    moments = [load.following(problem.body, loading.held) for load in problem.loads if isinstance(load, Moment)]
-    return replace(dead, following=tuple(moments)).force(problem.mesh.nodes)
+def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats) -> Loading:
+    """Return supports with loads as forces on nodes: those that follow the body act as on the undeformed one."""
+    spreads = [load.spread(body) for load in loads]
+    potentials = [load.following(body, loading.held) for load in loads]
+    return replace(
+        loading,
+        external_force=nodal_force((one for one in spreads if one is not None), nodes.shape),
+        following=tuple(one for one in potentials if one is not None),
+    ).at_rest(nodes)
 
 
 # --- springs -------------------------------------------------------------------------------------
@@ -390,14 +402,10 @@ def check_springs(problem: Problem, network: SpringNetwork) -> None:
             "other targets take them: mujoco, sofa, npz, json"
         )
     for load in problem.loads:
-        if isinstance(load, Pressure | Moment):
-            what, instead = (
-                ("pressure", "a traction, which is dead,")
-                if isinstance(load, Pressure)
-                else ("moment", "the rotation of a support")
-            )
+        if load.follows:
             raise ExportError(
-                f"a {what} follows a face, and SPRINGA elements have none: take {instead} or finite elements instead"
+                f"{load.words()} follows a face, and SPRINGA elements have none: use {load.instead}, or finite "
+                "elements instead"
             )
 
 

@@ -1,6 +1,6 @@
 """What every target is given: the problem, the springs, and the equilibrium that the receiver should find."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -10,13 +10,11 @@ import numpy as np
 from truespring.arrays import Bools, Floats
 from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
-from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
-from truespring.material import PlaneStrain, PlaneStress
-from truespring.mesh import Box, Near, Plane, Selection
-from truespring.mesh.selections import AXES
+from truespring.loading import vector_words
+from truespring.mesh import counted
 from truespring.models import Model, SpringNetwork, VolumeSprings
 from truespring.potential import Potential
-from truespring.problem import Load, Problem
+from truespring.problem import Problem
 from truespring.solvers import Newton, Reporter, Solver, as_solver
 
 
@@ -122,8 +120,8 @@ class Exported:
     @property
     def told_of_springs(self) -> tuple[str, ...]:
         """How springs bear weight, what to expect of them, and what is to be known, a sentence a line."""
-        heavy = any(isinstance(load, Gravity) for load in self.problem.loads)
-        weight = ["Gravity acts as forces on nodes."] if heavy else []
+        everywhere = [load.words() for load in self.problem.loads if load.on is None]
+        weight = [f"{words[:1].upper()}{words[1:]} acts as forces on nodes." for words in everywhere]
         return printable([*weight, *self.expected, *self.notes])
 
     def _asked(self) -> Iterator[str]:
@@ -131,30 +129,25 @@ class Exported:
         yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}."
         yield from self._body()
         for number, (support, held) in enumerate(zip(self.problem.supports, self.problem.held, strict=True), 1):
-            yield f"Support {number}: {_support(support, held.directions)} ({_counted(len(held.nodes), 'node')})."
+            yield f"Support {number}: {support.words(mesh.dim)} ({counted(len(held.nodes), 'node')})."
         for number, load in enumerate(self.problem.loads, 1):
-            yield f"Load {number}: {_load(load)}."
+            yield f"Load {number}: {load.words()}."
 
     def _body(self) -> Iterator[str]:
         for number, material in enumerate(self.problem.materials):
             count = int((self.problem.material_numbers == number).sum())
-            of = f" of {_counted(count, 'element')}" if self.problem.regions else ""
+            of = f" of {counted(count, 'element')}" if self.problem.regions else ""
             density = "density not given" if material.density is None else f"density {material.density:g} kg/m^3"
             yield (
                 f"Material{of}: Young's modulus {material.young:g} Pa, Poisson's ratio {material.poisson:g}, {density}."
             )
-        if isinstance(self.problem.section, PlaneStress | PlaneStrain):
+        if self.problem.section is not None and self.problem.section.key:
             yield f"Section: {self.section}, thickness {self.problem.section.thickness:g} m."
 
     @property
     def section(self) -> str:
         """How the body carries the direction that its mesh does not have: "plane stress", "plane strain", or ""."""
-        match self.problem.section:
-            case PlaneStress():
-                return "plane stress"
-            case PlaneStrain():
-                return "plane strain"
-        return ""
+        return "" if self.problem.section is None else self.problem.section.words
 
     @property
     def expected(self) -> tuple[str, ...]:
@@ -171,8 +164,8 @@ class Exported:
             moved = self.state.displacement
             yield (
                 f"Expected at full load: node {self.probe}, counted from 0, at rest at "
-                f"{_vector(self.problem.mesh.nodes[self.probe], 9)} m, has moved by "
-                f"{_vector(moved[self.probe], 9)} m; the largest displacement is "
+                f"{vector_words(self.problem.mesh.nodes[self.probe], 9)} m, has moved by "
+                f"{vector_words(moved[self.probe], 9)} m; the largest displacement is "
                 f"{np.linalg.norm(moved, axis=1).max():.9g} m."
             )
             if self.path.status is not Status.CONVERGED:
@@ -230,53 +223,7 @@ def solve_springs(
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
-def _support(support: Fixed, directions: Sequence[int]) -> str:
-    axes = ", ".join(AXES[axis] for axis in directions)
-    words = f"{_where(support.on)} held along {axes}"
-    if support.displacement is not None:
-        words += f", moved by {_vector(support.displacement)} m"
-    if support.rotation:
-        words += f", turned by {support.rotation:g} rad"
-    return words
-
-
 def printable(sentences: Iterable[str]) -> tuple[str, ...]:
     """Return sentences of a line each: whatever a title holds, it does not end the comment that it stands in."""
     signs = ("".join(sign if sign.isprintable() else " " for sign in sentence) for sentence in sentences)
     return tuple(" ".join(sentence.split()) for sentence in signs)
-
-
-def _load(load: Load) -> str:
-    match load:
-        case Force(on, total):
-            return f"force {_vector(total)} N in total on {_where(on)}"
-        case Traction(on, traction):
-            return f"traction {_vector(traction)} Pa on {_where(on)}"
-        case Gravity(acceleration):
-            return f"gravity {_vector(acceleration)} m/s^2"
-        case Pressure(on, pressure):
-            return f"pressure {pressure:g} Pa on {_where(on)}"
-        case Moment(on, moment):
-            return f"moment {moment:g} N m on {_where(on)}"
-
-
-def _where(on: Selection) -> str:
-    match on:
-        case str():
-            return f"'{on}'"
-        case Plane(axis, value):
-            return f"the nodes at {axis} = {value:g} m"
-        case Box(lower, upper):
-            return f"the nodes from {_vector(lower)} to {_vector(upper)} m"
-        case Near(point):
-            return f"the node nearest to {_vector(point)} m"
-        case _:
-            return _counted(len(on), "chosen node")
-
-
-def _vector(values: Sequence[float] | Floats, digits: int = 6) -> str:
-    return f"({', '.join(f'{value:.{digits}g}' for value in values)})"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"

@@ -1,99 +1,31 @@
-"""Dead loads: forces that keep their direction, shared consistently with the elements over what they act on."""
+"""Dead loads: forces that keep their direction, integrated with the shape functions of the elements that carry them."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError
-from truespring.loading.values import components
+from truespring.loading.body import Body, Spread
+from truespring.loading.load import BodyForce, DeadLoad, Mark
+from truespring.loading.values import components, rotated, times
+from truespring.loading.words import selection_words, vector_words
 from truespring.mesh import (
     Mesh,
-    SecondOrder,
     Selection,
     corner_measures,
     covering,
     element_corner_measures,
     facets_within,
+    loaded,
     select,
-    shares,
 )
 
 
-class Body(NamedTuple):
-    """What loads act on: `thickness` [m] is 1 in space, `density` [kg/m^3] of each element None where not known.
-
-    `second_order` is None where elements have no nodes but those of the mesh.
-    """
-
-    mesh: Mesh
-    thickness: float
-    density: Floats | None
-    second_order: SecondOrder | None = None
-
-    @property
-    def nodes(self) -> Floats:
-        """Positions of all nodes at rest [m], shape (n_nodes, dim)."""
-        return self.mesh.nodes if self.second_order is None else self.second_order.nodes
-
-    def whole(self, cells: Ints) -> Ints:
-        """Return all nodes of cells that are given by their corners."""
-        return cells if self.second_order is None else self.second_order.of(cells)
-
-    def carrying(self, cells: Ints, measures: Floats) -> tuple[Ints, Floats]:
-        """Return cells and each corner's part of their measures [m^k], both as all nodes of the cells have them."""
-        if self.second_order is None:
-            return cells, measures
-        whole = self.second_order.of(cells)
-        return whole, self.second_order.shares(whole)
-
-    def shares(self, on: Selection) -> tuple[Ints, Floats]:
-        """Return the nodes that a load acts on, ascending, and the share of a uniform total that each takes."""
-        covered = covering(self.mesh, on)
-        if self.second_order is None or covered is None:
-            return shares(self.mesh, on)
-        cells, measures = self.carrying(*covered)
-        weight = np.zeros(len(self.nodes))
-        np.add.at(weight, cells, measures)
-        carrying = np.unique(cells)
-        return carrying, weight[carrying] / weight[carrying].sum()
-
-
-class Spread(NamedTuple):
-    """A dead load over cells of the mesh.
-
-    Attributes:
-        cells: elements, facets, edges or nodes, by all their nodes, shape (n, k).
-        measures: what each node's shape function integrates to [m^k], shape (n, k); 1 for nodes alone.
-        density: force per measure of each cell [N/m^k], shape (n, dim).
-    """
-
-    cells: Ints
-    measures: Floats
-    density: Floats
-
-
-def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
-    """Return the sum of loads on the nodes [N], of shape (n_nodes, dim)."""
-    force = np.zeros(shape)
-    for cells, measures, density in spreads:
-        np.add.at(force, cells, measures[:, :, None] * density[:, None, :])
-    return force
-
-
-@runtime_checkable
-class DeadLoad(Protocol):
-    """A load that keeps its direction."""
-
-    def spread(self, body: Body) -> Spread:
-        """Return the load over the cells of `body` that carry it."""
-        ...
-
-
 @dataclass(frozen=True)
-class Force:
+class Force(DeadLoad):
     """A dead load: the `total` force [N], one value a direction, shared consistently over what is `on`.
 
     `on` is a group of the mesh (its facets where it has some), a side ("left", "right", "bottom", "top", "back",
@@ -110,9 +42,30 @@ class Force:
         cells, measures = body.carrying(*(covering(body.mesh, self.on) or (nodes[:, None], np.ones((len(nodes), 1)))))
         return Spread(cells, measures, np.tile(total / measures.sum(), (len(cells), 1)))
 
+    def scaled(self, factor: float) -> Self:
+        """Return the load times a factor."""
+        return replace(self, total=times(self.total, factor))
+
+    def turned(self, rotation: Floats) -> Self:
+        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        return replace(self, total=rotated(self.total, rotation))
+
+    @property
+    def vector(self) -> Floats:
+        """The total force [N], shape (dim,)."""
+        return np.array(self.total, dtype=float)
+
+    def mark(self, body: Body, held: Bools) -> Mark:
+        """Return an arrow along the force."""
+        return Mark(loaded(body.mesh, self.on), self.vector, "F", float(np.linalg.norm(self.total)), "N")
+
+    def words(self) -> str:
+        """Return the total and where it acts."""
+        return f"force {vector_words(self.total)} N in total on {selection_words(self.on)}"
+
 
 @dataclass(frozen=True)
-class Traction:
+class Traction(DeadLoad):
     """A dead load: force per area at rest [Pa], one value a direction, on the facets `on`.
 
     `on` is a group of facets, which may lie inside the body, or a side, another group of the mesh, a Plane, a Box or
@@ -129,12 +82,34 @@ class Traction:
         density = np.tile(body.thickness * traction, (len(facets), 1))
         return Spread(*body.carrying(facets, corner_measures(body.mesh.nodes[facets])), density)
 
+    def scaled(self, factor: float) -> Self:
+        """Return the load times a factor."""
+        return replace(self, traction=times(self.traction, factor))
+
+    def turned(self, rotation: Floats) -> Self:
+        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        return replace(self, traction=rotated(self.traction, rotation))
+
+    @property
+    def vector(self) -> Floats:
+        """The traction [Pa], shape (dim,)."""
+        return np.array(self.traction, dtype=float)
+
+    def mark(self, body: Body, held: Bools) -> Mark:
+        """Return an arrow along the traction."""
+        return Mark(loaded(body.mesh, self.on), self.vector, "t", float(np.linalg.norm(self.traction)), "Pa")
+
+    def words(self) -> str:
+        """Return the traction and where it acts."""
+        return f"traction {vector_words(self.traction)} Pa on {selection_words(self.on)}"
+
 
 @dataclass(frozen=True)
-class Gravity:
+class Gravity(DeadLoad):
     """The weight of the whole body under an `acceleration` [m/s^2], one value a direction; needs a density."""
 
     acceleration: Sequence[float]
+    on: None = field(default=None, init=False, repr=False)
 
     def spread(self, body: Body) -> Spread:
         """Return the load over all elements."""
@@ -143,3 +118,29 @@ class Gravity:
             raise ProblemError("gravity needs the material's density [kg/m^3], and that of each region")
         elements, measures = body.carrying(body.mesh.elements, element_corner_measures(body.mesh))
         return Spread(elements, body.thickness * measures, body.density[:, None] * acceleration)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the load times a factor."""
+        return replace(self, acceleration=times(self.acceleration, factor))
+
+    def turned(self, rotation: Floats) -> Self:
+        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        return replace(self, acceleration=rotated(self.acceleration, rotation))
+
+    @property
+    def vector(self) -> Floats:
+        """The acceleration [m/s^2], shape (dim,)."""
+        return np.array(self.acceleration, dtype=float)
+
+    def mark(self, body: Body, held: Bools) -> Mark:
+        """Return an arrow along the acceleration, at the middle of the body."""
+        size = float(np.linalg.norm(self.acceleration))
+        return Mark(np.arange(body.mesh.n_nodes), self.vector, "g", size, "m/s^2")
+
+    def words(self) -> str:
+        """Return the acceleration."""
+        return f"gravity {vector_words(self.acceleration)} m/s^2"
+
+    def cards(self, mesh: Mesh) -> tuple[BodyForce]:
+        """Return the acceleration of all elements."""
+        return (BodyForce(self.vector),)

@@ -1,17 +1,22 @@
 """Supports: nodes that are held, or moved and turned as prescribed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ProblemError
-from truespring.loading.values import components, number
+from truespring.loading.load import Mark
+from truespring.loading.values import components, number, rotated, times
+from truespring.loading.words import selection_words, vector_words
 from truespring.mesh import Mesh, Selection, select
 from truespring.mesh.selections import AXES
 from truespring.potential import Turn
+
+# The share of a turn [rad] whose motion is a direction to draw.
+_SMALL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,14 +37,62 @@ class Fixed:
     about: Sequence[float] | None = None
     axis: Sequence[float] | None = None
 
+    def scaled(self, factor: float) -> Self:
+        """Return the support with its prescribed motion times a factor."""
+        moved = None if self.displacement is None else times(self.displacement, factor)
+        return replace(self, displacement=moved, rotation=factor * self.rotation)
+
+    @property
+    def vector(self) -> Floats | None:
+        """The prescribed displacement [m], shape (dim,), where all directions are held; else None."""
+        if self.displacement is None or self.fix is not None:
+            return None
+        return np.array(self.displacement, dtype=float)
+
+    def turned(self, rotation: Floats) -> Self:
+        """Return the support with `vector` turned by a rotation matrix, shape (dim, dim); itself without one."""
+        if self.displacement is None or self.vector is None:
+            return self
+        return replace(self, displacement=rotated(self.displacement, rotation))
+
+    def moved_to(self, on: Selection) -> Self:
+        """Return the support on another selection, such as a group that another mesh has too."""
+        return replace(self, on=on)
+
+    def words(self, dim: int) -> str:
+        """Return the support in words without a full stop: "'left' held along x, y"."""
+        axes = ", ".join(AXES[:dim] if self.fix is None else self.fix)
+        words = f"{selection_words(self.on)} held along {axes}"
+        if self.displacement is not None:
+            words += f", moved by {vector_words(self.displacement)} m"
+        if self.rotation:
+            words += f", turned by {self.rotation:g} rad"
+        return words
+
 
 class Held(NamedTuple):
-    """What a support holds: `nodes`, the numbers of their `directions`, the motion [m], the turn if there is one."""
+    """What a support holds on a mesh.
+
+    Attributes:
+        nodes: their numbers.
+        directions: numbers of the directions that are held.
+        motion: prescribed displacement [m], shape (dim,).
+        turn: prescribed rotation, None without one.
+    """
 
     nodes: Ints
     directions: list[int]
     motion: Floats
     turn: Turn | None
+
+    def marks(self) -> Iterator[Mark]:
+        """Yield arrows that show the prescribed displacement and the rotation, where there are any."""
+        if self.motion.any():
+            yield Mark(self.nodes, self.motion, "u", float(np.linalg.norm(self.motion)), "m")
+        if self.turn is not None:
+            small = self.turn.motion(_SMALL / abs(self.turn.angle))
+            outermost = int(np.linalg.norm(small, axis=1).argmax())
+            yield Mark(self.nodes, small[outermost], "turn", float(np.degrees(self.turn.angle)), "°")
 
 
 def held_by(mesh: Mesh, support: Fixed) -> Held:

@@ -1,4 +1,4 @@
-"""Numbers that a user gives, checked."""
+"""Numbers of loads and supports: checked, scaled and turned."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from truespring.errors import ProblemError
 
 
 def components(values: Sequence[float], dim: int, name: str, unit: str) -> Floats:
-    """Return a value a direction; raise ProblemError where they are not as many, or not finite."""
+    """Return one finite value a direction, shape (dim,); raise ProblemError for another number of them."""
     try:
         found = np.array([float(value) for value in values])
     except (TypeError, ValueError):
-        raise ProblemError(f"{name} = {values!r}: one number [{unit}] a direction is wanted") from None
+        raise ProblemError(f"{name} = {values!r}: must be one number [{unit}] a direction") from None
     if len(found) != dim:
         raise ProblemError(f"{name} = {list(values)} [{unit}] has {len(found)} values, the body has {dim} directions")
     if not np.isfinite(found).all():
@@ -23,7 +23,17 @@ def components(values: Sequence[float], dim: int, name: str, unit: str) -> Float
 
 
 def number(value: float, name: str, unit: str) -> float:
-    """Return a finite number; raise ProblemError where it is none."""
+    """Return a finite number; raise ProblemError for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
-        raise ProblemError(f"{name} = {value!r}: a finite number [{unit}] is wanted")
+        raise ProblemError(f"{name} = {value!r}: must be a finite number [{unit}]")
     return float(value)
+
+
+def times(values: Sequence[float], factor: float) -> tuple[float, ...]:
+    """Return components times a factor."""
+    return tuple(factor * one for one in values)
+
+
+def rotated(values: Sequence[float], rotation: Floats) -> tuple[float, ...]:
+    """Return components turned by a rotation matrix, shape (dim, dim)."""
+    return tuple((rotation @ np.asarray(values)).tolist())

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from truespring.material import PlaneStrain
+from truespring.models.by_rule import SpringsByRule
 from truespring.models.interpolation import locks
-from truespring.models.lattice import Lattice
 from truespring.models.moduli import Moduli, moduli
 from truespring.problem import Problem
 
@@ -15,7 +14,7 @@ from truespring.problem import Problem
 _SAME_MODULI, _SAME_BENDING = 0.01, 0.05
 
 
-def springs_warnings(problem: Problem, springs: Lattice) -> tuple[str, ...]:
+def springs_warnings(problem: Problem, springs: SpringsByRule) -> tuple[str, ...]:
     """Return what should be known of springs: moduli other than the material's, springs that lock, in sentences."""
     found: dict[str, list[str]] = {}  # each warning once, with its materials
     for twin in problem.homogeneous:
@@ -29,7 +28,7 @@ def springs_warnings(problem: Problem, springs: Lattice) -> tuple[str, ...]:
     )
 
 
-def _springs_warnings(problem: Problem, springs: Lattice, realised: Moduli) -> Iterator[str]:
+def _springs_warnings(problem: Problem, springs: SpringsByRule, realised: Moduli) -> Iterator[str]:
     yield from _moduli_warning(problem, realised)
     if not realised.stable:
         yield "these springs are not stable at rest: nodes inside the body have no positive stiffness"
@@ -89,14 +88,14 @@ def _moduli_warning(problem: Problem, realised: Moduli) -> Iterator[str]:
     for name, (young, poisson) in found.items():
         shown.setdefault(f"{young:.6g} Pa and {poisson:.4g}", name)
     said = ", ".join(f"{pair} {name}" for pair, name in shown.items())
-    explained = " (E / (1 - nu^2) and nu / (1 - nu))" if isinstance(problem.section, PlaneStrain) else ""
+    explained = f" ({problem.section.moduli_words})" if problem.section and problem.section.moduli_words else ""
     yield (
         f"these springs realise a Young's modulus and a Poisson's ratio of {said}; the material in its section "
         f"has {realised.young_wanted:.6g} Pa and {realised.poisson_wanted:.4g}{explained}"
     )
 
 
-def springs_lock(twin: Problem, springs: Lattice) -> bool:
+def springs_lock(twin: Problem, springs: SpringsByRule) -> bool:
     """Return whether springs are too stiff as linear finite elements are: coupled ones, and a term in each simplex."""
     simplices = twin.mesh.element in ("triangle", "tetrahedron")
     return locks(twin) and (springs.coupled or (springs.volume and simplices))

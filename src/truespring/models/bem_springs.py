@@ -8,7 +8,6 @@ from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ModelError, nearest
-from truespring.loading import Gravity
 from truespring.mesh import Mesh, Selection, select_elements
 from truespring.models.block import inner_nodes, make_block
 from truespring.models.frames import AtRest, Frame, Tangent, Turning
@@ -130,12 +129,16 @@ def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork
 
 def _refuse_inside(problem: Problem, inside: Ints) -> None:
     """Raise ModelError where something acts inside the block, which only its surface knows of."""
-    gravity = any(isinstance(load, Gravity) for load in problem.loads)
+    everywhere = next((load.words() for load in problem.loads if load.on is None), None)
     loading = problem.loading
     loaded = np.flatnonzero(loading.external_force[inside].any(axis=1))
     held = np.flatnonzero(loading.held[inside].any(axis=1))
-    if gravity or loaded.size:
-        where = "gravity acts" if gravity else f"a load acts at {loaded.size} nodes, first node {inside[loaded[0]]},"
+    if everywhere or loaded.size:
+        where = (
+            f"{everywhere} acts"
+            if everywhere
+            else f"a load acts at {loaded.size} nodes, first node {inside[loaded[0]]},"
+        )
         raise ModelError(
             f"block: {where} within it, and boundary elements know no force but on their surface: load the surface, or "
             "choose another block"

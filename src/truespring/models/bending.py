@@ -8,10 +8,10 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.memory import remembered
 from truespring.mesh import Mesh
+from truespring.models.by_rule import SpringsByRule
 from truespring.models.fem_potential import FemPotential, element_matrices
 from truespring.models.finite_elements import fem_potential
 from truespring.models.interpolation import chosen_interpolation
-from truespring.models.lattice import Lattice
 from truespring.models.links import CORNERS, all_alike, link_vectors
 from truespring.models.rules import require_body
 from truespring.models.volume import VolumeTerm
@@ -33,7 +33,7 @@ def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:
 
 
 def bending_factors(
-    problem: Problem, springs: Lattice | None, sizes: dict[int, tuple[int, ...]]
+    problem: Problem, springs: SpringsByRule | None, sizes: dict[int, tuple[int, ...]]
 ) -> MappingProxyType[int, float]:
     """Return bending factors by depth, of sections of so many elements through depth (and width).
 
@@ -84,7 +84,7 @@ def bending_excess(problem: Problem) -> float:
     return max(found)
 
 
-def _bending_factor(problem: Problem, springs: Lattice | None, counts: tuple[int, ...]) -> float:
+def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tuple[int, ...]) -> float:
     """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
 
     A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
@@ -122,7 +122,7 @@ def _bending_factor(problem: Problem, springs: Lattice | None, counts: tuple[int
     return float(energy / sides[0] / (young * width * (counts[0] * sides[1]) ** 3 / 12))
 
 
-def _element_matrix(problem: Problem, springs: Lattice | None, share: Floats | None = None) -> Floats:
+def _element_matrix(problem: Problem, springs: SpringsByRule | None, share: Floats | None = None) -> Floats:
     """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
     if springs is None:
         elements = fem_potential(problem, "linear", chosen_interpolation(problem, "linear"))

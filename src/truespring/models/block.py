@@ -8,7 +8,6 @@ from scipy import linalg
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
-from truespring.material import PlaneStress
 from truespring.memory import available_memory
 from truespring.mesh import Mesh
 from truespring.models.boundary import Influence, Kelvin
@@ -85,7 +84,7 @@ def make_block(problem: Problem, elements: Ints) -> Block:
     _refuse_too_large(panels, len(inside))
     nodes = mesh.nodes[np.concatenate([surface, inside])]
     material = problem.materials[problem.material_numbers[elements[0]]]
-    poisson = material.poisson / (1 + material.poisson) if isinstance(section, PlaneStress) else material.poisson
+    poisson = material.poisson / (1 + material.poisson) if section.free_thickness else material.poisson
     across = 2 * float(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1).max())  # the same however the body is turned
     influence = Influence(panels, Kelvin(material.lame.mu, poisson, across))
     G, H = influence.equations()

@@ -9,7 +9,7 @@ import numpy as np
 from truespring.arrays import Bools
 from truespring.errors import ModelError
 from truespring.loading import Fixed
-from truespring.material import Material, PlaneStrain, PlaneStress
+from truespring.material import Material, PlaneStress
 from truespring.memory import remembered
 from truespring.mesh import Mesh, box, plural, rectangle
 from truespring.models.advice import springs_lock
@@ -210,7 +210,7 @@ class _Judge:
         return "; ".join(self.said(both))
 
     def _young(self, twin: Problem, realised: Moduli) -> str:
-        whose = "the material's" + (" in plane strain" if isinstance(twin.section, PlaneStrain) else "")
+        whose = "the material's" + (twin.section.within if twin.section else "")
         lowest, highest = (self._number(value / realised.young_wanted) for value in realised.young_range)
         if lowest == highest:
             return f"Young's modulus is {lowest} times {whose} in every direction"

@@ -1,7 +1,6 @@
 """The interpolation of finite elements: which of ELEMENTS a mesh allows, and where elements of first order lock."""
 
 from truespring.errors import ModelError
-from truespring.material import PlaneStress
 from truespring.mesh import counted
 from truespring.models.laws import LAWS
 from truespring.problem import Problem
@@ -27,7 +26,7 @@ def chosen_interpolation(problem: Problem, law: str, asked: str | None = None) -
         return incompressible if locks(problem) else usual
     allowed = _allowed(problem, law)
     if asked not in allowed:
-        within = " in plane stress" if isinstance(problem.section, PlaneStress) else ""
+        within = f" in {problem.section.words}" if problem.section and _free_thickness(problem) else ""
         raise ModelError(
             f"element = '{asked}' is not for a mesh of {problem.mesh.kinds} elements{within}; "
             f"allowed here: {', '.join(allowed)}"
@@ -45,9 +44,14 @@ def default_interpolations(problem: Problem, law: str) -> tuple[str, str]:
 def _allowed(problem: Problem, law: str) -> tuple[str, ...]:
     """Return the interpolations that the mesh and the law allow."""
     found = dict.fromkeys(("linear", *default_interpolations(problem, law)))
-    if isinstance(problem.section, PlaneStress):  # the third direction is free to take lambda's part
+    if _free_thickness(problem):  # the third direction is free to take lambda's part
         found.pop("quadratic-mean-dilatation", None)
     return tuple(found)
+
+
+def _free_thickness(problem: Problem) -> bool:
+    """Whether the body changes its thickness freely: plane stress."""
+    return problem.section is not None and problem.section.free_thickness
 
 
 def stiff_simplices(problem: Problem) -> tuple[str, ...]:
@@ -66,7 +70,7 @@ def stiff_simplices(problem: Problem) -> tuple[str, ...]:
 def locks(problem: Problem) -> bool:
     """Return whether linear elements are known to lock: nearly incompressible, and not free to change thickness."""
     incompressible = any(material.poisson > LOCKING_POISSON for material in problem.materials)
-    return incompressible and not isinstance(problem.section, PlaneStress)
+    return incompressible and not _free_thickness(problem)
 
 
 def locking_warnings(problem: Problem) -> tuple[str, ...]:

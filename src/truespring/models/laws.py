@@ -13,7 +13,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
-from truespring.material import Material, PlaneStress
+from truespring.material import Material
 from truespring.models.law import Constant, Constants, Law, Response
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import (
@@ -250,7 +250,8 @@ def law_constants(problem: Problem, name: str) -> Constants:
     Raises ModelError where a material has a constant that no law knows, lacks one that the law needs, has one out of
     range, or has other moduli than the law's constants give at small strain.
     """
-    plane_stress, law = isinstance(problem.section, PlaneStress), LAWS[name]
+    plane_stress = problem.section is not None and problem.section.free_thickness
+    law = LAWS[name]
     found = {material: _values(material, name) for material in problem.materials}
     if len(found) == 1:
         ((material, values),) = found.items()

@@ -15,8 +15,8 @@ from truespring.memory import remembered
 from truespring.mesh import MIXED, Mesh
 from truespring.mesh.rows import distinct_rows
 from truespring.models.bending import bending_factors, cell_counts, fem_bending_factors
+from truespring.models.by_rule import SpringsByRule
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
-from truespring.models.lattice import Lattice
 from truespring.models.links import in_a_row, n_links
 from truespring.models.relaxation import relaxed_elasticity
 from truespring.models.rules import require_body
@@ -207,7 +207,7 @@ def _directions(dim: int) -> Floats:
 
 
 @remembered
-def moduli(problem: Problem, springs: Lattice) -> Moduli:
+def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     """Return what `springs` realise on the problem's mesh, were it all of the problem's own material.
 
     On a lattice, whose nodes are centres of symmetry, a uniform strain is an equilibrium and

@@ -7,7 +7,7 @@ import numpy as np
 import skfem
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.loading import nodal_force
+from truespring.loading import Body, nodal_force
 from truespring.mesh import Grid, SecondOrder, edge_numbers
 from truespring.models.fem_potential import FemPotential
 from truespring.models.reference_element import Reference, reference_element
@@ -81,9 +81,13 @@ class QuadraticPotential(FemPotential):
         held = np.concatenate([given.held, by_edge])
         displacement = np.concatenate([given.displacement, given.displacement[ends].mean(axis=1)])
         turns = tuple(self._turn(turn, np.asarray(by_edge.all(axis=1))) for turn in given.turns)
-        body = self.problem.body._replace(second_order=self._second_order)
-        force = nodal_force(self.problem.spreads(body), self.nodes.shape)
-        return Loading(force, held, np.where(held, displacement, 0.0), turns, self.problem.following(body, held))
+        force = nodal_force(self.problem.spreads(self.body), self.nodes.shape)
+        return Loading(force, held, np.where(held, displacement, 0.0), turns, self.problem.following(self.body, held))
+
+    @property
+    def body(self) -> Body:
+        """What loads act on: the problem's body, whose cells have nodes on their edges too."""
+        return self.problem.body._replace(second_order=self._second_order)
 
     def _held_alike(self, cells: Ints) -> Ints:
         """The edges of cells, given by their corners, all of whose corners are held and moved alike."""

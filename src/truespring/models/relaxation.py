@@ -8,7 +8,7 @@ from truespring.linear.choice import choose
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError
 from truespring.mesh import MIXED, Mesh
-from truespring.models.lattice import Lattice
+from truespring.models.by_rule import SpringsByRule
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
 from truespring.models.strain import uniform_strain, voigt_pairs
@@ -23,7 +23,7 @@ _ACCURACY = 1e-6
 
 
 def relaxed_elasticity(
-    problem: Problem, springs: Lattice, stiffness: Floats, negative: bool
+    problem: Problem, springs: SpringsByRule, stiffness: Floats, negative: bool
 ) -> tuple[Floats | None, float]:
     """Return the elasticity of a body whose boundary is strained uniformly [Pa], and its patch score (see `Moduli`).
 
@@ -63,7 +63,7 @@ def _unit_strains(mesh: Mesh) -> Floats:
     return np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
 
 
-def _at_rest(problem: Problem, springs: Lattice) -> SparseMatrix:
+def _at_rest(problem: Problem, springs: SpringsByRule) -> SparseMatrix:
     """The stiffness of the body at rest [N/m]."""
     return springs.allowing_negative().potential(problem).hessian(problem.mesh.nodes)
 

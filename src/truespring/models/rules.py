@@ -1,13 +1,14 @@
 """Stiffness rules: from a material and an element to the stiffness of the element's springs.
 
 A rule is one function of the problem that returns stiffness [N/m], shape (n_elements, links), in
-the order of `ElementKind.links`, and one line in RULES. What the springs realise is computed from
-the result (`moduli`), so that no rule needs to be believed.
+the order of `ElementKind.links`, and one entry of RULES. The effective moduli that an entry states are
+confirmed by `moduli`, which computes them from the stiffness.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
 
@@ -29,30 +30,77 @@ K_BODY = 1 / 12
 _LARGEST_K_BODY = 0.3
 
 
+#: The lattice of `Realised` that stands for all meshes.
+ANY_MESH = "any mesh"
+
+
 @dataclass(frozen=True, slots=True)
-class Rule:
-    """A table entry.
+class Realised:
+    """Effective moduli of a rule on a lattice, in plane stress or 3D; `moduli` confirms them in the tests.
 
     Attributes:
-        stiffness: the recipe; takes the problem, and by name those of `parameters` that are given.
-        elements: the kinds of element that it is made for.
-        realises: what its springs realise, in a line.
-        source: where it comes from.
+        lattice: a key of LATTICES, or ANY_MESH.
+        young: smallest and largest Young's modulus over all directions, over that of the material [-].
+        poisson: smallest and largest Poisson's ratio over the directions of the test [-]; None where it is the
+            material's.
+        at: the material's Poisson's ratio for which these hold [-]; None for any.
+    """
+
+    lattice: str
+    young: tuple[float, float] = (1.0, 1.0)
+    poisson: tuple[float, float] | None = None
+    at: float | None = None
+
+    def __str__(self) -> str:
+        where = self.lattice + ("" if self.at is None else f" (nu = {_number(self.at)})")
+        lowest, highest = (_number(value) for value in self.young)
+        young = "E" if lowest == highest == "1" else f"{lowest} E" if lowest == highest else f"{lowest} to {highest} E"
+        if self.poisson is None:
+            return f"{where}: {young}, the material's Poisson's ratio"
+        smallest, largest = (_number(value) for value in self.poisson)
+        return f"{where}: {young}, Poisson's ratio {smallest if smallest == largest else f'{smallest} to {largest}'}"
+
+
+def _number(value: float) -> str:
+    """A value as a fraction of small numbers if it is one, else with three digits."""
+    found = Fraction(value).limit_denominator(4)
+    return str(found) if abs(float(found) - value) < 1e-9 else f"{value:.3f}"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """An entry of RULES. All its statements are checked by the contract tests (`tests/test_rules.py`).
+
+    Attributes:
+        stiffness: takes the problem, and by name those of `parameters` that are set, and returns the stiffness of each
+            element's links [N/m], shape (n_elements, links).
+        elements: the kinds of element that it is for, keys of ELEMENT_KINDS.
+        idea: how stiffness follows from material and element, in a few words.
+        moduli: effective moduli, on one lattice at least of each kind of element.
+        source: where it is published.
+        shapes: of kinds of element that must have a shape, by kind: "square", "rectangle" or "brick".
         parameters: keys of Springs that it takes.
-        coupled: whether springs answer to each other's length too: `stiffness` is then that of a
-            spring whose neighbours keep their length.
+        coupled: whether the force of a spring depends on the lengths of its neighbours too: `stiffness` is then that
+            of a spring whose neighbours keep their length.
     """
 
     stiffness: Callable[..., Floats]
     elements: tuple[str, ...]
-    realises: str
+    idea: str
+    moduli: tuple[Realised, ...]
     source: str
+    shapes: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     parameters: tuple[str, ...] = ()
     coupled: bool = False
 
     def takes(self, mesh: Mesh) -> bool:
-        """Return whether it is made for all kinds of elements that a mesh has."""
+        """Return whether it is for all kinds of elements that a mesh has."""
         return all(kind in self.elements for kind in mesh.element_kinds)
+
+    @property
+    def realises(self) -> str:
+        """Its effective moduli in words, of E and Poisson's ratio."""
+        return "; ".join(str(one) for one in self.moduli)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +216,22 @@ def _bricks(problem: Problem, rule: str) -> Floats:
     if wrong.size:
         raise ModelError(
             f"rule = '{rule}' is made for {'rectangles' if mesh.dim == 2 else 'bricks'}, {wrong.size} elements are "
-            f"none, the first is element {wrong[0]}; allowed here: projected, least-squares, biquadratic"
+            f"none, the first is element {wrong[0]}; allowed here: {', '.join(_of_any_shape(mesh))}"
         )
     return lengths
+
+
+def _of_any_shape(mesh: Mesh) -> list[str]:
+    """The rules that take the elements of a mesh whatever their shape."""
+    return [name for name, rule in RULES.items() if rule.takes(mesh) and not rule.shapes.keys() & mesh.element_kinds]
+
+
+def _of_rectangles() -> list[str]:
+    return [
+        name
+        for name, rule in RULES.items()
+        if "quadrilateral" in rule.elements and rule.shapes.get("quadrilateral") != "square"
+    ]
 
 
 def lloyd(problem: Problem) -> Floats:
@@ -192,7 +253,7 @@ def lloyd(problem: Problem) -> Floats:
         worst = sides[int(unequal.argmax())]
         raise ModelError(
             f"rule = 'lloyd' is made for squares, the elements measure {worst[0]:g} m by {worst[1]:g} m: "
-            "choose size and elements so that they are squares, or the rule isotropic, projected or least-squares"
+            f"choose size and elements so that they are squares, or a rule among {', '.join(_of_rectangles())}"
         )
     return _classes(problem, 5 / 16, 7 / 16)
 
@@ -306,45 +367,74 @@ def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats
 
 _ALL = ("triangle", "quadrilateral", "tetrahedron", "pyramid", "wedge", "hexahedron")
 
+_THIRD, _QUARTER = (1 / 3, 1 / 3), (1 / 4, 1 / 4)
+
 RULES: MappingProxyType[str, Rule] = MappingProxyType(
     {
         "lloyd": Rule(
             lloyd,
             ("triangle", "quadrilateral", "tetrahedron"),
-            "squares: 0.882 E along the edges, 1.105 E at 45 degrees; equilateral triangles: E, Poisson's ratio 1/3; "
-            "body-centred-cubic tetrahedra: 1.008 E and 1/4 in every direction; other meshes: see moduli",
+            "the same multiple of E for all elements of a kind",
+            (
+                Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17)),
+                Realised("equilateral triangles", poisson=_THIRD),
+                Realised("body-centred-cubic tetrahedra", (127 / 126, 127 / 126), _QUARTER),
+            ),
             "Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders 2007",
+            shapes=MappingProxyType({"quadrilateral": "square"}),
         ),
         "isotropic": Rule(
             isotropic,
             ("quadrilateral", "hexahedron"),
-            "rectangles: E in every direction, Poisson's ratio 1/3 in plane stress; bricks: E and 1/4",
+            "the springs whose lattice is isotropic",
+            (Realised("rectangles", poisson=_THIRD), Realised("bricks", poisson=_QUARTER)),
             "Brisard, What is homogenization? part 4; Baudet et al. 2009; Golec et al. 2020",
+            shapes=MappingProxyType({"quadrilateral": "rectangle", "hexahedron": "brick"}),
             parameters=("k_body",),
         ),
         "least-squares": Rule(
             least_squares,
             _ALL,
             "the springs nearest to the element's FEM matrix, all entries",
+            (
+                Realised("squares", (340 / 399, 460 / 441), (17 / 63, 23 / 57), at=1 / 3),
+                Realised("equilateral triangles", poisson=_THIRD, at=1 / 3),
+                Realised("cubes", (0.7258, 0.8469), (0.2351, 0.2730), at=1 / 4),
+                Realised("body-centred-cubic tetrahedra", (0.6337, 1.1715), (0.1982, 0.3367), at=1 / 4),
+                Realised("wedges", (0.2433, 1.0396), (0.1108, 0.5308), at=1 / 4),
+                Realised("pyramids", (0.3987, 1.1040), (0.1749, 0.3826), at=1 / 4),
+            ),
             "the norm of Lloyd et al. 2007 for tetrahedra, applied to every element",
         ),
         "projected": Rule(
             projected,
             _ALL,
             "the springs nearest to the off-diagonal blocks of the element's FEM matrix",
+            (
+                Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17), at=1 / 3),
+                Realised("equilateral triangles", poisson=_THIRD, at=1 / 3),
+                Realised("cubes", (0.8325, 1.1057), (0.2236, 0.2919), at=1 / 4),
+                Realised("body-centred-cubic tetrahedra", (12 / 17, 33 / 28), (23 / 112, 11 / 34), at=1 / 4),
+                Realised("wedges", (0.3202, 1.2490), (0.1151, 0.5515), at=1 / 4),
+                Realised("pyramids", (3 / 5, 21 / 17), (13 / 68, 7 / 20), at=1 / 4),
+            ),
             "after Lloyd et al. 2007; the longer formula of Van Gelder 1998 on triangles",
         ),
         "van-gelder": Rule(
             van_gelder,
             ("triangle", "tetrahedron"),
-            "equilateral triangles: E, Poisson's ratio 1/3; body-centred-cubic tetrahedra: 0.857 to 1.091 E",
-            "Van Gelder 1998, E area / length^2 and E volume / length^2",
+            "E area / length^2 and E volume / length^2",
+            (
+                Realised("equilateral triangles", poisson=_THIRD),
+                Realised("body-centred-cubic tetrahedra", (6 / 7, 12 / 11), (5 / 22, 2 / 7)),
+            ),
+            "Van Gelder, Journal of Graphics Tools 3, 1998",
         ),
         "biquadratic": Rule(
             biquadratic,
             _ALL,
-            "the material itself, any Poisson's ratio, any mesh: springs in squared lengths, coupled within an "
-            "element, that are St. Venant-Kirchhoff FEM",
+            "springs in squared lengths, coupled within an element: St. Venant-Kirchhoff finite elements",
+            (Realised(ANY_MESH),),
             "Delingette 2008 (triangles), Goulette and Chen 2015 (tetrahedra)",
             coupled=True,
         ),

@@ -8,7 +8,6 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
-from truespring.material import PlaneStrain
 from truespring.mesh.rows import distinct_rows
 from truespring.mesh.selections import AXES
 from truespring.models.metric import Component, MetricPotential, components
@@ -97,10 +96,9 @@ class Terzopoulos(Model):
             if abs(poisson) <= _SAME_POISSON:
                 continue
             double = 2 / young + 1 / section.lame_within(material).mu  # 4 / E at 45 degrees
-            within = " in plane strain" if isinstance(section, PlaneStrain) else ""
             yield (
-                f"along the grid's axes Poisson's ratio is 0 where the material has {poisson:.4g}{within}, for any "
-                "weights of the metric tensor: its energy has no product of two strains. Young's modulus along the "
+                f"along the grid's axes Poisson's ratio is 0 where the material has {poisson:.4g}{section.within}, for "
+                "any weights of the metric tensor: its energy has no product of two strains. Young's modulus along the "
                 f"axes ({young:.6g} Pa) and the shear modulus are the material's; at 45 degrees these weights give "
                 f"{4 / double:.6g} Pa and {1 - 4 / young / double:.4g}"
             )

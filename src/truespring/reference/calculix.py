@@ -14,8 +14,7 @@ from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside, second_order, usual_element
 from truespring.exports.exported import plain_springs
-from truespring.loading import Pressure
-from truespring.material import PlaneStress
+from truespring.loading import FacePressure
 from truespring.models import Fem, Model, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import on_the_mesh
@@ -172,8 +171,9 @@ class CalculiX(Program):
                 f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints that of the last "
                 "increment only, and took several to a level"
             )
-        pressed = any(isinstance(load, Pressure) for load in problem.loads)
-        if pressed and isinstance(problem.section, PlaneStress) and self.finite:
+        cards = [card for load in problem.loads for card in load.cards(problem.mesh)]
+        pressed = any(isinstance(card, FacePressure) for card in cards)
+        if pressed and problem.section is not None and problem.section.free_thickness and self.finite:
             warnings.append(
                 "the pressure acts on the thickness as it becomes, in truespring's own models on that at rest: plane "
                 "strain has no such difference"

@@ -5,12 +5,12 @@ Matplotlib is imported where it is needed, and only through its objects: no wind
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from truespring.report.bodies import distance_figure, over_figure, undeformed_figure
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
+from truespring.report.drawing import Drawing, drawing_of, save_drawings
 from truespring.report.frame3d import figure_of, shot
 from truespring.report.plots import curves_figure, error_figure, moduli_figure, reactions_figure, tells_reactions
 from truespring.report.render import render
@@ -20,20 +20,6 @@ from truespring.report.style import figure_style
 
 # A Result does not change, and its files and its pages show the same pictures: they are drawn once.
 _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """A figure as the bytes of its two files, its title for those who cannot see it, and its width [inch].
-
-    `note` tells what a reader should know of how it was drawn, and is mostly empty.
-    """
-
-    png: bytes
-    svg: bytes
-    title: str
-    width: float
-    note: str = ""
 
 
 def draw_figures(result: Result) -> dict[str, Sheet]:
@@ -46,20 +32,14 @@ def render_figures(result: Result) -> dict[str, Drawing]:
     """Return the figures of a study as PNG and SVG, by the stem of their file names."""
     if result not in _DRAWN:
         with figure_style():
-            _DRAWN[result] = {
-                name: Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width, note)
-                for name, sheet, note in _draw(result)
-            }
+            _DRAWN[result] = {name: drawing_of(sheet, note) for name, sheet, note in _draw(result)}
     return _DRAWN[result]
 
 
 def save_figures(result: Result, folder: Path) -> dict[str, Drawing]:
     """Write every figure as PNG and SVG into `folder`, made where it is not there; return what was written."""
     drawings = render_figures(result)
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, drawing in drawings.items():
-        (folder / f"{name}.png").write_bytes(drawing.png)
-        (folder / f"{name}.svg").write_bytes(drawing.svg)
+    save_drawings(drawings, folder)
     return drawings
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, Status
-from truespring.material import Material, PlaneStrain, PlaneStress
+from truespring.material import Material
 from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
 from truespring.problem import Problem, Region
@@ -127,9 +127,8 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     if problem.material is not None:
         facts.append(("material", _material_words(problem.material)))
     facts += [_region_fact(problem, region) for region in problem.regions]
-    if isinstance(problem.section, PlaneStress | PlaneStrain):
-        kind = "plane stress" if isinstance(problem.section, PlaneStress) else "plane strain"
-        facts.append(("section", f"{kind}, {given(problem.section.thickness, 'm')} thick"))
+    if problem.section is not None and problem.section.key:
+        facts.append(("section", f"{problem.section.words}, {given(problem.section.thickness, 'm')} thick"))
     facts += _drive_facts(problem)
     facts += _element_facts(result)
     at = ", ".join(given(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
@@ -325,7 +324,7 @@ def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
 
 def _section_note(problem: Problem) -> str | None:
     """In plane strain, where the wanted moduli come from."""
-    if problem.material is None or not isinstance(problem.section, PlaneStrain):
+    if problem.material is None or problem.section is None or not problem.section.moduli_words:
         return None
     young, poisson = problem.section.apparent_moduli(problem.material)
     seen = f"E/(1 − ν²) = {quantity(young, 'Pa')} and ν/(1 − ν) = {poisson:.3f}"

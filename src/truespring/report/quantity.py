@@ -24,8 +24,8 @@ class Scale:
 
 
 def natural_scale(largest: float, unit: str) -> Scale:
-    """Return the largest prefix of `unit` (of _PREFIXES) in which `largest`, in SI, is at least 1."""
-    prefixes = _PREFIXES[unit]
+    """Return the largest prefix of `unit` in which `largest`, in SI, is at least 1; any other unit without one."""
+    prefixes = _PREFIXES.get(unit, ((1.0, unit),))
     # A hair below 1 still is 1: lengths come out of sums.
     fitting = [Scale(*one) for one in prefixes if abs(largest) >= one[0] * (1 - 1e-9)]
     if largest == 0 or not math.isfinite(largest):
@@ -42,7 +42,8 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 def given(value: float, unit: str) -> str:
     """Return a value that someone wrote, as a text in its natural unit without digits of our own: 0.04 m is "40 mm"."""
     scale = natural_scale(value, unit)
-    return f"{value / scale.size:.6g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
+    gap = "" if scale.unit == "°" else " "
+    return f"{value / scale.size:.6g}{gap}{scale.unit}".replace("-", "\N{MINUS SIGN}")
 
 
 def significant(value: float, digits: int) -> str:

@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from truespring.report.figures import Drawing
+from truespring.report.drawing import Drawing
 
 if TYPE_CHECKING:
     from jinja2 import Environment

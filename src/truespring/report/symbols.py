@@ -1,14 +1,13 @@
 """Marks on a picture of a body: the probe, loads and prescribed motions as arrows, supports on pins and rollers."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.loading import Force, Gravity, Moment, Pressure, Traction
-from truespring.mesh import Mesh, loaded
+from truespring.loading import Mark
 from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, given
@@ -58,7 +57,7 @@ class Arrow:
 
 
 class Acting(NamedTuple):
-    """A load or a prescribed motion: the nodes it acts on, the way it pulls them, what it is, its colour."""
+    """A load or a prescribed motion: the nodes it acts on, its direction, its text and its colour."""
 
     nodes: Ints
     vector: Floats
@@ -68,50 +67,16 @@ class Acting(NamedTuple):
 
 def find_acting(problem: Problem) -> Iterator[Acting]:
     """Yield the loads of a problem, then its prescribed motions."""
-    mesh = problem.mesh
-    everywhere = np.arange(mesh.n_nodes)
     for load in problem.loads:
-        match load:
-            case Force():
-                yield _along(loaded(mesh, load.on), load.total, "F", "N", LOAD)
-            case Traction():
-                yield _along(loaded(mesh, load.on), load.traction, "t", "Pa", LOAD)
-            case Gravity():
-                yield _along(everywhere, load.acceleration, "g", "m/s^2", LOAD)
-            case Pressure():
-                force = -load.following(problem.body, problem.loading.held).gradient(mesh.nodes)
-                nodes = loaded(mesh, load.on)
-                total = force.sum(axis=0)
-                if np.linalg.norm(total) < 1e-6 * np.abs(force).sum():  # all around: one place stands for all
-                    nodes = nodes[[mesh.nodes[nodes, 0].argmax()]]
-                    total = force[nodes[0]]
-                yield Acting(nodes, total, f"p = {_size(load.pressure, 'Pa')}", LOAD)
-            case Moment():
-                nodes = loaded(mesh, load.on)
-                yield Acting(nodes, _around(mesh, nodes, load.moment), f"M = {_size(load.moment, 'N m')}", LOAD)
-    for support, held in zip(problem.supports, problem.held, strict=True):
-        if held.motion.any():
-            yield _along(held.nodes, held.motion, "u", "m", MOTION)
-        if held.turn is not None:
-            way = held.turn.motion(1e-3 / abs(held.turn.angle))
-            outermost = int(np.linalg.norm(way, axis=1).argmax())
-            yield Acting(held.nodes, way[outermost], f"turn {np.degrees(support.rotation):.4g}°", MOTION)
+        yield _acting(load.mark(problem.body, problem.loading.held), LOAD)
+    for held in problem.held:
+        for mark in held.marks():
+            yield _acting(mark, MOTION)
 
 
-def _along(nodes: Ints, vector: Sequence[float] | Floats, symbol: str, unit: str, color: str) -> Acting:
-    components = np.array(vector, dtype=float)
-    return Acting(nodes, components, f"{symbol} = {_size(np.linalg.norm(components), unit)}", color)
-
-
-def _size(value: float | np.floating[Any], unit: str) -> str:
-    return given(float(f"{value:.4g}"), unit)
-
-
-def _around(mesh: Mesh, nodes: Ints, moment: float) -> Floats:
-    """The way in which a moment moves the outer end of a face of a plane body."""
-    arm = mesh.nodes[nodes] - mesh.nodes[nodes].mean(axis=0)
-    x, y = arm[np.linalg.norm(arm, axis=1).argmax()]
-    return moment * np.array([-y, x])
+def _acting(mark: Mark, color: str) -> Acting:
+    text = f"{mark.symbol} = {given(float(f'{mark.size:.4g}'), mark.unit)}"
+    return Acting(mark.nodes, mark.vector, text, color)
 
 
 def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arrow]:

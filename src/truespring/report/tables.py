@@ -4,13 +4,27 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
+from truespring.report.quantity import natural_scale
 from truespring.report.result import Result
 from truespring.report.standing import own_errors
 from truespring.report.supports import support_rows
-from truespring.report.verdict import verdict
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+
+def moduli_line(title: str, moduli: Moduli) -> str:
+    """Return the effective moduli of springs in one line, beside those of the material in its section."""
+    (low, high), (least, most) = moduli.young_range, moduli.poisson_range
+    scale = natural_scale(high, "Pa")
+    young = _span(f"{low / scale.size:.4g}", f"{high / scale.size:.4g}")
+    poisson = _span(f"{least:.3f}", f"{most:.3f}")
+    material = f"material {moduli.young_wanted / scale.size:.4g} {scale.unit}, {moduli.poisson_wanted:.3f}"
+    return f"{title}: Young's modulus {young} {scale.unit}, Poisson's ratio {poisson} ({material})"
+
+
+def _span(first: str, last: str) -> str:
+    return first if first == last else f"{first} to {last}"
 
 
 def moduli_table(title: str, moduli: Moduli) -> "Table":
@@ -69,13 +83,13 @@ def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
     table = new_table("Stiffness rules", "rule", "", "uses nu", "")
     for name, rule in rules.items():
         uses = "yes" if rule["follows_poisson"] else "no"
-        words = f"{rule['realises']}\nSource: {rule['source']}"
+        words = f"{rule['idea']}\n{rule['realises']}\nSource: {rule['source']}"
         table.add_row(name, "\n".join(rule["elements"]), uses, words, end_section=True)
     return table
 
 
 def result_tables(result: Result) -> "Iterator[Table | str]":
-    """Yield the state of every path, the errors, the verdict, notes and warnings of a study."""
+    """Yield the status of every model, errors, notes and warnings of a study."""
     table = new_table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
     for name, path in result.paths.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
@@ -86,7 +100,6 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
         supports = support_table(result)
         if supports is not None:
             yield supports
-    yield verdict(result)
     for note in result.problem.mesh.notes:
         yield f"note: mesh: {note}"
     for name, path in result.paths.items():

@@ -8,7 +8,6 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError, decisive
 from truespring.equilibrium import Solution, State, Status
-from truespring.material import PlaneStrain
 from truespring.mesh.selections import AXES
 from truespring.models import Fem, Moduli
 from truespring.reactions import SupportForce, leading_support, moved_supports
@@ -197,7 +196,7 @@ def carrying_sentence(result: Result) -> str | None:
 
 def material_name(result: Result) -> str:
     """Return what the moduli that are wanted are called: in plane strain they are not the material's own."""
-    return "material in plane strain" if isinstance(result.problem.section, PlaneStrain) else "material"
+    return "material" + (result.problem.section.within if result.problem.section else "")
 
 
 def linear_fem(path: Solution) -> str:

@@ -3,7 +3,7 @@
 import io
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +13,8 @@ from pydantic import ValidationError
 
 from truespring.equilibrium import check_solver
 from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError, close_words, nearest, one_line, shown
-from truespring.loading import Fixed, Force, Gravity, Moment, Pressure, Traction
-from truespring.material import Material, PlaneStrain, PlaneStress, Section
+from truespring.loading import LOADS, Fixed
+from truespring.material import SECTIONS, Material, Section
 from truespring.mesh import (
     Mesh,
     box,
@@ -42,7 +42,7 @@ from truespring.models import (
     material_constants,
 )
 from truespring.opening import read_file
-from truespring.problem import Load, Problem, Region
+from truespring.problem import Problem, Region
 from truespring.program import ReadSolution
 from truespring.reference import CalculiX, read_stl
 from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
@@ -319,10 +319,10 @@ class _Builder:
             if load.on is not None:
                 with self.at("load", number, "on"):
                     select(mesh, load.on)
-            ((key, value),) = ((key, getattr(load, key)) for key in schema.LOADS if getattr(load, key) is not None)
-            with self.at("load", number, key):
-                _one_a_direction(value if isinstance(value, list) else None, mesh)
-            loads.append(_LOADS[key](load.on, value))
+            for key, value in load.values.items():
+                with self.at("load", number, key):
+                    _one_a_direction(value if isinstance(value, list) else None, mesh)
+            loads.append(load.load())
         try:
             return Problem(mesh, material, section, supports, loads, regions)
         except LoadError as error:
@@ -372,8 +372,8 @@ class _Builder:
             if mesh.dim == 3:
                 return None
             if table is None:
-                raise StudyError(f"is required and missing; kind: {', '.join(_SECTIONS)}, and a thickness")
-            return _SECTIONS[table.kind](table.thickness)
+                raise StudyError(f"is required and missing; kind: {', '.join(SECTIONS)}, and a thickness")
+            return SECTIONS[table.kind](table.thickness)
 
     def entry(self, problem: Problem, solver: Solver, name: str, table: Any) -> Model:
         with self.at("models", name):
@@ -474,15 +474,7 @@ def _material(table: schema.MaterialTable) -> Material:
     return Material(table.young, table.poisson, table.density, known)
 
 
-_LOADS: dict[str, Callable[[Any, Any], Load]] = {
-    "force": Force,
-    "traction": Traction,
-    "pressure": Pressure,
-    "moment": Moment,
-    "gravity": lambda _, acceleration: Gravity(acceleration),
-}
 _OTHER_MESHES = "file = a mesh file, voxels = a label image, nodes and springs = CSV files"
-_SECTIONS: dict[str, type[Section]] = {"plane-stress": PlaneStress, "plane-strain": PlaneStrain}
 
 
 def _probe_node(mesh: Mesh, probe: str | tuple[float, ...] | None) -> int | None:
@@ -552,7 +544,7 @@ def _allowed_keys(loc: tuple[str | int, ...]) -> list[str]:
         "material": schema.MaterialTable,
         "section": schema.SectionTable,
         "support": schema.SupportTable,
-        "load": schema.LoadTable,
+        "load": schema.load_form(LOADS),
         "solver": schema.SolverTable,
         "compare": schema.CompareTable,
     }

@@ -12,7 +12,7 @@ import numpy as np
 from truespring.comparison import compare, most_moved
 from truespring.equilibrium import Solution, solve, unsolved
 from truespring.errors import StudyError
-from truespring.material import Material, PlaneStrain, PlaneStress, Solid
+from truespring.material import Material
 from truespring.mesh.selections import AXES
 from truespring.models import (
     RULES,
@@ -204,7 +204,7 @@ def _draw_moduli(study: Study, realised: Sequence[Realised], folder: Path) -> Pa
         for one in realised
         for moduli in [one.by_material[0][1]]
     }
-    within = " in plane strain" if isinstance(study.problem.section, PlaneStrain) else ""
+    within = study.problem.section.within if study.problem.section else ""
     return save_young(several, f"material{within}", folder)
 
 
@@ -213,7 +213,9 @@ def rule_values() -> dict[str, dict[str, Any]]:
     return {
         name: {
             "elements": list(rule.elements),
+            "idea": rule.idea,
             "realises": rule.realises,
+            "shapes": dict(rule.shapes),
             "follows_poisson": follows_poisson(name),
             "coupled": rule.coupled,
             "parameters": list(rule.parameters),
@@ -311,10 +313,9 @@ def plan(study: Study) -> dict[str, Any]:
 
 
 def _section(problem: Problem) -> dict[str, Any] | None:
-    if problem.section is None or isinstance(problem.section, Solid):
+    if problem.section is None or not problem.section.key:
         return None
-    kind = "plane-stress" if isinstance(problem.section, PlaneStress) else "plane-strain"
-    return {"kind": kind, "thickness": problem.section.thickness}
+    return {"kind": problem.section.key, "thickness": problem.section.thickness}
 
 
 def _model_plan(study: Study, name: str) -> Mapping[str, Any]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -20,6 +20,8 @@ from pydantic import (
 )
 
 from truespring.errors import TruespringError, nearest, shown
+from truespring.loading import LOADS, Load, LoadKind
+from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
 from truespring.models import ELEMENTS, LAWS, RULES, Constant, material_constants
 from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
@@ -75,22 +77,22 @@ def _file_name(value: Any) -> Any:
 
 Length = Annotated[float, _si("length"), _quantity("length")]
 Stress = Annotated[float, _si("stress"), _quantity("stress")]
-Force = Annotated[float, _si("force"), _quantity("force")]
 Density = Annotated[float, _si("density"), _quantity("density")]
-Acceleration = Annotated[float, _si("acceleration"), _quantity("acceleration")]
-Moment = Annotated[float, _si("moment"), _quantity("moment")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
 _QUANTITIES: dict[Dimension, Any] = {
     dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
 }
-RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)})]
+_RULES = {"description": "; ".join(f"{name}: {rule.idea}" for name, rule in RULES.items())}
+RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)} | _RULES)]
 _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
 PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
-LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)})]
+_LAWS = {"description": "; ".join(f"{name}: {law.source}" for name, law in LAWS.items())}
+LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
 FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
 PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
 SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
 Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
+SectionKind = Annotated[str, _key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
 #: A file, beside the study's own where the name is no absolute one.
 FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
@@ -261,7 +263,7 @@ class RegionTable(MaterialTable):
 class SectionTable(Table):
     """How a plane body behaves across the plane."""
 
-    kind: Literal["plane-stress", "plane-strain"]
+    kind: SectionKind
     thickness: Length
 
 
@@ -277,30 +279,62 @@ class SupportTable(Table):
 
 
 class LoadTable(Table):
-    """A load: one key of LOADS tells which; all but gravity act on a selection."""
+    """A load: one key names it; all but those of the whole body act on a selection."""
 
     on: On = None
-    force: Annotated[list[Force], Field(min_length=2, max_length=3)] | None = None
-    traction: Annotated[list[Stress], Field(min_length=2, max_length=3)] | None = None
-    pressure: Stress | None = None
-    moment: Moment | None = None
-    gravity: Annotated[list[Acceleration], Field(min_length=2, max_length=3)] | None = None
+    kinds: ClassVar[Mapping[str, LoadKind]] = {}
 
     @model_validator(mode="after")
-    def _one_load(self) -> "LoadTable":
-        given = [name for name in LOADS if getattr(self, name) is not None]
+    def _one_load(self) -> Self:
+        given = [name for name in self.kinds if getattr(self, name) is not None]
         if len(given) != 1:
-            told = f"{' and '.join(given)} are given" if given else "nothing is given"
-            raise ValueError(f"{told}: a load has one of {', '.join(LOADS)}")
-        if given == ["gravity"] and self.on is not None:
-            raise ValueError("gravity acts on the whole body: leave out on")
-        if given != ["gravity"] and self.on is None:
-            raise ValueError(f"on is required and missing: where the {given[0]} acts")
+            found = f"{' and '.join(given)} are given" if given else "nothing is given"
+            raise ValueError(f"{found}: a load has one of {', '.join(self.kinds)}")
+        if self.kind.on_selection and self.on is None:
+            raise ValueError(f"on is required and missing: where the {self.key} acts")
+        if not self.kind.on_selection and self.on is not None:
+            raise ValueError(f"{self.key} acts on the whole body: leave out on")
+        for key in sorted(self.model_fields_set - {"on", self.key, *self.kind.further}):
+            raise ValueError(f"{key} does not go with {self.key}: leave it out")
+        for key, quantity in self.kind.further.items():
+            if getattr(self, key) is None and quantity.default is None:
+                raise ValueError(f"{key} is required and missing: {quantity.about}")
         return self
 
+    @property
+    def key(self) -> str:
+        """The key that names the load."""
+        return next(name for name in self.kinds if getattr(self, name) is not None)
 
-#: What a load may be.
-LOADS = ("force", "traction", "pressure", "moment", "gravity")
+    @property
+    def kind(self) -> LoadKind:
+        """What the load is."""
+        return self.kinds[self.key]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values of the load's keys in SI, by key."""
+        given = {key: getattr(self, key) for key in (self.key, *self.kind.further)}
+        return {key: self.kind.quantities(self.key)[key].default if one is None else one for key, one in given.items()}
+
+    def load(self) -> Load:
+        """Return the load."""
+        quantities = self.kind.quantities(self.key)
+        arguments: dict[str, Any] = {quantities[key].argument: value for key, value in self.values.items()}
+        return self.kind.load(**({"on": self.on} if self.kind.on_selection else {}), **arguments)
+
+
+def load_form(kinds: Mapping[str, LoadKind]) -> type[LoadTable]:
+    """Return the schema of `[[load]]` that takes these loads."""
+    keys = {key: one for name, kind in kinds.items() for key, one in kind.quantities(name).items()}
+    fields: dict[str, Any] = {}
+    for key, quantity in keys.items():
+        number: Any = _QUANTITIES[quantity.dimension]
+        form: Any = Annotated[list[number], Field(min_length=2, max_length=3)] if quantity.vector else number
+        fields[key] = (form | None, Field(None, description=quantity.about))
+    made: type[LoadTable] = create_model("LoadTable", __base__=LoadTable, __doc__=LoadTable.__doc__, **fields)
+    made.kinds = kinds
+    return made
 
 
 class SolverTable(Table):
@@ -482,7 +516,7 @@ class StudyTable(Table):
     region: list[RegionTable] = []
     section: SectionTable | None = None
     support: Annotated[list[SupportTable], Field(min_length=1)]
-    load: list[LoadTable] = []
+    load: list[load_form(LOADS)] = []  # type: ignore[valid-type]  # the type is made of the table
     solver: SolverTable = SolverTable()
     models: Annotated[dict[ModelName, ModelTable], Field(min_length=1)]
     compare: CompareTable = CompareTable()

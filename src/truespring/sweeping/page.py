@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truespring.report.figures import Drawing
+from truespring.report.drawing import Drawing
 from truespring.report.quantity import percent
 from truespring.report.shell import picture, render
 from truespring.report.style import figure_style

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.errors import TruespringError
 from truespring.outputs import Lock, Output
+from truespring.report.rows import table_of
 from truespring.report.summary import summary
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
 from truespring.sweeping.plan import Plan, Point, digests, make_plan
 from truespring.sweeping.pool import Failure, Pool, Report, require_dask
 from truespring.sweeping.store import CONVERGED, FAILED, Store
-from truespring.sweeping.table import rows_of, table_of, write_table
+from truespring.sweeping.table import rows_of, write_table
 from truespring.sweeping.values import choose, read_points
 
 if TYPE_CHECKING:

@@ -1,12 +1,10 @@
 """The tidy table of a sweep: a row a point, a column for each varied key and each figure of the summary."""
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    import polars
+from truespring.report.rows import table_of
 
 # What of each model, and of each comparison, is a column; a vector has one for each direction.
 _OF_MODELS = (
@@ -90,29 +88,6 @@ def _rank(value: Any) -> tuple[int, Any]:
     if isinstance(value, list):
         return 1, [_rank(one) for one in value]
     return (3, "") if value is None else (2, str(value))
-
-
-def table_of(rows: Sequence[Mapping[str, Any]]) -> "polars.DataFrame":
-    """Return rows as a table of polars; lists, and what differs in kind within a column, become texts."""
-    import polars
-
-    columns = {name: _column([row[name] for row in rows]) for name in rows[0]}
-    return polars.DataFrame([polars.Series(name, values, kind) for name, (values, kind) in columns.items()])
-
-
-def _column(values: Sequence[Any]) -> tuple[list[Any], Any]:
-    import polars
-
-    kinds = {type(value) for value in values if value is not None}
-    if kinds == {bool}:
-        return list(values), polars.Boolean
-    if kinds == {int}:
-        return list(values), polars.Int64
-    if kinds and kinds <= {int, float}:
-        return list(values), polars.Float64
-    return [
-        None if value is None else value if isinstance(value, str) else json.dumps(value) for value in values
-    ], polars.String
 
 
 def write_table(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:

@@ -1,9 +1,9 @@
 """Validity maps: up to which load, on which meshes, springs may be trusted."""
 
 from truespring.validity.axes import read_range as read_range
-from truespring.validity.loads import LOADS as LOADS
+from truespring.validity.loads import LOAD_TYPES as LOAD_TYPES
 from truespring.validity.mapping import map_validity as map_validity
 from truespring.validity.maps import Map as Map
-from truespring.validity.maps import Validity as Validity
+from truespring.validity.result import Validity as Validity
 from truespring.validity.writing import validity_values as validity_values
 from truespring.validity.writing import write_validity as write_validity

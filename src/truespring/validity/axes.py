@@ -145,7 +145,7 @@ def _depths(body: Body, given: Range | None) -> Axis:
     return Axis("depth", values, tuple(dict.fromkeys([*start, len(whole) - 1])), note)
 
 
-def chosen(names: Sequence[str | None]) -> list[str]:
+def check_axes(names: Sequence[str | None]) -> list[str]:
     """Return the axes chosen, checked; raise StudyError where they do not go together."""
     found = [known(name, {**NUMBERS, **NAMES}) for name in names if name is not None]
     if len(set(found)) < len(found):

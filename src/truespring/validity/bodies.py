@@ -7,7 +7,7 @@ from truespring.mesh import Mesh, box, nearest_node, rectangle, refined, refuse_
 from truespring.models import Fem
 from truespring.problem import Problem
 from truespring.study import Study, schema
-from truespring.validity.loads import LOADS, Asked, LoadType, scaled, standard
+from truespring.validity.loads import LOAD_TYPES, Asked, Bar, LoadType
 
 # Element counts off a whole number by less are whole.
 _WHOLE = 1e-6
@@ -128,11 +128,12 @@ class Body:
         problem, material = self.problem, self.problem.material
         assert material is not None and problem.section is not None  # `of` has asked for them
         modulus, _ = problem.section.apparent_moduli(material)
-        return standard(load.name, self.extent, problem.section.thickness, modulus)
+        assert load.standard is not None  # own loads are the study's
+        return load.standard(Bar(self.extent, problem.section.thickness, modulus))
 
     def probe_in(self, problem: Problem, load: LoadType) -> int | None:
         """Return the number of the probe's node, None where it is the one that moves most."""
-        place = self.probe if load.name == "own" else self.asked(load).probe
+        place = self.probe if load.own else self.asked(load).probe
         return None if place is None else nearest_node(problem.mesh, list(place))
 
     def _loaded(self, mesh: Mesh, load: LoadType, factor: float, poisson: float | None) -> Problem:
@@ -141,15 +142,15 @@ class Body:
             assert given.material is not None  # `of` has asked for it
             regions = [replace(one, material=replace(one.material, poisson=poisson)) for one in given.regions]
             given = replace(given, material=replace(given.material, poisson=poisson), regions=regions)
-        if load.name != "own":
+        if not load.own:
             asked = self.asked(load)
             given = replace(given, supports=asked.supports, loads=asked.loads)
-        return scaled(replace(given, mesh=mesh) if mesh is not given.mesh else given, factor)
+        return (replace(given, mesh=mesh) if mesh is not given.mesh else given).scaled(factor)
 
     def refuse(self, load: str) -> LoadType:
         """Return a load type by name; raise StudyError where it is not for this body."""
-        known = LOADS[load]
-        if self.shape is None and load != "own":
+        known = LOAD_TYPES[load]
+        if self.shape is None and not known.own:
             raise StudyError(
                 f"load {load}: standard loads are made for rectangles and boxes; a mesh from a file is mapped under "
                 "the study's own load only: --load own"

@@ -13,14 +13,15 @@ from truespring.errors import StudyError, TruespringError, nearest
 from truespring.models import LAWS
 from truespring.study import Study, read_study
 from truespring.sweeping import Failure, Pool
-from truespring.validity.axes import NAMES, Range, axis_of, chosen, known, range_of, sizes_to
+from truespring.validity.axes import NAMES, Range, axis_of, check_axes, known, range_of, sizes_to
 from truespring.validity.bodies import Body, Spot
-from truespring.validity.curve import Curve, curve
-from truespring.validity.loads import LOADS, LoadType
-from truespring.validity.maps import Key, Map, Validity
+from truespring.validity.deviation import Deviation, deviation_of
+from truespring.validity.loads import LOAD_TYPES, LoadType
+from truespring.validity.maps import Key, Map
 from truespring.validity.reference import Reference, solve_reference
 from truespring.validity.refine import Cells, Rows
-from truespring.validity.rules import Chosen, choose
+from truespring.validity.result import Validity
+from truespring.validity.rules import MappedSprings, mapped_springs
 from truespring.validity.solving import Solved, Task, run_task
 
 #: Told what is solved, how many paths are, and how many are known to be needed so far.
@@ -51,7 +52,7 @@ def map_validity(
     Args:
         study: a study file, or one that was read.
         law: of the reference, a key of LAWS; it is solved on finer and finer meshes until it changes no more.
-        loads: load types, keys of LOADS, or "all"; by default the study's own load.
+        loads: load types, keys of LOAD_TYPES, or "all"; by default the study's own load.
         rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs,
             or all rules where it has none.
         x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
@@ -133,7 +134,7 @@ class _Run:
         self.body = Body.of(study)
         if y == "depth" and x == "load" and self.body.shape is None:
             y = "rule"
-        chosen([x, y])
+        check_axes([x, y])
         self.x, self.y, self.law, self.pool = x, y, law, pool
         given = {known(name, {"load": 0, "depth": 0, "aspect": 0, "poisson": 0}): one for name, one in ranges.items()}
         self.ranges = {name: range_of(name, one) for name, one in given.items()}
@@ -143,19 +144,23 @@ class _Run:
         self.axes = {str(name): axis_of(str(name), self.body, self.ranges) for name in numbers}
         if not adaptive:
             self.axes = {name: replace(axis, start=tuple(range(len(axis.values)))) for name, axis in self.axes.items()}
-        names = list(LOADS) if loads and "all" in loads else list(loads or ["own"])
+        names = list(LOAD_TYPES) if loads and "all" in loads else list(loads or ["own"])
         if "all" in (loads or ()):
-            names = [one for one in names if self.body.dim in LOADS[one].dims and (self.body.shape or one == "own")]
+            names = [
+                one for one in names if self.body.dim in LOAD_TYPES[one].dims and (self.body.shape or one == "own")
+            ]
         for name in names:
-            if name not in LOADS:
-                raise StudyError(f"load '{name}' is unknown{nearest(name, LOADS)}; allowed: {', '.join(LOADS)}, all")
+            if name not in LOAD_TYPES:
+                raise StudyError(
+                    f"load '{name}' is unknown{nearest(name, LOAD_TYPES)}; allowed: {', '.join(LOAD_TYPES)}, all"
+                )
         self.loads = [self.body.refuse(name) for name in dict.fromkeys(names)]
-        self.rules = {one.name: one for one in choose(study, rules, "poisson" in self.axes)}
+        self.rules = {one.name: one for one in mapped_springs(study, rules, "poisson" in self.axes)}
         self.progress = progress or (lambda what, done, wanted: None)
         self.references: dict[tuple[str, float | None], Reference] = {}
         self.steps = {load.name: _STEPS[self.body.dim] for load in self.loads}
         self.spent: list[Reference] = []
-        self.found: dict[Key, Curve | Failure] = {}
+        self.found: dict[Key, Deviation | Failure] = {}
         self.solved, self.done, self.wanted = 0, 0, 0
 
     @property
@@ -177,7 +182,7 @@ class _Run:
                 values = {place: self._errors(Key(*pair, spot)) for place, spot in places.items()}
                 grids[pair].add(values)
         for (load, rule), grid in grids.items():
-            yield self._map(LOADS[load], self.rules[rule], grid)
+            yield self._map(LOAD_TYPES[load], self.rules[rule], grid)
 
     def _grid(self) -> Any:
         y = self.axes.get(self.y or "")
@@ -227,9 +232,11 @@ class _Run:
                     self.found[key] = Failure(str(error))
             for key, solved in self._run(tasks, lambda key: f"{key.load}: {key.rule}"):
                 self.solved += 1
-                self.found[key] = self._curve(key, solved)
+                self.found[key] = self._deviation(key, solved)
             short = [
-                key for key in tasks if isinstance(found := self.found[key], Curve) and found.interpolation > _BETWEEN
+                key
+                for key in tasks
+                if isinstance(found := self.found[key], Deviation) and found.interpolation > _BETWEEN
             ]
             keys = [key for key in short if self.steps[key.load] < _MOST_STEPS]
             for load in {key.load for key in keys}:
@@ -241,7 +248,7 @@ class _Run:
         wanted = {(key.load, key.spot.poisson) for key in keys} - self.references.keys()
         last = self.ranges["load"].last if "load" in self.ranges else None
         jobs = {
-            (load, poisson): _Wanted(self.body, LOADS[load], self.law, poisson, last, self.steps[load])
+            (load, poisson): _Wanted(self.body, LOAD_TYPES[load], self.law, poisson, last, self.steps[load])
             for load, poisson in sorted(wanted, key=str)
         }
         for key, found in self._run(jobs, lambda key: f"{key[0]}: reference"):
@@ -252,17 +259,17 @@ class _Run:
 
     def _task(self, key: Key) -> Task:
         reference = self.references[key.load, key.spot.poisson]
-        problem = self.body.springs_problem(LOADS[key.load], reference.factor, key.spot)
+        problem = self.body.springs_problem(LOAD_TYPES[key.load], reference.factor, key.spot)
         return Task(problem, self.rules[key.rule].springs, self.steps[key.load])
 
-    def _curve(self, key: Key, solved: Any) -> Curve | Failure:
+    def _deviation(self, key: Key, solved: Any) -> Deviation | Failure:
         if isinstance(solved, Failure):
             return solved
         reference = self.references[key.load, key.spot.poisson]
         if not solved.states:
             return Failure(f"the springs have no equilibrium under a small load: {solved.end or 'unstable at rest'}")
-        probe = self.body.probe_in(solved.path.problem, LOADS[key.load])
-        return curve(solved, reference, sizes_to(reference.asked), probe)
+        probe = self.body.probe_in(solved.path.problem, LOAD_TYPES[key.load])
+        return deviation_of(solved, reference, sizes_to(reference.asked), probe)
 
     def _run(self, jobs: Mapping[Any, Any], say: Callable[[Any], str]) -> Iterator[tuple[Any, Any]]:
         self.wanted += len(jobs)
@@ -282,7 +289,7 @@ class _Run:
                 found = Failure(str(error))
             yield key, found
 
-    def _map(self, load: LoadType, rule: Chosen, grid: Any) -> Map:
+    def _map(self, load: LoadType, rule: MappedSprings, grid: Any) -> Map:
         here = {key.spot: one for key, one in self.found.items() if (key.load, key.rule) == (load.name, rule.name)}
         references = {poisson: one for (name, poisson), one in self.references.items() if name == load.name}
         y = self.axes.get(self.y or "")
@@ -304,7 +311,7 @@ class _Run:
             y=along,
             errors=errors,
             smooth=smooth,
-            curves={spot: one for spot, one in here.items() if isinstance(one, Curve)},
+            deviations={spot: one for spot, one in here.items() if isinstance(one, Deviation)},
             failures={spot: one.reason for spot, one in here.items() if isinstance(one, Failure)},
             references=references,
             full=full,

@@ -1,22 +1,16 @@
-"""The validity map: where springs are within 1, 2, 5 and 10 % of a converged reference."""
+"""Data of validity maps: the errors of springs against a converged reference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from truespring.arrays import Floats
 from truespring.validity.axes import Axis
 from truespring.validity.bodies import Body, Spot
-from truespring.validity.curve import Curve
+from truespring.validity.deviation import Deviation
 from truespring.validity.loads import LoadType
 from truespring.validity.reference import Reference
-from truespring.validity.rules import Chosen
-
-if TYPE_CHECKING:
-    import polars
-
-    from truespring.report.sheet import Sheet
+from truespring.validity.rules import MappedSprings
 
 
 class Key(NamedTuple):
@@ -36,19 +30,19 @@ class Map:
         x, y: the values along both axes, shapes (n_x,) and (n_y,); y is (0,) where there is one row only.
         errors: relative, shape (n_y, n_x); not a number where springs or reference do not reach.
         smooth: values along y, and errors there, between those of the grid too, for lines and pictures.
-        curves: what was solved, by its place along y, or along x and y where x is not the load.
+        deviations: what was solved, by its place along y, or along x and y where x is not the load.
         failures: where springs cannot be had, and why.
         references: by Poisson's ratio.
         full: the number of springs paths that the whole grid would have taken.
     """
 
     load: LoadType
-    rule: Chosen
+    rule: MappedSprings
     x: Floats
     y: Floats
     errors: Floats
     smooth: tuple[Floats, Floats]
-    curves: Mapping[Spot, Curve]
+    deviations: Mapping[Spot, Deviation]
     failures: Mapping[Spot, str]
     references: Mapping[float | None, Reference]
     full: int
@@ -56,11 +50,11 @@ class Map:
     @property
     def refused(self) -> str:
         """Why there is no map at all, empty where there is one."""
-        return "" if self.curves else next(iter(self.failures.values()))
+        return "" if self.deviations else next(iter(self.failures.values()))
 
 
 @dataclass(frozen=True, eq=False)
-class Validity:
+class Maps:
     """Maps of a study.
 
     Attributes:
@@ -95,37 +89,3 @@ class Validity:
     def converged(self) -> bool:
         """Whether every reference is, and there is a map of all that was asked for."""
         return all(one.converged for one in self.references) and not any(one.refused for one in self.maps)
-
-    @property
-    def verdicts(self) -> list[str]:
-        """A sentence or two a map: up to where which springs may be trusted."""
-        from truespring.validity.sentences import verdict
-
-        return [verdict(self, one) for one in self.maps]
-
-    @property
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each load level of each path of springs, as in validity.csv."""
-        from truespring.validity.writing import rows
-
-        return list(rows(self))
-
-    def table(self) -> "polars.DataFrame":
-        """Return `rows` as a table of polars."""
-        from truespring.sweeping.table import table_of
-
-        return table_of(self.rows)
-
-    def figures(self) -> "dict[str, Sheet]":
-        """Return the pictures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
-        from truespring.report.style import figure_style
-        from truespring.validity.picture import figures
-
-        with figure_style():
-            return dict(figures(self))
-
-    def write(self, out: str | Path) -> dict[str, Path]:
-        """Write validity.json, validity.csv, figures and report.html into out/STEM; return where each is."""
-        from truespring.validity.writing import write_validity
-
-        return write_validity(self, Path(out))

@@ -11,7 +11,7 @@ from truespring.comparison import compare
 from truespring.converging.settling import Settling, settle
 from truespring.errors import MeshError, StudyError
 from truespring.validity.bodies import Body
-from truespring.validity.loads import LoadType, sizes
+from truespring.validity.loads import Course, LoadType
 from truespring.validity.solving import Solved, Task, conjugate_force, run_task
 
 #: What the reference may still be off, relative, in the plane and in space: a fifth, and half of the smallest line.
@@ -161,7 +161,7 @@ class _Search:
         solved = run_task(Task(problem, self.body.reference_model(self.law), self.steps))
         self.solves, self.seconds = self.solves + 1, self.seconds + solved.seconds
         if not solved.states:
-            what = f"under {self.load.name}" if self.load.name != "own" else "under the study's own load"
+            what = "under the study's own load" if self.load.own else f"under {self.load.name}"
             raise StudyError(f"the reference {solved.path.label} has no equilibrium {what}, however small that is")
         return solved
 
@@ -173,16 +173,15 @@ class _Search:
             moved = np.linalg.norm(solved.path.states[-1].displacement, axis=1)
             probe = int(moved.argmax())
         displacements = np.array([state.displacement for state in solved.states])
-        found = sizes(self.load, problem, displacements, solved.levels, probe, self.body.extent)
-        return found
+        return self.load.sizes(Course(problem, displacements, solved.levels, probe, self.body.extent))
 
     def factor(self, asked: float | None) -> tuple[float, float]:
         """The share of the load at which the reference reaches a size on a coarse mesh, and that size."""
         if asked is None:
             return 1.0, float(self.sizes(self.solve(1.0, 1))[-1])
-        if self.load.name != "own" and self.load.moved:
+        if self.load.moved:
             return asked, asked
-        factor = 1.0 if self.load.name == "own" else asked
+        factor = 1.0 if self.load.own else asked
         for _ in range(_MOST_TRIALS):
             solved = self.solve(factor, 1)
             reached, levels = self.sizes(solved), solved.levels

@@ -25,7 +25,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class MappedSprings:
     """Springs to be mapped: their `name` in files, themselves, and the names of others that are the same here."""
 
     name: str
@@ -46,7 +46,7 @@ class Chosen:
         return words + (" with a volume term" if one.volume else "")
 
 
-def choose(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> list[Chosen]:
+def mapped_springs(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> list[MappedSprings]:
     """Return the springs asked for: names of models of the study, rules, "RULE+volume", or "all"; else the study's.
 
     "all" are the rules made for the mesh, each once, and with a volume term those that can have one where Poisson's
@@ -110,7 +110,7 @@ def _goes(problem: Problem, springs: Springs) -> bool:
     return True
 
 
-def _once(found: dict[str, Springs], problem: Problem, study: Study, varies_poisson: bool) -> list[Chosen]:
+def _once(found: dict[str, Springs], problem: Problem, study: Study, varies_poisson: bool) -> list[MappedSprings]:
     """Each of the springs once: others that give the same stiffness here are named beside the first."""
     several: list[tuple[list[str], Springs]] = []
     for name, springs in found.items():
@@ -119,7 +119,7 @@ def _once(found: dict[str, Springs], problem: Problem, study: Study, varies_pois
             twin[0].append(name)
         elif springs not in [one for _, one in several]:
             several.append(([name], springs))
-    return [Chosen(names[0], springs, tuple(names[1:])) for names, springs in several]
+    return [MappedSprings(names[0], springs, tuple(names[1:])) for names, springs in several]
 
 
 def _same(problem: Problem, one: Springs, other: Springs) -> bool:

@@ -7,9 +7,9 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.models import Fem
 from truespring.report.quantity import percent, tolerance_percent
-from truespring.validity.curve import Curve
+from truespring.validity.deviation import Deviation
 from truespring.validity.lines import spans
-from truespring.validity.maps import Map, Validity
+from truespring.validity.maps import Map, Maps
 from truespring.validity.reference import Reference
 from truespring.validity.refine import LINES
 
@@ -19,7 +19,7 @@ _SAME = 0.02
 _EXACT = 0.005
 
 
-def verdict(validity: Validity, one: Map) -> str:
+def verdict(validity: Maps, one: Map) -> str:
     """Return the verdict of a map."""
     if one.refused:
         return f"{one.load.did}, {one.rule.words} cannot be had: {one.refused}."
@@ -27,7 +27,7 @@ def verdict(validity: Validity, one: Map) -> str:
     return " ".join([*said, *_ends(one), *_left_out(one), *_unsure(one)])
 
 
-def _by_load(validity: Validity, one: Map) -> str:
+def _by_load(validity: Maps, one: Map) -> str:
     """Up to which size on which rows."""
     law, line = Fem(validity.law).label, validity.tolerance
     rows = [spans(one.x, errors, line) for errors in one.errors]
@@ -47,7 +47,7 @@ def _by_load(validity: Validity, one: Map) -> str:
 
 def _moving(one: Map) -> str:
     """Of the study's own load, what its size is."""
-    return f", which moves the probe by up to {one.load.told(float(one.x[-1]))}" if one.load.name == "own" else ""
+    return f", which moves the probe by up to {one.load.told(float(one.x[-1]))}" if one.load.own else ""
 
 
 def _others(one: Map, line: float) -> list[float]:
@@ -57,7 +57,7 @@ def _others(one: Map, line: float) -> list[float]:
     return [*met[:1], *wider[:1]]
 
 
-def _where(validity: Validity, one: Map, rows: Sequence[list[tuple[float, float]]], first: bool) -> str:
+def _where(validity: Maps, one: Map, rows: Sequence[list[tuple[float, float]]], first: bool) -> str:
     """Over which sizes on which rows: those with the whole range, else the best of all."""
     span = float(one.x[-1])
     whole = [bool(found) and found[0][0] <= _SAME * span and found[0][1] >= (1 - _SAME) * span for found in rows]
@@ -95,7 +95,7 @@ def _number(one: Map, size: float) -> str:
     return told.partition(" ")[0]
 
 
-def _every(validity: Validity, one: Map, first: bool) -> str:
+def _every(validity: Maps, one: Map, first: bool) -> str:
     """Say that all rows are alike."""
     if len(one.y) < 2 or not first:
         return ""
@@ -107,13 +107,13 @@ def _every(validity: Validity, one: Map, first: bool) -> str:
     return f" {what[str(validity.y)]}"
 
 
-def _at_row(validity: Validity, one: Map, row: int) -> str:
+def _at_row(validity: Maps, one: Map, row: int) -> str:
     if len(one.y) < 2 or np.nanmax(np.nanmin(one.errors, axis=1)) - np.nanmin(one.errors) < 1e-4:
         return ""
     return f" {_run(validity.y, one.y[row], one.y[row])}"
 
 
-def _rows(validity: Validity, one: Map, chosen: Sequence[bool], first: bool = True) -> str:
+def _rows(validity: Maps, one: Map, chosen: Sequence[bool], first: bool = True) -> str:
     """Rows in words, runs of neighbours as from and to."""
     runs: list[list[float]] = []
     for place, (value, there) in enumerate(zip(one.y, chosen, strict=True)):
@@ -150,7 +150,7 @@ def _run(axis: str | None, first: float, last: float) -> str:
 
 def _small(one: Map) -> list[str]:
     """How stiff the springs are under a small load."""
-    found = {spot: float(curve.stiffness_on_grid[0]) for spot, curve in one.curves.items()}
+    found = {spot: float(deviation.stiffness_on_grid[0]) for spot, deviation in one.deviations.items()}
     low, high = min(found.values()), max(found.values())
     if high - low < 2 * _EXACT:
         return [f"Under a small load they are {_stiff((low + high) / 2)}."]
@@ -185,9 +185,9 @@ def _ends(one: Map) -> list[str]:
                 "nothing to compare with."
             )
             break
-    ended = {spot: curve for spot, curve in one.curves.items() if curve.end}
+    ended = {spot: deviation for spot, deviation in one.deviations.items() if deviation.end}
     if ended:
-        first: tuple[object, Curve] = min(ended.items(), key=lambda item: item[1].reached)
+        first: tuple[object, Deviation] = min(ended.items(), key=lambda item: item[1].reached)
         said.append(f"The springs give way at {one.load.told(first[1].reached)}{_spot(first[0])}: {first[1].end}.")
     return said
 
@@ -196,9 +196,8 @@ def _left_out(one: Map) -> list[str]:
     if not one.failures:
         return []
     spot, reason = next(iter(one.failures.items()))
-    return [
-        f"At {len(one.failures)} of {len(one.failures) + len(one.curves)} places{_spot(spot)} there are none: {reason}."
-    ]
+    places = len(one.failures) + len(one.deviations)
+    return [f"At {len(one.failures)} of {places} places{_spot(spot)} there are none: {reason}."]
 
 
 def _unsure(one: Map) -> list[str]:
@@ -215,7 +214,7 @@ def unconverged(reference: Reference) -> str:
     )
 
 
-def _by_mesh(validity: Validity, one: Map) -> str:
+def _by_mesh(validity: Maps, one: Map) -> str:
     """Where along x at the last size of the load, row by row if there are rows."""
     law, line = Fem(validity.law).label, validity.tolerance
     size = max(reference.reached for reference in one.references.values())
@@ -260,7 +259,7 @@ def _grouped(
     return groups
 
 
-def headline(validity: Validity, one: Map) -> str:
+def headline(validity: Maps, one: Map) -> str:
     """Return the verdict in short, for the head of a picture."""
     if one.refused:
         return one.refused
@@ -269,7 +268,7 @@ def headline(validity: Validity, one: Map) -> str:
     return f"{first[0].upper()}{first[1:]}."
 
 
-def row_words(validity: Validity, one: Map, with_range: bool) -> str:
+def row_words(validity: Maps, one: Map, with_range: bool) -> str:
     """Return what a row of an axis of names is called, with the range of its load where loads differ."""
     if validity.y == "load-type":
         return f"{one.load.name}, to {one.load.told(float(one.x[-1]))}" if with_range else one.load.name

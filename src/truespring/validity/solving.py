@@ -13,7 +13,6 @@ from truespring.models import Model
 from truespring.potential import Loading, Potential, Refined
 from truespring.problem import Problem
 from truespring.solvers import Equilibrium, Geometry, Newton, Reporter
-from truespring.validity.loads import scaled
 
 #: The share of the load at which a body answers as linear theory has it, to this share itself.
 SMALL = 0.01
@@ -92,7 +91,7 @@ class Solved:
 def run_task(task: Task) -> Solved:
     """Solve a task."""
     started = time.perf_counter()
-    small = solve(scaled(task.problem, SMALL), task.model, Newton(load_steps=1))
+    small = solve(task.problem.scaled(SMALL), task.model, Newton(load_steps=1))
     path = solve(task.problem, task.model, _UpToTheEnd(task.steps, max_iterations=_ITERATIONS, max_cutbacks=_CUTBACKS))
     return Solved(_alone(path), _alone(small), time.perf_counter() - started)
 

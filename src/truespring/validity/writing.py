@@ -10,20 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from truespring.models import Fem
 from truespring.outputs import Output
-from truespring.report.figures import Drawing
-from truespring.report.quantity import percent, significant
-from truespring.report.shell import picture, render, versions
-from truespring.report.style import figure_style
-from truespring.validity.curve import Curve
+from truespring.report.drawing import drawings, save_drawings
+from truespring.report.shell import versions
+from truespring.validity.deviation import Deviation
+from truespring.validity.figures import figures as validity_figures
 from truespring.validity.lines import polylines
-from truespring.validity.loads import LOADS
-from truespring.validity.maps import Map, Validity
-from truespring.validity.picture import figures
+from truespring.validity.maps import Map, Maps
+from truespring.validity.page import render_validity
 from truespring.validity.reference import Reference
 from truespring.validity.refine import LINES
-from truespring.validity.sentences import unconverged, verdict
+from truespring.validity.sentences import verdict
 
 #: Version of the form of validity.json; told in it.
 FORM = 1
@@ -44,8 +41,11 @@ COLUMNS = (
     "end",
 )
 
+# Attributes of a Deviation that fill the columns from "size" on.
+_OF_LEVELS = ("sizes", "rms_errors", "probe_errors", "force_errors", "stiffness")
 
-def write_validity(validity: Validity, out: Path, command: str | None = None) -> dict[str, Path]:
+
+def write_validity(validity: Maps, out: Path, command: str | None = None) -> dict[str, Path]:
     """Write validity.json, validity.csv, figures/ and report.html into out/STEM; return where each is.
 
     `command` is what does it again, where it was a command line.
@@ -56,31 +56,23 @@ def write_validity(validity: Validity, out: Path, command: str | None = None) ->
     return {name: output.folder / name for name in ("validity.json", "validity.csv", "figures", "report.html")}
 
 
-def _write(validity: Validity, folder: Path, command: str | None) -> None:
-    (folder / "figures").mkdir()
+def _write(validity: Maps, folder: Path, command: str | None) -> None:
     text = json.dumps(validity_values(validity), indent=1, allow_nan=False)
     (folder / "validity.json").write_text(text + "\n", encoding="utf-8")
     with (folder / "validity.csv").open("w", newline="", encoding="utf-8") as stream:
         table = csv.DictWriter(stream, COLUMNS)
         table.writeheader()
         table.writerows(rows(validity))
-    with figure_style():
-        drawings = {
-            name: Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width) for name, sheet in figures(validity)
-        }
-    for name, drawing in drawings.items():
-        (folder / "figures" / f"{name}.png").write_bytes(drawing.png)
-        (folder / "figures" / f"{name}.svg").write_bytes(drawing.svg)
-    (folder / "report.html").write_text(_page(validity, drawings, command), encoding="utf-8")
+    figures = drawings(validity_figures(validity))
+    save_drawings(figures, folder / "figures")
+    (folder / "report.html").write_text(render_validity(validity, figures, command), encoding="utf-8")
 
 
-def rows(validity: Validity) -> Iterator[dict[str, Any]]:
+def rows(validity: Maps) -> Iterator[dict[str, Any]]:
     """Yield a row for each load level of each path of springs, its keys COLUMNS; None where nothing is known."""
     for one in validity.maps:
-        for spot, curve in sorted(one.curves.items(), key=lambda item: str(item[0])):
-            numbers = np.column_stack(
-                [curve.sizes, curve.rms_errors, curve.probe_errors, curve.force_errors, curve.stiffness]
-            )
+        for spot, deviation in sorted(one.deviations.items(), key=lambda item: str(item[0])):
+            numbers = np.column_stack([getattr(deviation, name) for name in _OF_LEVELS])
             for level in numbers.tolist():
                 told = [value if math.isfinite(value) else None for value in level]
                 yield {
@@ -89,13 +81,13 @@ def rows(validity: Validity) -> Iterator[dict[str, Any]]:
                     "depth": spot.depth or validity.body.depth or None,
                     "aspect": validity.body.aspect if spot.aspect is None else spot.aspect,
                     "poisson": validity.body.poisson if spot.poisson is None else spot.poisson,
-                    "n_nodes": curve.n_nodes,
+                    "n_nodes": deviation.n_nodes,
                     **dict(zip(COLUMNS[6:11], told, strict=True)),
-                    "end": curve.end,
+                    "end": deviation.end,
                 }
 
 
-def validity_values(validity: Validity) -> dict[str, Any]:
+def validity_values(validity: Maps) -> dict[str, Any]:
     """Return all of a map as values that JSON can hold; docs/validity.md describes them."""
     found = {
         "form": FORM,
@@ -120,7 +112,7 @@ def validity_values(validity: Validity) -> dict[str, Any]:
     return dict(_plain(found))
 
 
-def _map_values(validity: Validity, one: Map) -> dict[str, Any]:
+def _map_values(validity: Maps, one: Map) -> dict[str, Any]:
     springs = one.rule.springs
     return {
         "load": one.load.name,
@@ -136,10 +128,10 @@ def _map_values(validity: Validity, one: Map) -> dict[str, Any]:
         "x": one.x,
         "y": one.y,
         "errors": one.errors,
-        "lines": {f"{line:g}": parts for line, parts in polylines(one).items()} if one.curves else {},
-        "points": [{**_spot(spot), **_curve_values(curve)} for spot, curve in one.curves.items()],
+        "lines": {f"{line:g}": parts for line, parts in polylines(one).items()} if one.deviations else {},
+        "points": [{**_spot(spot), **_deviation_values(deviation)} for spot, deviation in one.deviations.items()],
         "failures": [{**_spot(spot), "reason": reason} for spot, reason in one.failures.items()],
-        "solved": len(one.curves),
+        "solved": len(one.deviations),
         "whole_grid": one.full,
     }
 
@@ -148,17 +140,17 @@ def _spot(spot: Any) -> dict[str, Any]:
     return {name: getattr(spot, name) for name in ("depth", "aspect", "poisson")}
 
 
-def _curve_values(curve: Curve) -> dict[str, Any]:
+def _deviation_values(deviation: Deviation) -> dict[str, Any]:
     return {
-        "n_nodes": curve.n_nodes,
-        "reached": curve.reached,
-        "end": curve.end or None,
-        "interpolation_error": curve.interpolation,
-        "size": curve.sizes,
-        "rms_error": curve.rms_errors,
-        "probe_error": curve.probe_errors,
-        "force_error": curve.force_errors,
-        "stiffness": curve.stiffness,
+        "n_nodes": deviation.n_nodes,
+        "reached": deviation.reached,
+        "end": deviation.end or None,
+        "interpolation_error": deviation.interpolation,
+        "size": deviation.sizes,
+        "rms_error": deviation.rms_errors,
+        "probe_error": deviation.probe_errors,
+        "force_error": deviation.force_errors,
+        "stiffness": deviation.stiffness,
     }
 
 
@@ -193,67 +185,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.7g}") if math.isfinite(value) else None
     return value
-
-
-# --- the page -----------------------------------------------------------------------------------------
-
-
-def _page(validity: Validity, drawings: Mapping[str, Drawing], command: str | None) -> str:
-    return render(
-        "validity/page.html.j2",
-        command,
-        title=validity.title,
-        law=Fem(validity.law).label,
-        groups=list(_groups(validity, drawings)),
-        several=len(validity.maps) > 1,
-        converged=all(one.converged for one in validity.references),
-        warnings=[*_warnings(validity), *validity.notes],
-        references=[_reference_row(one) for one in validity.references],
-        by_load=validity.x == "load",
-        moved=any(one.driven for one in validity.references),
-        given=any(not one.driven for one in validity.references),
-        solves=validity.solves,
-        full=validity.full,
-        seconds=significant(validity.seconds, 2),
-    )
-
-
-def _groups(validity: Validity, drawings: Mapping[str, Drawing]) -> Iterator[dict[str, Any]]:
-    """What is told together: of one load type its verdicts and pictures, or of one rule where loads lie along y."""
-    by_rule = validity.y == "load-type"
-    for name in dict.fromkeys(one.rule.name if by_rule else one.load.name for one in validity.maps):
-        maps = [one for one in validity.maps if (one.rule.name if by_rule else one.load.name) == name]
-        begins = f"validity_{name.replace('+', '_')}"
-        kept = [drawn for stem, drawn in drawings.items() if stem == begins or stem.startswith(f"{begins}_")]
-        yield {
-            "title": maps[0].rule.words[0].upper() + maps[0].rule.words[1:] if by_rule else maps[0].load.did,
-            "how": "" if by_rule else maps[0].load.how,
-            "verdicts": [verdict(validity, one).partition(one.rule.words) for one in maps],
-            "same": [
-                f"{', '.join(one.rule.same)}: the same springs here as {one.rule.name}" for one in maps if one.rule.same
-            ],
-            "pictures": [picture(drawn) for drawn in kept],
-        }
-
-
-def _warnings(validity: Validity) -> Iterator[str]:
-    for one in validity.references:
-        if not one.converged:
-            yield f"{LOADS[one.load.name].did}: {unconverged(one)}"
-        if one.end:
-            yield (
-                f"{one.load.did}: {Fem(one.law).label} ends at {one.load.told(one.reached)} of the "
-                f"{one.load.told(one.asked)} asked for ({one.end}); what lies beyond is hatched"
-            )
-
-
-def _reference_row(one: Reference) -> dict[str, str]:
-    return {
-        "load": one.load.name + ("" if one.poisson is None else f", Poisson's ratio {one.poisson:.3g}"),
-        "reached": one.load.told(one.reached),
-        "depth": "–" if one.elements is None else str(one.elements),
-        "nodes": " → ".join(f"{count:,}" for count in one.n_nodes),
-        "error": percent(one.error) if one.error > 1e-9 else "exact",
-        "order": "–" if one.order is None else f"{one.order:.1f}",
-        "converged": "converged" if one.converged else "not converged",
-    }

@@ -1,47 +1,37 @@
-"""Loads that follow the body, as potentials: a pressure on its surface, a moment on a face of a plane body.
+"""A pressure that follows the body, as a potential: pressure times the volume that its surface sweeps.
 
-A load has a potential where its work does not depend on the way: of a pressure, where the edge of the surface is held
-or slides within planes, or there is none; of a moment, in the plane. Others are refused.
+It has one where the edge of the surface is held or slides within planes, or where the surface has no edge; elsewhere
+its work depends on the path, and it is an error.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ProblemError
-from truespring.loading.dead import Body
+from truespring.loading.body import Body
+from truespring.loading.load import FacePressure, FollowingLoad, Mark
 from truespring.loading.values import number
+from truespring.loading.words import selection_words
 from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
 from truespring.mesh.rows import ascending, distinct_rows
-from truespring.potential import Pattern, Potential, SparseMatrix
+from truespring.potential import Pattern, SparseMatrix
 
-# Forces of a pressure are polynomials of second order along a straight way: two Gauss points give its work exactly.
+# Forces of a pressure are polynomials of second order along a straight line: two Gauss points integrate its work
+# exactly.
 _GAUSS = ((0.5 - 0.5 / np.sqrt(3), 0.5), (0.5 + 0.5 / np.sqrt(3), 0.5))
-# The tangent of a load that has a potential is symmetric to this share of its size, at a state deformed by a
-# share of the body's size.
+# The tangent of a load that has a potential is symmetric to this share of its size, at a state deformed by this share
+# of the body's size.
 _SYMMETRIC, _DEFORMED = 1e-9, 0.05
-
-
-@runtime_checkable
-class FollowingLoad(Protocol):
-    """A load that follows the body."""
-
-    def following(self, body: Body, held: Bools) -> Potential:
-        """Return the potential on `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
-        ...
-
-    def rim(self, mesh: Mesh) -> Ints:
-        """Return the edges around the surface in space, by their ends, shape (n, 2)."""
-        ...
+# A resultant below this share of the forces is zero: the pressure acts all around.
+_BALANCED = 1e-6
 
 
 @dataclass(frozen=True)
-class Pressure:
+class Pressure(FollowingLoad):
     """A `pressure` [Pa] that presses on the facets of the boundary `on` and stays normal to them as they move.
 
     `on` is a group of facets, or a side, another group of the mesh, a Plane, a Box or node numbers: all facets of the
@@ -50,6 +40,7 @@ class Pressure:
 
     on: Selection
     pressure: float
+    instead = "a traction, which is dead"
 
     def following(self, body: Body, held: Bools) -> "SurfacePressure":
         """Return the potential; raise ProblemError where the load has none."""
@@ -69,35 +60,28 @@ class Pressure:
         found = distinct_rows(ascending(edges.T))
         return np.asarray(edges[found.first[found.count == 1]])
 
+    def scaled(self, factor: float) -> Self:
+        """Return the load times a factor."""
+        return replace(self, pressure=factor * self.pressure)
 
-@dataclass(frozen=True)
-class Moment:
-    """A `moment` [N m], anticlockwise, on the nodes `on` of a plane body, that turns with them.
+    def mark(self, body: Body, held: Bools) -> Mark:
+        """Return an arrow along the total force on the undeformed body, or at one node where that is zero."""
+        force = -self.following(body, held).gradient(body.nodes)
+        nodes = loaded(body.mesh, self.on)
+        total = force.sum(axis=0)
+        if np.linalg.norm(total) < _BALANCED * np.abs(force).sum():  # all around: one place stands for all
+            nodes = nodes[[body.mesh.nodes[nodes, 0].argmax()]]
+            total = force[nodes[0]]
+        return Mark(nodes, total, "p", self.pressure, "Pa")
 
-    It does work on their mean rotation; while they stay on a line its forces are a linear stress across it.
-    """
+    def words(self) -> str:
+        """Return the pressure and where it acts."""
+        return f"pressure {self.pressure:g} Pa on {selection_words(self.on)}"
 
-    on: Selection
-    moment: float
-
-    def following(self, body: Body, held: Bools) -> "FaceMoment":
-        """Return the potential; raise ProblemError where the load has none."""
-        moment = number(self.moment, "moment", "N m")
-        mesh = body.mesh
-        if mesh.dim == 3:
-            raise ProblemError(
-                "a moment in space has no potential: its work depends on the order of turns about several axes; "
-                "prescribe the rotation of the face instead (a support with rotation and axis)"
-            )
-        nodes = loaded(mesh, self.on)
-        if len(nodes) < 2:
-            raise ProblemError("a moment turns a face: select at least two nodes")
-        way = _way_to(mesh, nodes, held[: mesh.n_nodes])
-        return FaceMoment(body.nodes, *body.shares(self.on), moment, way)
-
-    def rim(self, mesh: Mesh) -> Ints:
-        """Return no edges: a moment acts in the plane."""
-        return np.zeros((0, 2), dtype=np.int64)
+    def cards(self, mesh: Mesh) -> tuple[FacePressure]:
+        """Return the pressure on each facet."""
+        facets = outer_facets(mesh, self.on)
+        return (FacePressure(facets, np.full(len(facets), float(self.pressure))),)
 
 
 # The cell that a facet of so many nodes is, by dimensions of the body, and Gauss points along its axes: forces of a
@@ -205,85 +189,3 @@ def _cross_matrix(v: Floats) -> Floats:
         j, k = (i + 1) % 3, (i + 2) % 3
         matrix[..., i, j], matrix[..., i, k] = -v[..., k], v[..., j]
     return matrix
-
-
-class FaceMoment:
-    """Minus a moment times the mean rotation of nodes in the plane: the angle that fits d = R D best."""
-
-    def __init__(self, nodes: Floats, face: Ints, weights: Floats, moment: float, way: "_Way") -> None:
-        """Take reference positions [m], the nodes of the face, the weight of each, and a way to it from elsewhere."""
-        self.nodes, self._face, self._moment, self._way = nodes, face, moment, way
-        arms = nodes[face] - weights @ nodes[face] / weights.sum()
-        self._arms = weights[:, None] * arms
-        self._across = self._arms[:, ::-1] * np.array([-1.0, 1.0])
-        self._pattern = Pattern(face[None], *nodes.shape)
-
-    def rotation(self, positions: Floats) -> float:
-        """The rotation of the face since rest [rad], whole turns included."""
-        cosine, sine = self._parts(positions)
-        within = float(np.arctan2(sine, cosine))
-        return within + 2 * np.pi * round((self._way.rotation(positions) - within) / (2 * np.pi))
-
-    def _parts(self, positions: Floats) -> tuple[float, float]:
-        face = positions[self._face]
-        return float((self._arms * face).sum()), float((self._across * face).sum())
-
-    def energy(self, positions: Floats) -> float:
-        """Minus the work of the moment [J]."""
-        return -self._moment * self.rotation(positions)
-
-    def gradient(self, positions: Floats) -> Floats:
-        """Minus the force on the nodes [N], shape (n_nodes, dim)."""
-        cosine, sine = self._parts(positions)
-        force = np.zeros(self.nodes.shape)
-        slope = (cosine * self._across - sine * self._arms) / (cosine**2 + sine**2)
-        force[self._face] = -self._moment * slope
-        return force
-
-    def hessian(self, positions: Floats) -> SparseMatrix:
-        """The derivative of the gradient [N/m]."""
-        cosine, sine = self._parts(positions)
-        size = cosine**2 + sine**2
-        along, across = self._arms.ravel(), self._across.ravel()
-        slope = (cosine * across - sine * along) / size
-        growth = 2 * (cosine * along + sine * across) / size
-        # The derivative of (C s - S c) / r^2: s c^T - c s^T is what of it is not symmetric, and cancels.
-        block = (np.outer(across, along) - np.outer(along, across)) / size - np.outer(slope, growth)
-        return self._pattern.summed(lambda first, last: -self._moment * block[None])
-
-
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """Nodes from one that turns little to a face, step by step, and the neighbours of each.
-
-    The rotation of a face is known up to whole turns; that of each node on the way differs little from the last one's.
-    """
-
-    nodes: Floats
-    pairs: tuple[Ints, ...]
-
-    def rotation(self, positions: Floats) -> float:
-        angles = []
-        for pairs in self.pairs:
-            rest, now = (places[pairs[:, 1]] - places[pairs[:, 0]] for places in (self.nodes, positions))
-            sine = float((rest[:, 0] * now[:, 1] - rest[:, 1] * now[:, 0]).sum())
-            angles.append(float(np.arctan2(sine, (rest * now).sum())))
-        steps = (b - a for a, b in pairwise(angles))
-        return angles[0] + sum(step - 2 * np.pi * round(step / (2 * np.pi)) for step in steps)
-
-
-def _way_to(mesh: Mesh, face: Ints, held: Bools) -> _Way:
-    """The way from the nearest held node, along edges of the mesh."""
-    edges = mesh.edges
-    graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(mesh.n_nodes,) * 2)
-    goal = int(face[np.linalg.norm(mesh.nodes[face] - mesh.nodes[face].mean(axis=0), axis=1).argmin()])
-    asked: Any = {"directed": False, "indices": goal, "unweighted": True, "return_predecessors": True}
-    distance, before = csgraph.dijkstra(sparse.csr_array(graph), **asked)
-    known = np.flatnonzero(held.all(axis=1) if held.all(axis=1).any() else held.any(axis=1))
-    node = int(known[distance[known].argmin()])
-    way = [node]
-    while node != goal and before[node] >= 0:
-        node = int(before[node])
-        way.append(node)
-    ends = np.concatenate([edges, edges[:, ::-1]])
-    return _Way(mesh.nodes, tuple(ends[ends[:, 0] == node] for node in way))

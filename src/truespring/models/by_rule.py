@@ -7,7 +7,7 @@ from truespring.potential import Potential
 from truespring.problem import Problem
 
 
-class Lattice(Protocol):
+class SpringsByRule(Protocol):
     """Springs whose stiffness follows from the material, element by element: `Springs`, and what is like them."""
 
     @property
@@ -38,7 +38,7 @@ class Lattice(Protocol):
         """Return the modulus of the area or volume term of each element [Pa], shape (n_elements,)."""
         ...
 
-    def allowing_negative(self) -> "Lattice":
+    def allowing_negative(self) -> "SpringsByRule":
         """Return the same springs, those of negative stiffness allowed."""
         ...
 

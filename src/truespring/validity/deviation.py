@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from truespring.arrays import Floats
-from truespring.comparison import SupportError, compare
+from truespring.comparison import Decisive, SupportError, compare, largest
 from truespring.validity.reference import Reference
 from truespring.validity.solving import Solved, conjugate_force
 
@@ -16,7 +16,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Curve:
+class Deviation:
     """Errors of one springs model on one mesh under one load type, all relative.
 
     Attributes:
@@ -25,7 +25,9 @@ class Curve:
             the displacement along the load under the same load, or the force of the same motion.
         force_errors: the largest of forces and torques of moved supports, as in a Comparison; zero where none moves.
         grid: sizes from 0 on, shape (m,).
-        errors, probe_on_grid, stiffness_on_grid: there, not a number where springs or reference do not reach.
+        errors: the error that decides there, by the one rule of `comparison.decisive`; not a number where springs or
+            reference do not reach, or nothing is known.
+        stiffness_on_grid: `stiffness` there.
         reached: the largest size for which there is an error.
         end: why the springs end there, empty where they do not.
         interpolation: what levels left out are off when told from the others: a bound for what lies between levels.
@@ -39,7 +41,6 @@ class Curve:
     stiffness: Floats
     grid: Floats
     errors: Floats
-    probe_on_grid: Floats
     stiffness_on_grid: Floats
     reached: float
     end: str
@@ -48,7 +49,7 @@ class Curve:
     seconds: float
 
 
-def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None) -> Curve:
+def deviation_of(springs: Solved, reference: Reference, grid: Floats, probe: int | None) -> Deviation:
     """Compare springs with the reference, carried to their nodes, at each level, and between levels.
 
     Between levels not the error but the difference of the two displacements, over the size of the reference's, is
@@ -83,13 +84,13 @@ def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None
     told = [apart, at_probe, *forces, stiffness[:, None]]
     ends = np.cumsum([one.shape[1] for one in told])
 
-    def split(rows: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    def split(rows: Floats) -> tuple[Floats, Floats, list[Floats], Floats]:
         fields, probed, *forced, stiff = np.split(rows, ends[:-1], axis=1)
         unknown = np.full(len(rows), np.nan)
         return (
             np.linalg.norm(fields, axis=1) if compared.any() else unknown,
             np.linalg.norm(probed, axis=1) if told_at_probe else unknown,
-            np.max([np.zeros(len(rows)), *(np.linalg.norm(one, axis=1) for one in forced)], axis=0),
+            [np.linalg.norm(one, axis=1) for one in forced],
             stiff[:, 0],
         )
 
@@ -98,26 +99,31 @@ def curve(springs: Solved, reference: Reference, grid: Floats, probe: int | None
     between = _spline(size, together)
     reached = float(size[-1])
     there = grid <= reached * (1 + 1e-3)  # what a load was scaled to is met to a hair
-    rms, probed, forced, stiff = split(between(np.minimum(grid[there], reached)))
-    on_grid = np.full((3, len(grid)), np.nan)
-    on_grid[:, there] = np.fmax(rms, forced), probed, stiff
+    rms, _, forced, stiff = split(between(np.minimum(grid[there], reached)))
+    on_grid = np.full((2, len(grid)), np.nan)
+    on_grid[:, there] = _deciding(rms, forced), stiff
     rms, probed, forced, stiff = split(together)
-    return Curve(
+    return Deviation(
         sizes=size,
         rms_errors=rms,
         probe_errors=probed,
-        force_errors=forced,
+        force_errors=np.max([np.zeros(n), *forced], axis=0),
         stiffness=stiff,
         grid=grid,
         errors=on_grid[0],
-        probe_on_grid=on_grid[1],
-        stiffness_on_grid=on_grid[2],
+        stiffness_on_grid=on_grid[1],
         reached=reached,
         end=springs.end if n == len(springs.states) and n < len(theirs.states) else "",
         interpolation=_left_out(size, apart),
         n_nodes=springs.path.problem.mesh.n_nodes,
         seconds=springs.seconds,
     )
+
+
+def _deciding(rms: Floats, forced: Sequence[Floats]) -> Floats:
+    """Return the error that decides at each size, shape (m,), as `comparison.decisive` does at a level."""
+    rows = zip(rms, *forced, strict=True)
+    return np.array([largest([Decisive(float(error), "") for error in row]).error for row in rows])
 
 
 def _apart(levels: Sequence[tuple[SupportError, ...]]) -> list[Floats]:

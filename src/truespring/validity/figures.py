@@ -15,7 +15,7 @@ from truespring.report.sheet import Area, Sheet
 from truespring.report.style import INK, POINT
 from truespring.report.words import draw_words, text_width
 from truespring.validity.lines import contours, spans
-from truespring.validity.maps import Map, Validity
+from truespring.validity.maps import Map, Maps
 from truespring.validity.refine import LINES
 from truespring.validity.sentences import headline, row_words
 
@@ -31,7 +31,7 @@ _LEFT, _BOTTOM, _TOP, _LEGEND = 0.62, 0.5, 0.62, 1.5
 _WIDTH, _HEIGHT, _STRIP, _APART = 3.6, 2.6, 0.34, 0.42
 
 
-def figures(validity: Validity) -> Iterator[tuple[str, Sheet]]:
+def figures(validity: Maps) -> Iterator[tuple[str, Sheet]]:
     """Yield each picture and the stem of its files: one a map, or one for all rows of a map whose y has names."""
     shown = [one for one in validity.maps if not one.refused]
     if validity.y in ("rule", "load-type"):
@@ -54,7 +54,7 @@ def _safe(name: str) -> str:
     return name.replace("+", "_")
 
 
-def map_figure(validity: Validity, one: Map) -> Sheet:
+def map_figure(validity: Maps, one: Map) -> Sheet:
     """A map over two axes of numbers."""
     title = f"{one.load.did}: {one.rule.words}"
     sheet = Sheet(_LEFT + _WIDTH + _LEGEND, _BOTTOM + _HEIGHT + _TOP, f"{title}. {headline(validity, one)}")
@@ -76,7 +76,7 @@ def map_figure(validity: Validity, one: Map) -> Sheet:
     return sheet
 
 
-def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
+def strips_figure(validity: Maps, maps: Sequence[Map]) -> Sheet:
     """A strip of areas a map, for an axis of names or one axis alone; sizes of several loads as shares of each."""
     first = maps[0]
     shared = validity.x == "load" and len({one.load.name for one in maps}) > 1
@@ -109,7 +109,7 @@ def strips_figure(validity: Validity, maps: Sequence[Map]) -> Sheet:
     return sheet
 
 
-def _rows(validity: Validity, one: Map) -> tuple[Floats, Floats]:
+def _rows(validity: Maps, one: Map) -> tuple[Floats, Floats]:
     """The values along y and the errors there; a whole number is drawn as a row of its own, from middle to middle."""
     if validity.y != "depth":
         return one.smooth
@@ -120,7 +120,7 @@ def _rows(validity: Validity, one: Map) -> tuple[Floats, Floats]:
     return np.column_stack([lower + hair, upper - hair]).ravel(), np.repeat(one.errors, 2, axis=0)
 
 
-def _draw_title(validity: Validity, one: Map, sheet: Sheet, title: str) -> None:
+def _draw_title(validity: Maps, one: Map, sheet: Sheet, title: str) -> None:
     draw_words(sheet, 0.1, sheet.height - 0.17, title, 9, bold=True)
     words, lines = headline(validity, one).split(), [""]
     for word in words:
@@ -133,7 +133,7 @@ def _draw_title(validity: Validity, one: Map, sheet: Sheet, title: str) -> None:
         draw_words(sheet, 0.1, sheet.height - 0.34 - 0.14 * place, line, 7.5, EDGE)
 
 
-def _x_label(validity: Validity, one: Map) -> str:
+def _x_label(validity: Maps, one: Map) -> str:
     return one.load.axis if validity.x == "load" else validity.axes[validity.x].label
 
 
@@ -205,7 +205,7 @@ def _draw_axes(area: Area, x_label: str, y_label: str = "", whole: Floats | None
     draw_lines(sheet, np.array(edges), EDGE, 0.7, 2.5, "axes")
 
 
-def _draw_solved(area: Area, validity: Validity, one: Map) -> None:
+def _draw_solved(area: Area, validity: Maps, one: Map) -> None:
     """Marks at what was solved: rows at the left edge, or points."""
     from matplotlib.lines import Line2D
 
@@ -218,13 +218,13 @@ def _draw_solved(area: Area, validity: Validity, one: Map) -> None:
         "zorder": 6,
         "gid": "solved",
     }
-    y = [getattr(spot, str(validity.y)) for spot in one.curves]
+    y = [getattr(spot, str(validity.y)) for spot in one.deviations]
     if validity.x == "load":
         drawn = Line2D([area.x[0]] * len(y), y, ms=3.6, clip_on=False, **look)
         area.add(drawn)
         drawn.set_clip_on(False)
         return
-    area.add(Line2D([getattr(spot, validity.x) for spot in one.curves], y, ms=2.4, **look))
+    area.add(Line2D([getattr(spot, validity.x) for spot in one.deviations], y, ms=2.4, **look))
 
 
 def _draw_lines(area: Area, lines: Mapping[float, Sequence[Floats]]) -> None:
@@ -262,7 +262,7 @@ def _along(part: Floats, share: float) -> Floats:
     return np.array([np.interp(share * way[-1], way, part[:, axis]) for axis in (0, 1)])
 
 
-def _draw_legend(sheet: Sheet, validity: Validity, one: Map, left: float, top: float, missing: bool) -> None:
+def _draw_legend(sheet: Sheet, validity: Maps, one: Map, left: float, top: float, missing: bool) -> None:
     from matplotlib.patches import Rectangle
 
     draw_words(sheet, left, top - 0.06, "error against", 7.5, EDGE)

@@ -1,0 +1,3 @@
+"""The command line: parses, calls, prints; nothing else."""
+
+from truespring.cli.command import main as main

@@ -1,0 +1,86 @@
+"""The verb `calibrate`: fit the springs of a study to a reference."""
+
+import argparse
+from pathlib import Path
+
+from truespring.cli.printing import console, print_file, print_json, progress, reserve, say, writing
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, one_of
+
+
+def _add(parser: argparse.ArgumentParser) -> None:
+    from truespring.calibration import UNKNOWNS
+
+    parser.add_argument("study", help="study whose springs are fitted, under its load")
+    parser.add_argument("case", nargs="*", help="studies of the same body whose loads are fitted too")
+    parser.add_argument(
+        "--held-out", nargs="+", default=[], metavar="CASE", help="studies whose loads are used for testing only"
+    )
+    parser.add_argument(
+        "--unknowns",
+        default="class",
+        metavar="KIND",
+        **one_of(UNKNOWNS),
+        help=f"what one unknown stiffness is for: {', '.join(UNKNOWNS)}; default: class",
+    )
+    parser.add_argument("--to", metavar="NAME", help="reference in the studies, default: neo-Hookean FEM, if there")
+    parser.add_argument("--markers", type=Path, metavar="FILE", help="markers (.csv) measured under the study's load")
+    parser.add_argument(
+        "--curve", type=Path, metavar="FILE", help="force-displacement curve (.csv) measured under the study's load"
+    )
+    parser.add_argument(
+        "--regularisation", type=float, metavar="R", help="weight of the pull toward the rule, default: 0.01"
+    )
+    add_out(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from truespring.calibration.page import calibration_table
+    from truespring.calibration.study import calibrate_study
+    from truespring.calibration.writing import calibrated_values, write_calibrated
+    from truespring.study import read_studies
+
+    study, *others = read_studies([options.study, *options.case, *options.held_out])
+    cases, held_out = others[: len(options.case)], others[len(options.case) :]
+    reserve(options, [study])
+    weight = {} if options.regularisation is None else {"regularisation": options.regularisation}
+    with progress(options) as advance:
+        fitting = None if advance is None else lambda text, share: advance(study.stem, "calibration", share)
+        found = calibrate_study(
+            study,
+            cases,
+            held_out,
+            options.unknowns,
+            options.to,
+            options.markers,
+            options.curve,
+            progress=fitting,
+            **weight,
+        )
+    with writing(options.out):
+        files = write_calibrated(found, options.out, options.command)
+    screen = console(options)
+    screen.print(found.calibration.headline, soft_wrap=True)
+    screen.print(calibration_table(f"{study.stem}: springs fitted to {found.reference}", found.calibration))
+    screen.print(found.calibration.identifiability.sentence, soft_wrap=True)
+    for text in found.calibration.warnings:
+        screen.print(f"warning: {text}", soft_wrap=True)
+    screen.print(f"study: {files[0]}", soft_wrap=True)
+    print_file(options, "report", files[-1])
+    if options.json:
+        print_json(calibrated_values(found))
+    if not found.calibration.converged:
+        for text in found.calibration.warnings:
+            say(f"{study.stem}: {text}")
+    return CONVERGED if found.calibration.converged else NOT_CONVERGED
+
+
+CALIBRATE = Verb(
+    "calibrate",
+    "fit the springs of a study to a reference, and test them on other loads",
+    _add,
+    _run,
+    (
+        "truespring calibrate examples/bending.toml --held-out examples/loads/bending_slanted.toml",
+        "truespring calibrate strip.toml --to nonlinear --unknowns direction-row",
+    ),
+)

@@ -1,0 +1,68 @@
+"""The verb `check`: read a study and print what would be solved."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from truespring.cli.moduli import print_moduli
+from truespring.cli.printing import console, print_each
+from truespring.cli.verb import CONVERGED, Verb, add_studies
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def _add(parser: argparse.ArgumentParser) -> None:
+    add_studies(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from truespring.study import plan, read_studies, realised_moduli
+
+    studies = read_studies(options.study)
+    plans = {study.stem: plan(study) for study in studies}
+    screen = console(options)
+    for study in studies:
+        _print_plan(screen, plans[study.stem])
+        if not screen.quiet:
+            print_moduli(screen, study.stem, realised_moduli(study), options.verbose)
+    if options.json:
+        print_each(plans)
+    return CONVERGED
+
+
+def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
+    held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
+    material, section = plan["material"], plan["section"]
+    size = " by ".join(f"{extent:g} m" for extent in plan["size"])
+    across = f", {section['kind']}, thickness {section['thickness']:g} m" if section else ""
+    screen.print(f"{plan['title']}\n{size}{across}")
+    if material:
+        screen.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
+    for region in plan["regions"]:
+        screen.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
+    screen.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
+    for note in plan["mesh_notes"]:
+        screen.print(f"the mesh: {note}")
+    screen.print(f"held nodes: {held}")
+    force = ", ".join(f"{component:g}" for component in plan["total_force"])
+    motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
+    screen.print(f"total force ({force}) N{motion}, in {plan['load_steps']} load steps")
+    probe = "the node that moves most" if plan["probe"] is None else f"the node at {plan['probe']} m"
+    screen.print(f"probe: {probe}")
+    for name, model in plan["models"].items():
+        screen.print(f"  {name}: {model['label']}", *(f"\n    warning: {text}" for text in model.get("warnings", ())))
+    compare = plan["compare"]
+    screen.print(f"compared: {compare['model']} with {', '.join(compare['references']) or 'nothing'}\n")
+
+
+CHECK = Verb(
+    "check",
+    "check a study and show mesh, supports, loads and moduli; solves nothing",
+    _add,
+    _run,
+    (
+        "truespring check strip.toml",
+        "truespring check examples/bending.toml examples/tissue.toml --verbose",
+    ),
+    ("verbose", "json", "quiet", "threads"),
+)

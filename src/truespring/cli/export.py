@@ -1,0 +1,65 @@
+"""The verb `export`: write springs for another simulator."""
+
+import argparse
+from typing import Any
+
+from truespring.cli.printing import console, print_each, progress, reserve, say, writing
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, one_of
+
+
+def _add(parser: argparse.ArgumentParser) -> None:
+    from truespring.exports import TARGETS
+
+    add_studies(parser)
+    parser.add_argument(
+        "--to",
+        action="append",
+        required=True,
+        metavar="TARGET",
+        **one_of(TARGETS),
+        help=f"{', '.join(TARGETS)}; repeat for several targets",
+    )
+    parser.add_argument(
+        "--model", metavar="NAME", help="model to write, default: the compared one, or the first springs"
+    )
+    add_out(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from truespring.study import export_study, read_studies, springs_of
+
+    studies = read_studies(options.study)
+    for study in studies:  # errors first, before any study is solved
+        springs_of(study, options.to, options.model)
+    reserve(options, studies)
+    screen = console(options)
+    values: dict[str, Any] = {}
+    converged = True
+    for study in studies:
+        with progress(options) as advance, writing(options.out):
+            carried = export_study(study, options.to, options.out, options.model, advance)
+        for one in carried:
+            if options.quiet and not options.json:
+                print(*one.files, sep="\n")
+            screen.print(f"{study.stem}: {one.target}: {', '.join(map(str, one.files))}", soft_wrap=True)
+        screen.print("\n".join(carried[0].told), soft_wrap=True)
+        if not carried[0].converged:
+            converged = False
+            say(f"{study.stem}: {carried[0].fault}")
+        found = {one.target: one.values for one in carried}
+        values[study.stem] = found if len(found) > 1 else carried[0].values
+    if options.json:
+        print_each(values)
+    return CONVERGED if converged else NOT_CONVERGED
+
+
+EXPORT = Verb(
+    "export",
+    "write springs for another simulator, with the displacement to expect there",
+    _add,
+    _run,
+    (
+        "truespring export examples/bending.toml --to mujoco",
+        "truespring export strip.toml --to calculix --to npz --model springs",
+    ),
+)

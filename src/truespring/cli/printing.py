@@ -1,0 +1,155 @@
+"""What verbs print: tables on standard output, JSON, errors, and progress on standard error."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.errors import TruespringError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from truespring.study import Study
+
+# Where standard error is no terminal, a line of progress is printed after this time [s].
+_EVERY = 10.0
+
+
+def say(text: str) -> None:
+    """Print a line on standard error, if that can be written."""
+    with suppress(OSError):
+        print(f"truespring: {text}", file=sys.stderr, flush=True)
+
+
+def print_json(value: Any) -> None:
+    """Print a value as JSON on standard output."""
+    print(json.dumps(value, indent=2, allow_nan=False))
+
+
+def print_each(values: dict[str, Any]) -> None:
+    """Print values by a study's stem as JSON: the value alone where there is one study, as the contract has it."""
+    print_json(values if len(values) > 1 else next(iter(values.values())))
+
+
+def console(options: argparse.Namespace) -> "Console":
+    """Return the console for tables and sentences; it prints nothing with --quiet or --json."""
+    from rich.console import Console
+
+    class Plain(Console):
+        """A console that leaves a closed pipe to `main`."""
+
+        def on_broken_pipe(self) -> None:
+            raise  # the exception being handled
+
+    return Plain(quiet=options.quiet or options.json, highlight=False, markup=False, emoji=False, soft_wrap=False)
+
+
+def print_file(options: argparse.Namespace, what: str, file: object) -> None:
+    """Print where a report or another file was written; with --quiet the path alone, with --json nothing."""
+    if not options.json:
+        print(file if options.quiet else f"{what}: {file}")
+
+
+@contextmanager
+def writing(out: Path) -> Iterator[None]:
+    """Turn an error of writing into one that names --out."""
+    try:
+        yield
+    except OSError as error:
+        place = error.filename or out
+        raise TruespringError(f"--out {out}: {place} cannot be written: {error.strerror}") from None
+
+
+def reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> None:
+    """Lock the folders of studies, or --out itself, against other runs until the command ends.
+
+    Raises TruespringError, before anything is solved, where nothing can be written or another run writes.
+    """
+    from truespring.outputs import Lock
+
+    with writing(options.out):
+        for folder in [options.out / study.stem for study in studies] or [options.out]:
+            options.reserved.enter_context(Lock(folder))
+
+
+class _Lines:
+    """Progress as a line now and then, for a standard error that is no terminal."""
+
+    def __init__(self) -> None:
+        self._next = time.monotonic() + _EVERY
+
+    def show(self, text: Callable[[], str]) -> None:
+        """Print a line, if the last one is long enough ago."""
+        if time.monotonic() >= self._next:
+            say(text())
+            self._next = time.monotonic() + _EVERY
+
+
+@contextmanager
+def progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float], None] | None]:
+    """Yield what shows the share done of each model: a bar on a terminal, else a line now and then."""
+    if options.quiet:
+        yield None
+        return
+    if not sys.stderr.isatty():
+        lines = _Lines()
+        yield lambda study, model, share: lines.show(lambda: f"{study}: {model}: {share:.0%}")
+        return
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    tasks: dict[str, TaskID] = {}
+    with Progress(console=Console(stderr=True), transient=True) as bars:
+
+        def advance(study: str, model: str, share: float) -> None:
+            if model not in tasks:
+                tasks[model] = bars.add_task(f"{study}: {model}", total=1.0)
+            bars.update(tasks[model], completed=share)
+
+        yield advance
+
+
+@contextmanager
+def counting(
+    options: argparse.Namespace, what: str
+) -> Iterator[tuple[Callable[[int, int, int], None] | None, Callable[[str], None] | None]]:
+    """Yield what shows how many are done, failed and asked for, and what prints a line beside it.
+
+    A bar with the time left on a terminal, else a line now and then.
+    """
+    if options.quiet:
+        yield None, None
+        return
+    if not sys.stderr.isatty():
+        lines = _Lines()
+
+        def count(done: int, failed: int, total: int) -> None:
+            lines.show(lambda: f"{done} of {total} {what}{f', {failed} failed' if failed else ''}")
+
+        yield count, say
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    screen = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    with Progress(*columns, TextColumn("left:"), TimeRemainingColumn(), console=screen, transient=True) as bars:
+        task = bars.add_task(what, total=None)
+
+        def advance(done: int, failed: int, total: int) -> None:
+            text = f"{what}, {failed} failed" if failed else what
+            bars.update(task, completed=done, total=total, description=text)
+
+        yield advance, lambda text: screen.print(f"truespring: {text}", soft_wrap=True)

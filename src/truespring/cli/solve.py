@@ -1,0 +1,112 @@
+"""The verbs `verify` and `solve`: solve every model of a study, with or without comparison and report."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truespring.cli.moduli import print_moduli
+from truespring.cli.printing import console, print_each, print_file, progress, reserve, writing
+from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, add_timeout
+
+if TYPE_CHECKING:
+    from truespring.equilibrium import Solution
+    from truespring.outputs import Output
+    from truespring.report.result import Result
+    from truespring.study import Known, Study
+
+
+def _add(parser: argparse.ArgumentParser) -> None:
+    add_studies(parser)
+    add_out(parser)
+    add_timeout(parser)
+
+
+def _run(options: argparse.Namespace, comparing: bool) -> int:
+    from truespring.report.summary import summary
+    from truespring.report.tables import result_tables
+    from truespring.report.verdict import verdict
+    from truespring.study import read_studies, realised_moduli, run, verify_command, write_overview, write_rest
+
+    studies = read_studies(options.study)
+    reserve(options, studies)
+    screen = console(options)
+    results = []
+    for study in studies:
+        with _output(study, options.out) as (output, known):
+            with progress(options) as advance:
+                result = run(study, advance, comparing, options.timeout, known)
+            results.append(result)
+            with writing(options.out):
+                (options.out / "report.html").unlink(missing_ok=True)  # it covers the studies of an earlier command
+                write_rest(result, output, verify_command([result], options.out) if comparing else None)
+        if not screen.quiet:
+            screen.print(f"{study.stem}: {verdict(result)}")
+            print_moduli(screen, study.stem, realised_moduli(study), options.verbose)
+        for part in result_tables(result):
+            screen.print(part)
+    if comparing:
+        with writing(options.out):
+            write_overview(results, options.out)
+        print_file(options, "report", options.out / "report.html")
+    if options.json:
+        print_each({result.stem: summary(result) for result in results})
+    for result in results:
+        print_failures(result, options.out, shown=not screen.quiet)
+    return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
+
+
+@contextmanager
+def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
+    """Yield the output of a study, and what writes the results of a model to it."""
+    from truespring.study import output, write_model
+
+    with writing(out):
+        opened = output(study, out)
+
+    def known(name: str, path: "Solution") -> None:
+        with writing(out):
+            write_model(path, opened, name)
+
+    with opened:
+        yield opened, known
+
+
+def print_failures(result: "Result", out: Path, shown: bool) -> None:
+    """Print on standard error which models did not converge and, unless `shown` already, why and what to try."""
+    for name, path in result.paths.items():
+        if str(path.status) not in ("converged", "read"):
+            print(
+                f"truespring: {result.stem}: model '{name}' is {path.status}; "
+                f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
+                *(f"truespring:   {warning}" for warning in path.warnings if not shown),
+                sep="\n",
+                file=sys.stderr,
+            )
+
+
+VERIFY = Verb(
+    "verify",
+    "solve and compare the models of a study; write curves, figures and a report",
+    _add,
+    lambda options: _run(options, comparing=True),
+    (
+        "truespring verify examples/bending.toml",
+        "truespring verify strip.toml block.toml --out results",
+    ),
+    ("verbose", "json", "quiet", "threads"),
+)
+
+SOLVE = Verb(
+    "solve",
+    "solve the models of a study; write curves and VTU files only",
+    _add,
+    lambda options: _run(options, comparing=False),
+    (
+        "truespring solve examples/truss.toml",
+        "truespring solve mesh.toml --timeout 600 --threads 4",
+    ),
+    ("verbose", "json", "quiet", "threads"),
+)

@@ -1,0 +1,26 @@
+"""Words for loads and supports, as a file's header, a table row and an error message use them."""
+
+from collections.abc import Sequence
+
+from truespring.arrays import Floats
+from truespring.mesh import Box, Near, Plane, Selection, counted
+
+
+def vector_words(values: Sequence[float] | Floats, digits: int = 6) -> str:
+    """Return components in brackets: "(0, -0.043)"."""
+    return f"({', '.join(f'{value:.{digits}g}' for value in values)})"
+
+
+def selection_words(on: Selection) -> str:
+    """Return what a selection names: "'right'", "the nodes at x = 0.16 m", "3 chosen nodes"."""
+    match on:
+        case str():
+            return f"'{on}'"
+        case Plane(axis, value):
+            return f"the nodes at {axis} = {value:g} m"
+        case Box(lower, upper):
+            return f"the nodes from {vector_words(lower)} to {vector_words(upper)} m"
+        case Near(point):
+            return f"the node nearest to {vector_words(point)} m"
+        case _:
+            return counted(len(on), "chosen node")

@@ -1,0 +1,45 @@
+"""The result of `map_validity`: maps with their verdicts, table and figures, which can be written."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.report.drawing import Figures, sheets
+from truespring.report.rows import table_of
+from truespring.validity.figures import figures
+from truespring.validity.maps import Maps
+from truespring.validity.sentences import verdict
+from truespring.validity.writing import rows, write_validity
+
+if TYPE_CHECKING:
+    import polars
+
+
+@dataclass(frozen=True, eq=False)
+class Validity(Maps):
+    """Maps of a study; the attributes are those of `Maps`."""
+
+    @property
+    def verdicts(self) -> list[str]:
+        """For each map one or two sentences: up to which load its springs agree with the reference."""
+        return [verdict(self, one) for one in self.maps]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """For each load level of each path of springs a row, as in validity.csv."""
+        return list(rows(self))
+
+    def table(self) -> "polars.DataFrame":
+        """Return `rows` as a table of polars."""
+        return table_of(self.rows)
+
+    def figures(self) -> Figures:
+        """Return the figures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
+        return sheets(figures(self))
+
+    def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
+        """Write validity.json, validity.csv, figures and report.html into out/STEM; return where each is.
+
+        `command` is the command line that repeats the run, named in the report.
+        """
+        return write_validity(self, Path(out), command)

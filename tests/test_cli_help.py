@@ -1,0 +1,140 @@
+"""The command line before anything is solved: help, examples, the nearest word, completion, `new`, closed pipes."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.test_examples import EXAMPLES
+from truespring.cli import main
+from truespring.cli.parser import VERBS, build_parser, parse
+
+KINDS = ("strip", "block", "mesh", "organ")
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what `new` writes, and the shipped studies."""
+    folder = tmp_path_factory.mktemp("started")
+    for kind in KINDS:
+        assert main(["new", kind, str(folder / f"{kind}.toml"), "--quiet"]) == 0
+    shutil.copytree(EXAMPLES, folder / "examples")
+    return folder
+
+
+def test_alone_it_prints_help_with_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    shown = capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert capsys.readouterr().out == shown
+    *_, last = re.findall(r"^    (\w+) ", shown, re.MULTILINE)
+    assert last == "table1"
+    examples = shown.split("examples:\n")[1].splitlines()
+    assert len(examples) == 4 and all(line.split()[1] in VERBS for line in examples)
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_examples_of_a_verb_run(name: str, started: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name, "--help"]) == 0
+    shown = [line.strip() for line in capsys.readouterr().out.split("examples:\n")[1].splitlines()]
+    assert shown == list(VERBS[name].examples) and len(shown) == 2
+    for line in shown:
+        program, *arguments = shlex.split(line.partition(" > ")[0])
+        assert program == "truespring" and arguments[0] == name
+        options = parse(arguments)
+        assert options is not None
+        files = [getattr(options, key, []) for key in ("study", "case", "held_out", "source")]
+        for file in (one for given in files for one in ([given] if isinstance(given, str) else given)):
+            assert file == "job.frd" or (started / file.partition(":")[0]).is_file(), f"{line}: {file}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["verfy", "x.toml"], "'verify'"),
+        (["Solve", "x.toml"], "'solve'"),
+        (["verify", "x.toml", "--thread", "2"], "'--threads'"),
+        (["export", "x.toml", "--to", "npz", "--modl=springs"], "'--model'"),
+        (["sweep", "x.toml", "--worker", "2"], "'--workers'"),
+    ],
+)
+def test_the_nearest_word_is_named(arguments: list[str], word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert f"did you mean {word}" in capsys.readouterr().err
+
+
+def test_options_without_effect_are_none() -> None:
+    _, verbs = build_parser(VERBS)
+    without = {name: {"--json", "--quiet", "--threads", "--verbose"} - set(verbs[name].option_names) for name in VERBS}
+    assert without == {
+        **{name: {"--verbose"} for name in VERBS},
+        **{name: set() for name in ("verify", "solve", "check")},
+        "new": {"--threads", "--verbose"},
+        "rules": {"--quiet", "--threads", "--verbose"},
+        "schema": {"--json", "--quiet", "--threads", "--verbose"},
+    }
+
+
+def test_names_in_help_are_those_of_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    from truespring.calibration import UNKNOWNS
+    from truespring.models import LAWS, RULES
+    from truespring.reference import READERS
+    from truespring.validity import LOADS
+
+    for verb, tables in (("calibrate", (UNKNOWNS,)), ("map", (LAWS, RULES, LOADS)), ("compare", (READERS,))):
+        assert main([verb, "--help"]) == 0
+        words = set(re.findall(r"[\w.+-]+", re.sub(r"-\n\s+", "-", capsys.readouterr().out)))
+        for table in tables:
+            assert set(table) <= words, set(table) - words
+
+
+def test_completion_knows_verbs_options_and_names(capsys: pytest.CaptureFixture[str]) -> None:
+    for shell in ("bash", "zsh", "tcsh"):
+        assert main(["--print-completion", shell]) == 0
+        script = capsys.readouterr().out
+        for word in (*VERBS, "held-out", "mujoco", "organ"):
+            assert word in script, f"{shell}: {word}"
+    assert main(["--print-completion", "fish"]) == 2
+    bash = shutil.which("bash")
+    assert main(["--print-completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    if bash is not None:
+        typed = "COMP_WORDS=(truespring export --to m); COMP_CWORD=3; _shtab_truespring; echo ${COMPREPLY[@]}"
+        shown = subprocess.run([bash, "-c", f"{script}\n{typed}"], capture_output=True, text=True, check=True).stdout
+        assert shown.split() == ["mujoco"]
+
+
+def test_new_studies_are_right_and_overwrite_nothing(
+    started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [str(started / f"{kind}.toml") for kind in KINDS]
+    assert main(["check", *files, "--json"]) == 0
+    plans = json.loads(capsys.readouterr().out)
+    assert [len(plan["size"]) for plan in plans.values()] == [2, 3, 3, 3]
+    for plan in plans.values():
+        assert plan["models"]["springs"]["n_springs"] and plan["compare"]["references"]
+        assert plan["mesh_notes"] == []
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mesh", "liver.toml"]) == 0
+    assert {one.name for one in tmp_path.iterdir()} == {"liver.toml", "liver.msh"}
+    assert 'file = "liver.msh"' in (tmp_path / "liver.toml").read_text("utf-8")
+    for wrong in (["mesh", "liver.toml"], ["mesh", "liver.msh"], ["strip", "none/strip.toml"], ["strp"]):
+        assert main(["new", *wrong]) == 2
+    (tmp_path / "organ.nrrd").touch()
+    assert main(["new", "organ"]) == 2
+    assert not (tmp_path / "organ.toml").exists() and (tmp_path / "organ.nrrd").read_bytes() == b""
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    command = [sys.executable, "-m", "truespring", "--help"]
+    buffered = {**os.environ, "PYTHONUNBUFFERED": ""}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=buffered) as writer:
+        assert writer.stdout is not None and writer.stderr is not None
+        writer.stdout.close()  # long before it has started to write
+        assert writer.stderr.read() == b"" and writer.wait() == 141
