@@ -8,7 +8,7 @@ from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_wor
 
 def _add(parser: argparse.ArgumentParser) -> None:
     from truespring.models import LAWS, RULES
-    from truespring.validity import LOADS
+    from truespring.validity import LOAD_TYPES
 
     parser.add_argument("study", help="study file (TOML)")
     parser.add_argument(
@@ -18,13 +18,13 @@ def _add(parser: argparse.ArgumentParser) -> None:
         **one_of(LAWS),
         help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean",
     )
-    in_space = [name for name, load in LOADS.items() if load.dims == (3,)]
+    in_space = [name for name, load in LOAD_TYPES.items() if load.dims == (3,)]
     parser.add_argument(
         "--load",
         action="append",
         metavar="TYPE",
-        **one_of((*LOADS, "all")),
-        help=f"{', '.join(LOADS)} or all ({', '.join(in_space)}: in 3D only; own: the load of the study); "
+        **one_of((*LOAD_TYPES, "all")),
+        help=f"{', '.join(LOAD_TYPES)} or all ({', '.join(in_space)}: in 3D only; own: the load of the study); "
         "may be repeated; default: own",
     )
     parser.add_argument(
