@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -85,9 +86,9 @@ def test_names_in_help_are_those_of_the_tables(capsys: pytest.CaptureFixture[str
     from truespring.calibration import UNKNOWNS
     from truespring.models import LAWS, RULES
     from truespring.reference import READERS
-    from truespring.validity import LOADS
+    from truespring.validity import LOAD_TYPES
 
-    for verb, tables in (("calibrate", (UNKNOWNS,)), ("map", (LAWS, RULES, LOADS)), ("compare", (READERS,))):
+    for verb, tables in (("calibrate", (UNKNOWNS,)), ("map", (LAWS, RULES, LOAD_TYPES)), ("compare", (READERS,))):
         assert main([verb, "--help"]) == 0
         words = set(re.findall(r"[\w.+-]+", re.sub(r"-\n\s+", "-", capsys.readouterr().out)))
         for table in tables:
@@ -138,3 +139,18 @@ def test_a_closed_pipe_is_no_error() -> None:
         assert writer.stdout is not None and writer.stderr is not None
         writer.stdout.close()  # long before it has started to write
         assert writer.stderr.read() == b"" and writer.wait() == 141
+
+
+def undescribed(schema: dict[str, Any]) -> list[str]:
+    """Return the keys of the study file without a description, as TABLE.KEY."""
+    tables = {"StudyTable": schema, **schema["$defs"]}
+    keys = [(f"{name}.{key}", one) for name, table in tables.items() for key, one in table["properties"].items()]
+    assert len(keys) > 80
+    return [key for key, one in keys if len(one.get("description", "").split()) < 2]
+
+
+def test_every_key_of_the_schema_has_a_description(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert undescribed(schema) == []
+    assert all("description" in table for table in schema["$defs"].values())

@@ -385,7 +385,7 @@ def test_the_verb_leaves_a_table_pictures_and_a_page(
         (["--load", "twist"], "is for bodies in space"),
         (["--rule", "loyd"], "did you mean 'lloyd'"),
         (["--rule", "van-gelder"], "not for quadrilateral elements"),
-        (["--law", "mooney"], "law = 'mooney' is unknown"),
+        (["--law", "mooney"], "'mooney' is unknown"),
         (["--x", "rule"], "names go along y"),
         (["--y", "load"], "both axes are load"),
         (["--range", "depth=1"], "depth=first:last"),

@@ -170,20 +170,20 @@ _two, _three = Field(min_length=2, max_length=2), Field(min_length=3, max_length
 class RectangleTable(Table):
     """A rectangle, and what it is divided into."""
 
-    shape: Literal["rectangle"]
-    size: Annotated[list[Length], _two]
-    elements: Annotated[list[_Count], _two]
-    element: PlaneElement = "quadrilateral"
-    diagonal: Diagonal = "right"
+    shape: Literal["rectangle"] = Field(description="a rectangle with a corner in the origin")
+    size: Annotated[list[Length], _two] = Field(description="lengths along x and y")
+    elements: Annotated[list[_Count], _two] = Field(description="numbers of elements along x and y")
+    element: PlaneElement = Field(default="quadrilateral", description="kind of elements")
+    diagonal: Diagonal = Field(default="right", description="how triangles split each rectangle")
 
 
 class BoxTable(Table):
     """A box, and what it is divided into."""
 
-    shape: Literal["box"]
-    size: Annotated[list[Length], _three]
-    elements: Annotated[list[_Count], _three]
-    element: SolidElement = "hexahedron"
+    shape: Literal["box"] = Field(description="a box with a corner in the origin")
+    size: Annotated[list[Length], _three] = Field(description="lengths along x, y and z")
+    elements: Annotated[list[_Count], _three] = Field(description="numbers of elements along x, y and z")
+    element: SolidElement = Field(default="hexahedron", description="kind of elements")
 
 
 class FileTable(Table):
@@ -192,25 +192,36 @@ class FileTable(Table):
     `join` makes nodes at one place one; by default where no two elements share a node.
     """
 
-    file: FileName
-    unit: str = "m"
-    join: bool | None = None
+    file: FileName = Field(
+        description="mesh file, relative to the study: gmsh .msh, Abaqus or CalculiX .inp, VTK .vtk and .vtu"
+    )
+    unit: str = Field(default="m", description='length unit of the file, such as "mm", which mesh files do not state')
+    join: bool | None = Field(
+        default=None,
+        description="whether nodes at the same position become one; default: only where no two elements share a node",
+    )
 
 
 class VoxelsTable(Table):
     """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
 
-    voxels: FileName
-    label: int | str
-    edge: Length | None = None
-    unit: str = "mm"
+    voxels: FileName = Field(description="label image, relative to the study: .nii, .nrrd, .mha, .vti or .npy")
+    label: int | str = Field(
+        description="label of the body in the image: its value, or its name where the file has names"
+    )
+    edge: Length | None = Field(
+        default=None, description="edge of the cubes to which the image is resampled; default: its own voxels"
+    )
+    unit: str = Field(default="mm", description="length unit of the image")
 
 
 class NetworkMeshTable(Table):
     """A plain network from two CSV files; the model of kind "network" takes their stiffness."""
 
-    nodes: FileName
-    springs: FileName
+    nodes: FileName = Field(description="CSV file of nodes, relative to the study: columns x, y and, in 3D, z [m]")
+    springs: FileName = Field(
+        description="CSV file of springs, relative to the study: columns a, b, stiffness [N/m], rest_length [m]"
+    )
 
 
 def _mesh_form(value: Any) -> str | None:
@@ -233,9 +244,9 @@ MeshTable = Annotated[
 class _PlainMaterialTable(Table):
     """What the body is made of."""
 
-    young: Stress
-    poisson: Number
-    density: Density | None = None
+    young: Stress = Field(description='Young\'s modulus: a number in Pa, or a string with its unit such as "10 kPa"')
+    poisson: Number = Field(description="Poisson's ratio")
+    density: Density | None = Field(default=None, description="density, needed for gravity")
 
 
 def with_constants(table: type[Table], name: str, constants: Mapping[str, Constant]) -> type[Table]:
@@ -257,25 +268,38 @@ else:
 class RegionTable(MaterialTable):
     """A part of the body of another material."""
 
-    on: On
+    on: On = Field(
+        description="elements of this material: a group of an imported mesh, or a box that holds their centres"
+    )
 
 
 class SectionTable(Table):
     """How a plane body behaves across the plane."""
 
-    kind: SectionKind
-    thickness: Length
+    kind: SectionKind = Field(description="whether stress or strain vanishes across the plane")
+    thickness: Length = Field(
+        description='thickness of the body: a number in m, or a string with its unit such as "10 mm"'
+    )
 
 
 class SupportTable(Table):
     """Nodes that are held or moved."""
 
-    on: On
-    fix: Annotated[list[Direction], Field(min_length=1)] | None = None
-    displacement: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = None
-    rotation: Angle = 0.0
-    about: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = None
-    axis: Annotated[list[Number], _three] | None = None
+    on: On = Field(description=f"nodes that are held or moved: {_SELECTION_FORMS}")
+    fix: Annotated[list[Direction], Field(min_length=1)] | None = Field(
+        default=None, description="directions that are held or prescribed; default: all"
+    )
+    displacement: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = Field(
+        default=None, description="prescribed displacement at full load; default: none, the nodes are held"
+    )
+    rotation: Angle = Field(
+        default=0.0,
+        description='prescribed rotation at full load, anticlockwise in 2D, about an axis in 3D: radians, or "10 deg"',
+    )
+    about: Annotated[list[Length], Field(min_length=2, max_length=3)] | None = Field(
+        default=None, description="centre of the rotation; default: the centre of the selection"
+    )
+    axis: Annotated[list[Number], _three] | None = Field(default=None, description="axis of the rotation in 3D")
 
 
 class LoadTable(Table):
@@ -340,16 +364,40 @@ def load_form(kinds: Mapping[str, LoadKind]) -> type[LoadTable]:
 class SolverTable(Table):
     """How equilibrium is found."""
 
-    load_steps: Annotated[int, Field(ge=1, le=100_000)] = 10
-    control: Literal["load", "displacement", "arc-length"] = "load"
-    on: On = None
-    direction: Direction | None = None
-    to: Length | None = None
-    max_steps: Annotated[int, Field(ge=1, le=100_000)] = 200
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-10
-    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
-    method: Literal["auto", "mixed", "line-search"] = "auto"
-    linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = "auto"
+    load_steps: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=10, description="number of load levels between no load and full load"
+    )
+    control: Literal["load", "displacement", "arc-length"] = Field(
+        default="load",
+        description="what is prescribed at each step: the load, a displacement, or the arc length of the path",
+    )
+    on: On = Field(
+        default=None, description="with control by displacement: the nodes whose mean displacement is prescribed"
+    )
+    direction: Direction | None = Field(
+        default=None, description="with control by displacement: the direction of that displacement"
+    )
+    to: Length | None = Field(
+        default=None, description="with control by displacement: the displacement at the end of the path"
+    )
+    max_steps: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=200, description="with control by arc length: largest number of steps"
+    )
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-10,
+        description="unbalanced force over the larger of applied and internal force at which a level is solved",
+    )
+    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=50, description="largest number of Newton iterations per load level, before the step is reduced"
+    )
+    method: Literal["auto", "mixed", "line-search"] = Field(
+        default="auto",
+        description="Newton's method with mixed integration points, with a line search, or one after the other",
+    )
+    linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = Field(
+        default="auto",
+        description="solver of linear systems: direct or multigrid, by size; or a library that factorises",
+    )
 
 
 class StiffnessTable(Table):
@@ -358,11 +406,17 @@ class StiffnessTable(Table):
     Or spring by spring: `file` is a CSV file with columns a, b and stiffness, `volume` one with element and kappa.
     """
 
-    edge: Number | None = None
-    diagonal: Number = 0.0
-    body: Number = 0.0
-    file: FileName | None = None
-    volume: FileName | None = None
+    edge: Number | None = Field(default=None, description="stiffness of the springs along edges")
+    diagonal: Number = Field(default=0.0, description="stiffness of the springs along diagonals of faces")
+    body: Number = Field(default=0.0, description="stiffness of the springs along body diagonals, in 3D")
+    file: FileName | None = Field(
+        default=None,
+        description="CSV file of the stiffness of each spring, relative to the study: columns a, b, stiffness [N/m]",
+    )
+    volume: FileName | None = Field(
+        default=None,
+        description="CSV file of the volume term of each element, relative to the study: columns element, kappa [Pa]",
+    )
 
     @model_validator(mode="after")
     def _numbers_or_file(self) -> "StiffnessTable":
@@ -378,13 +432,25 @@ class StiffnessTable(Table):
 class SpringsTable(Table):
     """A mass-spring model."""
 
-    kind: Literal["springs"]
-    rule: RuleName | None = None
-    stiffness: StiffnessTable | None = None
-    sharing: Literal["summed", "single"] = "summed"
-    allow_negative: bool = False
-    volume: bool = False
-    k_body: Number | None = None
+    kind: Literal["springs"] = Field(description="springs along edges and diagonals of the elements")
+    rule: RuleName | None = Field(
+        default=None,
+        description=f"stiffness rule, which sets the stiffness of springs from the material: {', '.join(RULES)}",
+    )
+    stiffness: StiffnessTable | None = Field(default=None, description="stiffness of the springs, instead of a rule")
+    sharing: Literal["summed", "single"] = Field(
+        default="summed",
+        description="whether a spring sums the stiffness of all elements that share it, or takes that of one",
+    )
+    allow_negative: bool = Field(default=False, description="whether springs of negative stiffness are accepted")
+    volume: bool = Field(
+        default=False,
+        description="whether an area or volume term is added, so that the body has the Poisson's ratio of the material",
+    )
+    k_body: Number | None = Field(
+        default=None,
+        description="stiffness of the body diagonals of a cube, in Young's modulus times edge; rule isotropic only",
+    )
 
     @model_validator(mode="after")
     def _stiffness_read(self) -> "SpringsTable":
@@ -398,38 +464,45 @@ class SpringsTable(Table):
 class FemTable(Table):
     """A finite element model."""
 
-    kind: Literal["fem"]
-    law: LawName
-    element: FemElement | None = None
+    kind: Literal["fem"] = Field(description="finite elements")
+    law: LawName = Field(description=f"constitutive law: {', '.join(LAWS)}")
+    element: FemElement | None = Field(
+        default=None, description=f"interpolation: {', '.join(ELEMENTS)}; default: one that does not lock"
+    )
 
 
 class HemlTable(Table):
     """Hyper-elastic mass links."""
 
-    kind: Literal["heml"]
-    law: LawName
+    kind: Literal["heml"] = Field(description="hyper-elastic mass links")
+    law: LawName = Field(description="constitutive law")
 
 
 class MassTensorTable(Table):
     """The mass-tensor method."""
 
-    kind: Literal["mass-tensor"]
-    law: LawName
+    kind: Literal["mass-tensor"] = Field(description="the mass-tensor method")
+    law: LawName = Field(description="constitutive law")
 
 
 class NetworkTable(Table):
     """The network of the mesh itself."""
 
-    kind: Literal["network"]
+    kind: Literal["network"] = Field(description="the springs of the mesh, a plain network")
 
 
 class CalculixTable(Table):
     """The problem in CalculiX, as finite elements of a law, or as the springs of another model of the study."""
 
-    kind: Literal["calculix"]
-    law: Literal["linear", "saint-venant-kirchhoff"] | None = None
-    springs: str | None = None
-    element: Literal["linear", "quadratic"] | None = None
+    kind: Literal["calculix"] = Field(description="the same problem, solved by CalculiX")
+    law: Literal["linear", "saint-venant-kirchhoff"] | None = Field(
+        default=None, description="constitutive law of the finite elements"
+    )
+    springs: str | None = Field(
+        default=None,
+        description="name of a springs model of the study, to be solved by CalculiX instead of finite elements",
+    )
+    element: Literal["linear", "quadratic"] | None = Field(default=None, description="order of the finite elements")
 
     @model_validator(mode="after")
     def _one_body(self) -> "CalculixTable":
@@ -445,37 +518,54 @@ class CalculixTable(Table):
 class TerzopoulosTable(Table):
     """The metric-tensor model on a regular grid."""
 
-    kind: Literal["terzopoulos"]
-    boundary: Literal["paper", "trapezoid"] = "paper"
+    kind: Literal["terzopoulos"] = Field(description="the metric-tensor model of Terzopoulos et al.")
+    boundary: Literal["paper", "trapezoid"] = Field(
+        default="paper", description="weights at the boundary: those of the paper, or of the trapezoidal rule"
+    )
 
 
 class BemSpringsTable(Table):
     """A block of boundary elements, and springs beside it."""
 
-    kind: Literal["bem-springs"]
-    block: On
-    rule: PlainRuleName = "isotropic"
-    corotated: bool = False
+    kind: Literal["bem-springs"] = Field(description="a block of boundary elements, springs elsewhere")
+    block: On = Field(
+        description="elements of the block: a group of an imported mesh, or a box that holds their centres"
+    )
+    rule: PlainRuleName = Field(default="isotropic", description="stiffness rule of the springs")
+    corotated: bool = Field(default=False, description="whether the block may rotate without strain")
 
 
 class StlTable(Table):
     """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
 
-    kind: Literal["stl"]
-    file: FileName
-    undeformed: FileName | None = None
-    load_factor: Annotated[Number, Field(gt=0, le=1)] = 1.0
-    unit: str = "m"
+    kind: Literal["stl"] = Field(description="a deformed mesh computed by another program")
+    file: FileName = Field(description="STL file of the deformed body, relative to the study")
+    undeformed: FileName | None = Field(
+        default=None, description="STL file of the undeformed body with the same triangles"
+    )
+    load_factor: Annotated[Number, Field(gt=0, le=1)] = Field(default=1.0, description="load level of the file")
+    unit: str = Field(default="m", description='length unit of the files, such as "mm", which STL files do not state')
 
 
 class CompareTable(Table):
     """Which path is compared with which, and where one looks."""
 
-    model: str | None = None
-    references: list[str] | None = None
-    probe: Probe = None
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
-    refine: bool = True
+    model: str | None = Field(
+        default=None, description="name of the model that is compared with the others; default: the first springs"
+    )
+    references: list[str] | None = Field(
+        default=None, description="names of the models that it is compared with; default: all others"
+    )
+    probe: Probe = Field(
+        default=None,
+        description='node that the curves follow: "right-middle", or coordinates; default: the node that moves most',
+    )
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.05, description="largest error at which two models agree"
+    )
+    refine: bool = Field(
+        default=True, description="whether each reference is solved on finer meshes too, to estimate its own error"
+    )
 
 
 #: What a model may be, by its kind.
@@ -510,16 +600,24 @@ ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 class StudyTable(Table):
     """A whole study file."""
 
-    title: str | None = None
-    mesh: MeshTable
-    material: MaterialTable | None = None
-    region: list[RegionTable] = []
-    section: SectionTable | None = None
-    support: Annotated[list[SupportTable], Field(min_length=1)]
-    load: list[load_form(LOADS)] = []  # type: ignore[valid-type]  # the type is made of the table
-    solver: SolverTable = SolverTable()
-    models: Annotated[dict[ModelName, ModelTable], Field(min_length=1)]
-    compare: CompareTable = CompareTable()
+    title: str | None = Field(default=None, description="title of the report; default: the file's name")
+    mesh: MeshTable = Field(description="the body: a shape, a mesh file, a label image or a network")
+    material: MaterialTable | None = Field(default=None, description="material of the body")
+    region: list[RegionTable] = Field(
+        default=[], description="parts of another material; where regions overlap, the last one applies"
+    )
+    section: SectionTable | None = Field(default=None, description="section of a plane body; absent in 3D")
+    support: Annotated[list[SupportTable], Field(min_length=1)] = Field(
+        description="supports, which together prevent rigid-body motion"
+    )
+    load: list[load_form(LOADS)] = Field(  # type: ignore[valid-type]  # the type is made of the table
+        default=[], description="loads; load_factor scales all of them, linearly"
+    )
+    solver: SolverTable = Field(default=SolverTable(), description="how equilibrium is found")
+    models: Annotated[dict[ModelName, ModelTable], Field(min_length=1)] = Field(
+        description="models to solve, by names of your choice"
+    )
+    compare: CompareTable = Field(default=CompareTable(), description="which models are compared, and where")
 
     @field_validator("models")
     @classmethod
