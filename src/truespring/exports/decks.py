@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.conditions import Loading
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
 from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
@@ -22,7 +23,6 @@ from truespring.mesh.facets import facet_keys
 from truespring.mesh.files.inp_elements import FACES
 from truespring.models import Fem, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
-from truespring.potential import Loading
 from truespring.problem import Problem
 
 # The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.

@@ -22,7 +22,7 @@ from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import RULES, require_body
 from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.potential import rigid_body_modes
+from truespring.modes import rigid_body_modes
 from truespring.problem import Problem
 
 # Poisson's ratio of an isotropic lattice of plain springs (Cauchy's relation lam = mu), in the plane and in space.

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import on_the_mesh
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
@@ -17,7 +18,6 @@ from truespring.exports.exported import plain_springs
 from truespring.loading import FacePressure
 from truespring.models import Fem, Model, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
-from truespring.potential import on_the_mesh
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
