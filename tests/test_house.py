@@ -186,7 +186,7 @@ ALLOWED = {
     "assembly": {"potential"},
     "potential": set(),
     "modes": set(),
-    "mesh": set(),
+    "mesh": {"units"},
     "material": set(),
     "table": {"units"},
     "units": set(),
@@ -196,9 +196,10 @@ ALLOWED = {
     "arrays": set(),
     "completing": set(),
     "memory": set(),
+    "deprecation": set(),
     "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "completing", "errors", "memory", "opening", "kernels"}
+OPEN_TO_ALL = {"arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels"}
 HEAVY = {
     "matplotlib",
     "pyvista",

@@ -50,7 +50,7 @@ from truespring.study import schema
 from truespring.study.changes import changed
 from truespring.study.given import read_given
 from truespring.study.network import read_network
-from truespring.units import to_si
+from truespring.units import unit_size
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,10 +340,10 @@ class _Builder:
                 return box(table.size, table.elements, table.element)
             case schema.VoxelsTable() as table:
                 with self.at("mesh", "unit"):
-                    scale = _unit(table.unit)
+                    unit_size(table.unit, "length")
                 with self.at("mesh", "voxels"):
                     ready = table.voxels if table.voxels.startswith("pyvista:") else self.file.parent / table.voxels
-                    mesh = read_voxels(ready, table.label, table.edge, scale)
+                    mesh = read_voxels(ready, table.label, table.edge, table.unit)
                     return self.halved(mesh)
             case schema.NetworkMeshTable() as table:
                 if self.halvings:
@@ -352,9 +352,9 @@ class _Builder:
                 return self.network.mesh
             case table:
                 with self.at("mesh", "unit"):
-                    scale = _unit(table.unit)
+                    unit_size(table.unit, "length")
                 with self.at("mesh", "file"):
-                    mesh = read_mesh(self.file.parent / table.file, scale, table.join)
+                    mesh = read_mesh(self.file.parent / table.file, table.unit, table.join)
                     refuse_too_large(mesh.n_nodes, mesh.dim)
                     return self.halved(mesh)
 
@@ -449,11 +449,6 @@ class _Builder:
         if name not in entries:
             with self.at("compare", key):
                 raise StudyError(f"'{name}' is not among the models{nearest(name, entries)}: {', '.join(entries)}")
-
-
-def _unit(text: str) -> float:
-    """The size of a unit of length [m]: "mm", or "0.2 mm" where one of the file's is so long."""
-    return to_si(text if text[:1].isdigit() else f"1 {text}", "length")
 
 
 def _one_a_direction(values: list[float] | None, mesh: Mesh) -> None:
