@@ -18,6 +18,7 @@ SOURCE = Path(truespring.__file__).parent
 ALLOWED = {
     "__main__": {"cli"},
     "cli": {
+        "names",
         "calibration",
         "comparing",
         "converging",
