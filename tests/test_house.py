@@ -18,7 +18,6 @@ SOURCE = Path(truespring.__file__).parent
 ALLOWED = {
     "__main__": {"cli"},
     "cli": {
-        "names",
         "calibration",
         "comparing",
         "converging",
