@@ -411,7 +411,7 @@ REFUSED: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "moment that turns": (
         CCX,
         (('force = ["0 N", "-0.01 N"]', 'moment = "1 N mm"'),),
-        ("models.calculix", "prescribe the rotation"),
+        ("models.calculix", "rotation of a support"),
     ),
     "control": (
         CCX,
