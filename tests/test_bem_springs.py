@@ -20,7 +20,8 @@ from truespring.models.panels import Panels
 from truespring.modes import rigid_body_modes
 from truespring.report.bodies import path_lines
 from truespring.study import read_study, run
-from truespring.study.run import plan, write
+from truespring.study.plan import plan
+from truespring.study.writing import write
 
 YOUNG, POISSON, THICKNESS = 7.0, 0.3, 0.4
 SECTIONS: dict[str, ts.PlaneStress | ts.PlaneStrain] = {

@@ -424,7 +424,7 @@ def test_moduli_of_a_study_without_springs(tmp_path: Path, capsys: pytest.Captur
 
 def test_check_says_it_too_and_knows_bodies_in_space(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path, BOX)
-    assert main(["check", str(file)]) == 0
+    assert main(["check", str(file), "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr().out
     assert "in 24 elements 20000 Pa and 0.25" in shown and "'coupled' does not fit" in shown
     assert main(["check", str(file), "--json"]) == 0

@@ -30,6 +30,7 @@ from truespring.report.result import Result
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import figure_style
 from truespring.report.summary import summary
+from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import (
     closest_sentence,
     drive,
@@ -495,7 +496,7 @@ def test_a_sheet_draws_the_same_on_pixels_and_in_an_svg() -> None:
 
 def test_pictures_do_not_change_from_drawing_to_drawing(solved: Result) -> None:
     with figure_style():
-        assert undeformed_figure(solved).svg() == undeformed_figure(solved).svg()
+        assert undeformed_figure(undeformed_of(solved)).svg() == undeformed_figure(undeformed_of(solved)).svg()
 
 
 def test_names_at_the_ends_of_curves_keep_their_distance() -> None:

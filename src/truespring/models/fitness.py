@@ -10,7 +10,6 @@ from truespring.arrays import Bools
 from truespring.errors import ModelError
 from truespring.loading import Fixed
 from truespring.material import Material, PlaneStress
-from truespring.memory import remembered
 from truespring.mesh import Mesh, box, plural, rectangle
 from truespring.models.advice import springs_lock
 from truespring.models.bending import bending_excess
@@ -24,6 +23,7 @@ from truespring.models.springs import Springs
 from truespring.models.strain import uniform_strain, voigt_pairs
 from truespring.modes import rigid_body_modes
 from truespring.problem import Problem
+from truespring.remembering import remembered
 
 # Poisson's ratio of an isotropic lattice of plain springs (Cauchy's relation lam = mu), in the plane and in space.
 _CAUCHY = {2: 1 / 3, 3: 1 / 4}
