@@ -178,7 +178,7 @@ def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
         "support",
         "models",
     }  # a body in 3D has no section, a network no material
-    assert schema["$defs"]["SpringsTable"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
+    assert schema["$defs"]["SpringsKeys"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
 
 
 def test_prescribed_motion_without_loads(tmp_path: Path) -> None:

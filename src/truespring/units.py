@@ -66,6 +66,18 @@ def to_si(value: object, dimension: Dimension) -> float:
     return number
 
 
+def unit_size(unit: str | float, dimension: Dimension) -> float:
+    """Return the size of a unit in SI, such as of "mm", or of "0.2 mm" where one unit is so long; a number is in SI.
+
+    Raises TruespringError where it is no unit of the dimension, or not above 0.
+    """
+    written = f"1 {unit}" if isinstance(unit, str) and not unit[:1].isdigit() else unit
+    size = to_si(written, dimension)
+    if size <= 0:
+        raise TruespringError(f"{unit!r} must be above 0")
+    return size
+
+
 def _ask_for_the_case(text: str, dimension: Dimension) -> None:
     """Raise TruespringError where "10 mPa" may be meant to be 10 MPa: 1e9 times as much."""
     written, meant, plain, factor = _WRONG_CASE.get(dimension, ("", "", "", 1.0))

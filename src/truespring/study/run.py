@@ -322,7 +322,7 @@ def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
     """Return what is known of a model before it is solved."""
     problem, model = study.problem, study.entries[name]
     realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
-    plan: dict[str, Any] = {"kind": study.table.models[name].kind, "label": model.label_on(problem)}
+    plan: dict[str, Any] = {"kind": study.keys.models[name].kind, "label": model.label_on(problem)}
     plan |= {} if model.law is None else {"law": model.law}
     element = model.chosen_element(problem)
     plan |= {} if element is None else {"element": element}
