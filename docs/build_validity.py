@@ -76,7 +76,7 @@ SHOWN = (
             "loads": ["stretch"],
             "rules": ["isotropic", "isotropic+volume", "projected", "biquadratic"],
             "y": "poisson",
-            "ranges": {"poisson": (0.0, 0.45, 8), "load": (0.0, 0.2)},
+            "ranges": {"poisson": (0.0, 0.45, 9), "load": (0.0, 0.2)},
         },
     ),
     Shown(

@@ -7,7 +7,7 @@ import truespring as ts
 
 def main() -> dict[str, ts.Comparison]:
     problem = ts.Problem(
-        mesh=ts.read_mesh(Path(__file__).parent / "tissue.msh", scale=1e-3),
+        mesh=ts.read_mesh(Path(__file__).parent / "tissue.msh", unit="mm"),
         material=ts.Material(young=5e3, poisson=0.4),
         supports=[ts.Fixed(on="clamped")],
         loads=[ts.Force(on="grasped", total=(0.1, 0.0, 0.2))],

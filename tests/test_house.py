@@ -164,7 +164,7 @@ ALLOWED = {
     "problem": {"loading", "potential", "mesh", "material"},
     "loading": {"potential", "mesh", "units"},
     "potential": set(),
-    "mesh": set(),
+    "mesh": {"units"},
     "material": set(),
     "table": {"units"},
     "units": set(),
@@ -174,9 +174,10 @@ ALLOWED = {
     "arrays": set(),
     "completing": set(),
     "memory": set(),
+    "deprecation": set(),
     "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "completing", "errors", "memory", "opening", "kernels"}
+OPEN_TO_ALL = {"arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels"}
 HEAVY = {
     "matplotlib",
     "pyvista",

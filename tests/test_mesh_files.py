@@ -76,7 +76,7 @@ GMSH = {
 
 @pytest.mark.parametrize("name", GMSH)
 def test_gmsh_counts_the_same(name: str) -> None:
-    mesh = read_mesh(DATA / name, scale=1e-3)
+    mesh = read_mesh(DATA / name, unit="mm")
     n_nodes, groups = GMSH[name]
     assert mesh.n_nodes == n_nodes and sizes(mesh) == groups
     assert mesh.notes == () or "second_order" in name
@@ -166,7 +166,7 @@ def test_calculix_sees_the_same_deck(tmp_path: Path) -> None:
 
 
 def test_the_shipped_tissue_is_a_good_mesh() -> None:
-    mesh = read_mesh(TISSUE, scale=1e-3)
+    mesh = read_mesh(TISSUE, unit="mm")
     assert mesh.notes == () and mesh.element == "tetrahedron" and (mesh.parts == 0).all()
     assert sizes(mesh) == {"clamped": (242, 0), "grasped": (16, 0), "tissue": (1086, 4142)}
     assert mesh.measures.sum() == pytest.approx(52.26e-6, rel=1e-3)
@@ -277,9 +277,9 @@ def test_what_meshio_writes_comes_back(
 def test_the_scale_is_the_unit(tmp_path: Path) -> None:
     mesh, file = bodies("tetrahedron", 7), tmp_path / "mesh.inp"
     write_inp(file, mesh)
-    assert (read_mesh(str(file), scale=1e-3).nodes == mesh.nodes * 1e-3).all()
+    assert (read_mesh(str(file), unit="mm").nodes == mesh.nodes * 1e-3).all()
     for scale in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(MeshError, match=r"mesh\.inp: scale = "):
+        with pytest.raises(MeshError, match=r"mesh\.inp: unit: "):
             read_mesh(file, scale)
 
 
@@ -309,7 +309,7 @@ def grid(tmp_path: Path, points: Floats | list[list[float]], cells: list[tuple[s
 
 
 def test_nodes_without_an_element_are_left_out_and_named(tmp_path: Path) -> None:
-    mesh = deck(tmp_path, TWO_QUADS.replace("*NODE\n", "*NODE, NSET=all\n17, 300, 400\n18, 9, 9\n"), scale=0.01)
+    mesh = deck(tmp_path, TWO_QUADS.replace("*NODE\n", "*NODE, NSET=all\n17, 300, 400\n18, 9, 9\n"), unit="cm")
     assert mesh.n_nodes == 6 and sizes(mesh) == {"Body": (6, 2), "all": (6, 0)}
     assert mesh.notes == (
         "2 of 8 nodes are unreferenced (no element has them) and were left out; the first is node 17 at (3, 4, 0) m",
@@ -780,3 +780,16 @@ def test_damage_of_any_kind_ends_in_a_mesh_or_a_meshes_error(
     damaged.write_bytes(data[:begin] + instead + data[begin + length :])
     with contextlib.suppress(MeshError):
         read_mesh(damaged)
+
+
+def test_the_unit_of_a_file_is_named_or_a_number_of_metres() -> None:
+    expected = read_mesh(TISSUE).nodes * 1e-3
+    for unit in ("mm", "1 mm", 1e-3):
+        assert np.allclose(read_mesh(TISSUE, unit).nodes, expected, rtol=1e-15, atol=0)
+    with pytest.warns(DeprecationWarning, match="unit="):
+        assert np.allclose(read_mesh(TISSUE, scale=1e-3).nodes, expected, rtol=1e-15, atol=0)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="scale"):
+        read_mesh(TISSUE, unit="mm", scale=1e-3)  # type: ignore[call-arg]
+    for wrong in ("s", "0 mm", float("nan"), -1.0):
+        with pytest.raises(MeshError, match="unit"):
+            read_mesh(TISSUE, wrong)

@@ -260,7 +260,7 @@ def test_files_keep_the_nodes_in_the_middle_of_edges(
     mesh = with_round_edges(octant(2, 1) if kind == "tetrahedron" else quarter(kind))
     written = as_written(mesh)
     written.write(tmp_path / f"body{suffix}", **how)
-    found = read_mesh(tmp_path / f"body{suffix}", scale=2.0)
+    found = read_mesh(tmp_path / f"body{suffix}", unit=2.0)
     assert found.middles is not None
     assert found.nodes == pytest.approx(2 * mesh.nodes, abs=1e-12)
     assert (found.elements == mesh.elements).all()

@@ -16,9 +16,10 @@ import truespring as ts
 from tests.closed_forms import bending_factor, lattice_tension, principal_state
 from tests.studies import STUDY
 from truespring.cli import main
-from truespring.errors import TruespringError
+from truespring.errors import StudyError, TruespringError
 from truespring.study import read_study
 from truespring.validity import Validity, map_validity, reference
+from truespring.validity.axes import axis_of, read_range
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.lines import polylines, spans
 from truespring.validity.loads import LOAD_TYPES
@@ -300,7 +301,7 @@ def test_a_reference_that_ends_limits_the_map(study: Path) -> None:
 
 def test_other_axes(study: Path) -> None:
     """Elements of the right length suit Lloyd's squares alone; Poisson's ratio the rules that follow it."""
-    found = map_validity(study, rules=["lloyd", "isotropic"], x="aspect", y=None, ranges={"aspect": (1, 2, 2)})
+    found = map_validity(study, rules=["lloyd", "isotropic"], x="aspect", y=None, ranges={"aspect": (1, 2, 3)})
     lloyd, isotropic = found.maps
     assert np.isfinite(lloyd.errors[0]).tolist() == [True, False, False]
     assert "made for squares" in next(iter(lloyd.failures.values()))
@@ -311,17 +312,26 @@ def test_other_axes(study: Path) -> None:
         rules=["isotropic", "isotropic+volume"],
         x="poisson",
         y="rule",
-        ranges={"poisson": (0.1, 0.4, 1), "load": (0, 0.002)},
+        ranges={"poisson": (0.1, 0.4, 2), "load": (0, 0.002)},
     )
     plain, corrected = ratios.maps
     assert plain.errors.max() > 0.02 > 0.005 > corrected.errors.max()
     assert len(ratios.figures()) == 1 and len(ratios.references) == 2
 
 
+def test_a_range_counts_values(study: Path) -> None:
+    body = Body.of(read_study(study))
+    axis = axis_of("poisson", body, dict([read_range("poisson=0:0.4:5")]))
+    assert axis.values == pytest.approx([0, 0.1, 0.2, 0.3, 0.4]) and axis.start == (0, 1, 2, 3, 4)
+    assert axis_of("poisson", body, {}).values == pytest.approx(np.linspace(0, 0.45, 17))
+    with pytest.raises(StudyError, match="at least 2"):
+        read_range("poisson=0:0.4:1")
+
+
 def test_a_valley_between_two_rows_is_not_filled(study: Path) -> None:
     """Where springs cross the reference at another strain for each Poisson's ratio, they do so between two as well."""
     (one,) = map_validity(
-        study, loads=["stretch"], rules=["projected"], y="poisson", ranges={"poisson": (0.25, 0.4, 2)}
+        study, loads=["stretch"], rules=["projected"], y="poisson", ranges={"poisson": (0.25, 0.4, 3)}
     ).maps
     y, errors = one.smooth
     lowest = errors.min(axis=1)

@@ -64,7 +64,7 @@ def test_every_format_gives_the_body_in_its_place(suffix: str, tmp_path: Path) -
 
 def test_an_array_has_voxels_of_one_unit(tmp_path: Path) -> None:
     np.save(tmp_path / "organ.npy", labelled())
-    mesh = ts.read_voxels(tmp_path / "organ.npy", 7, scale=1e-3)
+    mesh = ts.read_voxels(tmp_path / "organ.npy", 7, unit="mm")
     assert (mesh.upper - mesh.lower) == pytest.approx([2e-3, 2e-3, 2e-3])
     assert mesh.lower == pytest.approx([3.5e-3, -0.5e-3, -0.5e-3])
 
@@ -85,7 +85,7 @@ def test_a_ball_keeps_its_volume_in_cubes_of_any_size(edge: float, tmp_path: Pat
     x = np.arange(60) - 29.5
     ball = (x[:, None, None] ** 2 + x[:, None] ** 2 + x**2 < 25**2).astype(np.int16)
     np.save(tmp_path / "ball.npy", ball)
-    mesh = ts.read_voxels(tmp_path / "ball.npy", 1, edge=edge, scale=0.4e-3)
+    mesh = ts.read_voxels(tmp_path / "ball.npy", 1, edge=edge, unit="0.4 mm")
     sides = mesh.nodes[mesh.elements[:, 1]] - mesh.nodes[mesh.elements[:, 0]]
     assert np.linalg.norm(sides, axis=1) == pytest.approx(np.full(len(sides), edge))
     assert mesh.measures.sum() == pytest.approx(4 / 3 * np.pi * (25 * 0.4e-3) ** 3, rel=0.02)
@@ -124,7 +124,7 @@ def test_voxels_of_an_organ_are_solved_as_any_body(tmp_path: Path) -> None:
 def test_the_frog_comes_with_pyvista() -> None:
     labels = read_labels("pyvista:frog_tissues")
     assert labels.values.shape == (500, 470, 136)
-    mesh = ts.read_voxels("pyvista:frog_tissues", 10, edge=5.354e-3, scale=1e-3)
+    mesh = ts.read_voxels("pyvista:frog_tissues", 10, edge=5.354e-3, unit="mm")
     assert 1900 < len(mesh.elements) < 2100
 
 

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, TruespringError, one_line
 from truespring.mesh import select
 from truespring.models import Model, as_model
@@ -21,11 +22,12 @@ from truespring.solvers import Equilibrium, Geometry, Newton, Reporter, Solver, 
 from truespring.soundness import UNBALANCED, path_status, path_warnings
 
 
+@renamed_argument("report", "progress")
 def solve(
     problem: Problem,
     model: Model | Potential,
     solver: Solver | None = None,
-    report: Reporter | None = None,
+    progress: Reporter | None = None,
     timeout: float | None = None,
 ) -> Solution:
     """Follow the equilibria of `problem` under `model` from no load to the full one.
@@ -37,7 +39,7 @@ def solve(
         solver: Newton, the default, which applies the load in steps and keeps to stable states; DisplacementControl or
             ArcLength, which continue past limit points, through unstable states too; or any object with a method
             `follow(potential, loading, report, geometry)`.
-        report: called after each iteration with load factor, iteration and relative residual.
+        progress: called after each iteration with load factor, iteration and relative residual.
         timeout: seconds after which the path ends; of another program an hour by default.
 
     A failure is not an exception: see Solution.status and Solution.best; what a library raises on the way ends the
@@ -45,13 +47,13 @@ def solve(
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
     if isinstance(model, Program):
-        return model.run(problem, solver, report, timeout)
+        return model.run(problem, solver, progress, timeout)
     realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
     from truespring.kernels.threads import compiling
 
     with compiling() as compiled:
         started = time.perf_counter()
-        path = _solve(problem, model, solver, _timed(report, timeout))
+        path = _solve(problem, model, solver, _timed(progress, timeout))
         return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=realised)
 
 

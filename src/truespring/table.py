@@ -13,7 +13,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import MeshError, TruespringError, nearest
 from truespring.opening import read_file
-from truespring.units import Dimension, to_si
+from truespring.units import Dimension, unit_size
 
 #: Tells which columns other names may mean: from the names that are not known to those that are.
 Synonyms = Callable[[Sequence[str]], Mapping[str, str]]
@@ -145,7 +145,7 @@ class Table:
     def _is_unit(self, text: str) -> bool:
         for dimension in {one for one in self._known.values() if one is not None}:
             try:
-                to_si(f"1 {text}", dimension)
+                unit_size(text, dimension)
             except TruespringError:
                 continue
             return True
@@ -166,7 +166,7 @@ class Table:
         if unit and dimension is None:
             raise self._error(f"{self._file}:1: column {name} has no unit")
         try:
-            self._scales[name] = to_si(f"1 {unit}", dimension) if unit and dimension else 1.0
+            self._scales[name] = unit_size(unit, dimension) if unit and dimension else 1.0
         except TruespringError as error:
             raise self._error(f"{self._file}:1: {name}: {error}") from None
         self.columns[name], self.units[name] = place, unit

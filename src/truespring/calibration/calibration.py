@@ -15,6 +15,7 @@ from truespring.calibration.objective import Objective, relative_errors
 from truespring.calibration.partial import GAUSS_NEWTON, fit_equilibria
 from truespring.calibration.unknowns import Unknowns, make_unknowns
 from truespring.comparison import Decisive, compare, largest
+from truespring.deprecation import renamed_argument
 from truespring.equilibrium import Solution, Status, solve
 from truespring.errors import ModelError, ProblemError
 from truespring.models import GivenSprings, Springs
@@ -209,6 +210,7 @@ def _joined(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
+@renamed_argument("report", "progress")
 def calibrate(
     cases: LoadCase | Sequence[LoadCase],
     springs: Springs,
@@ -216,7 +218,7 @@ def calibrate(
     held_out: LoadCase | Sequence[LoadCase] = (),
     regularisation: float = REGULARISATION,
     evaluations: int = 20,
-    report: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Fit the stiffness of springs to what is known of load cases, and test them on cases held out.
 
@@ -236,7 +238,7 @@ def calibrate(
     body = fitted[0].problem
     require_one_body([(case.name, case.problem) for case in (*fitted, *apart)], body)
     found = make_unknowns(body, springs, unknowns)
-    say = report or (lambda text, share: None)
+    say = progress or (lambda text, share: None)
     say("equilibrium of full fields", 0.0)
     system = equations(found, fitted)
     starts = {"rule": found.start}

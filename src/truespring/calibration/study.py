@@ -85,7 +85,7 @@ def calibrate_study(
             progress(text, 0.5 + 0.5 * share)
 
     with _naming(study):
-        calibration = calibrate(fitted, model, unknowns, apart, regularisation, report=say)
+        calibration = calibrate(fitted, model, unknowns, apart, regularisation, progress=say)
     files = [str(file) for file in (markers, curve) if file is not None]
     return Calibrated(study, name, ", ".join(files) or names[0], calibration)
 

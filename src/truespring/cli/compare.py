@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
         reading = None if advance is None else lambda text, share: advance("reading", text, share)
         results = list(compare_sources(sources, probe, options.tolerance, reading, options.timeout))
     with writing(options.out):
-        report = write_comparisons(results, options.out, options.source, given)
+        report = write_comparisons(results, options.out, options.command)
     screen = console(options)
     for result in results:
         for part in difference_tables(result):

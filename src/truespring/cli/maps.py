@@ -43,8 +43,8 @@ def _add(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="A=FIRST:LAST[:COUNT]",
-        help="range of an axis: depth=1:8, load=0:0.4 (a strain, a share of the length, an angle), poisson=0:0.45:16; "
-        "may be repeated",
+        help="range of an axis: depth=1:8, load=0:0.4 (a strain, a share of the length, an angle), "
+        "poisson=0:0.45:17 (with 17 values on the finest grid); may be repeated",
     )
     parser.add_argument("--whole", action="store_true", help="solve the whole grid, not only where lines pass")
     add_workers(parser, "this one")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.comparing.misfits import box_words, refuse_misfit
-from truespring.comparing.options import Given, read_place
+from truespring.comparing.options import read_place
 from truespring.comparing.sources import Progress, Source, open_source
 from truespring.comparison import TOLERANCE, Comparison, compare
 from truespring.equilibrium import Solution
@@ -161,13 +160,11 @@ def read_probe(text: str | None) -> Probe:
         raise StudyError(f"--probe {text}: {error}") from None
 
 
-def write_comparisons(results: Sequence[Result], out: Path, texts: Sequence[str], given: Given) -> Path:
-    """Write what each result leaves behind into out, or where there are several into folders of it; return the report.
+def write_comparisons(results: Sequence[Result], out: Path, command: str) -> Path:
+    """Write the files of each result into out, or where there are several into folders of it; return the report.
 
-    `texts` and `given` are what was compared and what was told of it; they make the command that the report names.
+    `command` is the command line that repeats the comparison, named in the report.
     """
-    told = [part for name, values in given for value in values for part in (f"--{name.replace('_', '-')}", value)]
-    command = shlex.join(["truespring", "compare", *texts, *told, "--out", str(out)])
     for result in results:
         write_comparison(result, out if len(results) == 1 else out / result.file, command)
     report = out / "report.html"

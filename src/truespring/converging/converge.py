@@ -11,6 +11,7 @@ import numpy as np
 from truespring.comparison import most_moved
 from truespring.converging.page import render_settling
 from truespring.converging.settling import Attempt, Refinement, refinement
+from truespring.deprecation import renamed_argument
 from truespring.equilibrium import Solution
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
@@ -20,18 +21,20 @@ from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 
 
+@renamed_argument("report", "progress")
 def converge(
     study: Study | str | Path,
     tolerance: float = 0.01,
     most: int = 5,
-    report: Callable[[Study, str], None] | None = None,
+    progress: Callable[[Study, str], None] | None = None,
 ) -> Iterator[Refinement]:
     """Solve a study on meshes of half the size each time; yield after each what all models tell.
 
-    It ends when all that tells something has settled to `tolerance`, where a model does not reach full load, or after
+    It ends when every watched quantity has settled to `tolerance`, where a model does not reach full load, or after
     `most` meshes. Watched are the probe's displacement along each axis, the stored energy, and force and torque of
-    each moved support. A mesh on which a model is inverted, unstable or not converged settles nothing. Raises
-    StudyError where the mesh cannot be refined.
+    each moved support. A mesh on which a model is inverted, unstable or not converged settles nothing. `progress` is
+    called with the refined study and the name of a model before that is solved. Raises StudyError where the mesh
+    cannot be refined.
     """
     given = study if isinstance(study, Study) else read_study(study)
     attempts: list[Attempt] = []
@@ -44,8 +47,8 @@ def converge(
             raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")
         mesh = study.problem.mesh
         for name, model in models.items():
-            if report:
-                report(study, name)
+            if progress:
+                progress(study, name)
             path = follow(study, model)
             attempts.append(_attempt(name, path))
             if not path.complete:

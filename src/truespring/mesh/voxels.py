@@ -7,9 +7,11 @@ import numpy as np
 from scipy import ndimage
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.deprecation import renamed_argument
 from truespring.errors import MeshError
 from truespring.mesh.files.images import read_labels
 from truespring.mesh.files.labels import Labels
+from truespring.mesh.files.unit import length_unit
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.shapes import refuse_too_large
 
@@ -19,22 +21,22 @@ _SAMPLES = 3
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
 
-def read_voxels(file: str | Path, label: int | str, edge: float | None = None, scale: float = 1e-3) -> Mesh:
+@renamed_argument("scale", "unit")
+def read_voxels(file: str | Path, label: int | str, edge: float | None = None, unit: str | float = "mm") -> Mesh:
     """Read the body of one label from a label image, a hexahedron a voxel.
 
     Args:
         file: the image: .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vti or .npy.
         label: the body's own, a number, or the name of a segment of a .seg.nrrd file.
         edge: of the cubes wanted [m]; None takes the voxels as they are, cuboids where their spacing is.
-        scale: the image's unit of length [m]; most know millimetres only.
+        unit: the image's unit of length, such as "mm", or "0.2 mm" where one of its is so long; a number is in metres.
 
     Of several parts that no face joins the largest is taken; the notes say what was left out. Places are those of
     the image: origin, spacing and direction count; of medical images x points to the patient's left and y to the back
     (LPS, as in DICOM and ITK). Raises MeshError, with the file, where the image cannot be read
     or has no such label, or nothing is left of it.
     """
-    if not (math.isfinite(scale) and scale > 0):
-        raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
+    scale = length_unit(unit, file)
     if edge is not None and not (math.isfinite(edge) and edge > 0):
         raise MeshError(f"{file}: edge = {edge:g} m: the edge of the cubes must be above 0")
     labels = read_labels(file)

@@ -14,7 +14,7 @@ from truespring.mesh import Grid, Mesh, corner_mesh
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
 from truespring.reference.record import Record
-from truespring.units import to_si
+from truespring.units import unit_size
 
 # A body this thin lies in a plane, a share of its diameter; displacements out of it are as small beside the others.
 _FLAT = 1e-6
@@ -92,10 +92,9 @@ class Placing:
 def _unit(text: str, dimension: Literal["length", "force"]) -> float | None:
     """The size of a unit in SI, None where it is none of the dimension."""
     try:
-        size = to_si(text if text[:1].isdigit() else f"1 {text}", dimension)
+        return unit_size(text, dimension)
     except TruespringError:
         return None
-    return size if size > 0 else None
 
 
 def placed(record: Record, placing: Placing, label: str) -> Solution:

@@ -19,13 +19,13 @@ NUMBERS = {
 }
 NAMES = {"rule": "rule", "load-type": "load type"}
 
-# Intervals of the finest grid upon an axis of numbers that are not whole, and sizes of the load that are told.
-_FINEST, _SIZES = 16, 120
+# Values of the finest grid on an axis of real numbers, and intervals between the sizes of the load.
+_FINEST, _SIZES = 17, 120
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What `--range` says of an axis: from first to last, in so many intervals at the finest."""
+    """The range of an axis, as of `--range`: from `first` to `last`, with `count` values on the finest grid."""
 
     first: float
     last: float
@@ -68,11 +68,11 @@ def read_range(text: str) -> tuple[str, Range]:
 
 
 def range_of(name: str, given: Range | Sequence[float]) -> Range:
-    """Return first, last and if wanted the number of intervals as a range; raise StudyError where they are none."""
+    """Return (first, last) or (first, last, number of values) as a range; raise StudyError where it is none."""
     if isinstance(given, Range):
         return checked(name, given)
     if len(given) not in (2, 3):
-        raise StudyError(f"range of {name} = {list(given)}: first, last and if wanted the number of intervals")
+        raise StudyError(f"range of {name} = {list(given)}: give first, last and, optionally, the number of values")
     return checked(name, Range(float(given[0]), float(given[1]), int(given[2]) if len(given) == 3 else None))
 
 
@@ -81,8 +81,8 @@ def checked(name: str, given: Range) -> Range:
     place = f"range of {name} = {given.first:g}:{given.last:g}"
     if not (math.isfinite(given.first) and math.isfinite(given.last) and given.first < given.last):
         raise StudyError(f"{place}: the first must be below the last")
-    if given.count is not None and given.count < 1:
-        raise StudyError(f"{place}:{given.count}: at least one interval is wanted")
+    if given.count is not None and given.count < 2:
+        raise StudyError(f"{place}:{given.count}: give at least 2 values, from the first to the last")
     if name == "depth" and not (given.first >= 1 and given.first.is_integer() and given.last.is_integer()):
         raise StudyError(f"{place}: whole numbers from 1 on are wanted, elements through the depth")
     if name == "aspect" and given.first <= 0:
@@ -120,9 +120,9 @@ def sizes_to(last: float) -> Floats:
 
 def _even(name: str, given: Range) -> Axis:
     count = given.count or _FINEST
-    values = np.linspace(given.first, given.last, count + 1)
-    step = max(1, count // 4)
-    return Axis(name, values, tuple(dict.fromkeys([*range(0, count, step), count])))
+    values = np.linspace(given.first, given.last, count)
+    step = max(1, (count - 1) // 4)
+    return Axis(name, values, tuple(dict.fromkeys([*range(0, count - 1, step), count - 1])))
 
 
 def _depths(body: Body, given: Range | None) -> Axis:

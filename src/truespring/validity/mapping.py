@@ -57,7 +57,7 @@ def map_validity(
             or all rules where it has none.
         x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
         y: another of them, or "rule" or "load-type", or None. A mesh from a file has no depth: "rule" there.
-        ranges: first, last and if wanted the number of intervals at the finest, by axis; the load's from 0 on.
+        ranges: first, last and, optionally, the number of values on the finest grid, by axis; the load's from 0 on.
         adaptive: solve only where a line passes; else the whole grid.
         workers: processes on this machine; 1 solves in this one. None takes as many as cores.
         scheduler: address of a Dask cluster whose workers are taken instead.

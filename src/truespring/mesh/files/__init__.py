@@ -7,18 +7,19 @@ what it has read so far. The readers here name the line or byte of a fault, coun
 on files that those programs wrote.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from truespring.deprecation import renamed_argument
 from truespring.errors import MeshError
 from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
 from truespring.mesh.files.heads import Recognises, foreign, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
+from truespring.mesh.files.unit import length_unit
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
@@ -55,7 +56,8 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
 )
 
 
-def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) -> Mesh:
+@renamed_argument("scale", "unit")
+def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = None) -> Mesh:
     """Read a mesh file; its content tells the format, else its suffix.
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
@@ -77,7 +79,7 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
 
     Args:
         file: the mesh file.
-        scale: the file's unit of length [m].
+        unit: the file's unit of length, such as "mm", or "0.2 mm" where one of its is so long; a number is in metres.
         join: whether nodes that stand at one place become one; by default where no two elements share a node.
 
     Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
@@ -86,8 +88,7 @@ def read_mesh(file: str | Path, scale: float = 1.0, join: bool | None = None) ->
     mostly with a note on nodes that no element has.
     """
     file = Path(file)
-    if not (math.isfinite(scale) and scale > 0):
-        raise MeshError(f"{file}: scale = {scale:g} is no length of the file's unit in metres: it must be above 0")
+    scale = length_unit(unit, file)
     data = _bytes(file)
     key = format_by_head(file.suffix, data, {suffix: form.recognises for suffix, form in FORMATS.items()})
     if key is None:

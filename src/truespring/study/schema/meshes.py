@@ -107,9 +107,9 @@ class FileKeys(MeshKeys):
     def build(self, places: Places, halvings: int) -> Mesh:
         """Read the mesh and refine it."""
         with places.at("mesh", "unit"):
-            scale = unit_size(self.unit, "length")
+            unit_size(self.unit, "length")
         with places.at("mesh", "file"):
-            mesh = read_mesh(places.beside(self.file), scale, self.join)
+            mesh = read_mesh(places.beside(self.file), self.unit, self.join)
             refuse_too_large(mesh.n_nodes, mesh.dim)
             return _halved(mesh, halvings)
 
@@ -129,10 +129,10 @@ class VoxelsKeys(MeshKeys):
     def build(self, places: Places, halvings: int) -> Mesh:
         """Read the image, mesh the label and refine the mesh."""
         with places.at("mesh", "unit"):
-            scale = unit_size(self.unit, "length")
+            unit_size(self.unit, "length")
         with places.at("mesh", "voxels"):
             file = self.voxels if self.voxels.startswith("pyvista:") else places.beside(self.voxels)
-            return _halved(read_voxels(file, self.label, self.edge, scale), halvings)
+            return _halved(read_voxels(file, self.label, self.edge, self.unit), halvings)
 
 
 class NetworkFilesKeys(MeshKeys):
