@@ -190,7 +190,7 @@ def test_output_whose_reader_has_gone() -> None:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         said = process.stderr.read()
-    assert process.returncode == 1
+    assert process.returncode == 141
     assert len(said.splitlines()) == 1 and said.startswith("truespring: standard output cannot be written")
 
 
