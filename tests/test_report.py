@@ -307,17 +307,11 @@ def test_moduli_are_said_beside_the_material() -> None:
     # Uniform tension of the summed lattice: 15/17 E and 7/17 along x, 21/19 E and 5/19 at 45 degrees.
     text = moduli_sentence(ts.solve(problem, ts.Springs("lloyd")))
     assert text is not None
-    assert (
-        "8.82 kPa and 0.41 along x, 11.1 kPa and 0.26 at 45 degrees; the material in its section has 10 kPa and 0.33."
-        in text
-    )
+    assert "0.882 to 1.105" in text and "0.263 to 0.412" in text and "0.333" in text
     # One square under u = -x y stores E/(1 - nu^2) y^2 and G x^2: 9/8 and 3/8 of what the material would.
-    assert (
-        "Bent 1 element deep, they have 1.875 times the material's bending stiffness EI; "
-        "linear four-node FEM on this mesh has 1.500 times." in text
-    )
+    assert "1.875" in text and "1.500" in text
     isotropic = moduli_sentence(ts.solve(problem, ts.Springs("isotropic")))
-    assert isotropic is not None and isotropic.startswith("These springs realise the material, in every direction")
+    assert isotropic is not None and "1.000 times the material's (1e+04 Pa) in every direction" in isotropic
 
 
 @pytest.mark.parametrize(

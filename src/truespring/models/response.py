@@ -7,13 +7,13 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
-from truespring.memory import remembered
 from truespring.mesh import Mesh
-from truespring.models.fem import fem_of_one_kind
+from truespring.models.by_rule import SpringsByRule
+from truespring.models.fem_potential import fem_of_one_kind
 from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import require_body
-from truespring.models.springs import Springs
 from truespring.problem import Problem
+from truespring.remembering import remembered
 
 
 class Response(NamedTuple):
@@ -34,7 +34,7 @@ class Response(NamedTuple):
 
 
 @remembered
-def response(problem: Problem, springs: Springs) -> Response | None:
+def response(problem: Problem, springs: SpringsByRule) -> Response | None:
     """Return the response of a free body of triangles or tetrahedra; None where no equilibrium is found.
 
     The body is loaded by the nodal forces of a stress field that is in equilibrium, integral of stress : grad N. Their

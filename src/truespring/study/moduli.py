@@ -1,6 +1,7 @@
 """The effective moduli of the springs of a study, known without solving."""
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 from truespring.material import Material
 from truespring.models import (
     RULES,
+    Finding,
     Fitness,
     Moduli,
     Springs,
@@ -77,7 +79,20 @@ def realised_values(realised: Realised) -> dict[str, Any]:
         "reasons": list(fitness.reasons),
         "better": None if better is None else {"rule": better.rule, "volume": better.volume},
         "sentence": fitness.sentence,
+        "findings": finding_values(fitness.findings),
     }
+
+
+def finding_values(findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    """Return findings as values that JSON can hold; a number that is not finite is None."""
+    return [
+        {
+            "code": one.code,
+            "numbers": {name: value if math.isfinite(value) else None for name, value in one.numbers.items()},
+            "sentence": one.sentence,
+        }
+        for one in findings
+    ]
 
 
 def _material(material: Material) -> dict[str, float]:

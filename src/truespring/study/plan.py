@@ -14,6 +14,7 @@ from truespring.models import (
 from truespring.potential import Stretched
 from truespring.problem import Problem
 from truespring.report.summary import moduli_values
+from truespring.study.moduli import finding_values
 from truespring.study.read import Study
 
 
@@ -71,5 +72,5 @@ def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
         plan |= {"n_springs": len(potential.springs)} if isinstance(potential, Stretched) else {}
     for springs in springs_by_rule({name: model}).values():
         fitness = judge(problem, springs, study.tolerance)
-        plan |= {"fit": fitness.fit, "sentence": fitness.sentence}
+        plan |= {"fit": fitness.fit, "sentence": fitness.sentence, "findings": finding_values(fitness.findings)}
     return plan | {"warnings": list(model.warnings(problem))}
