@@ -479,7 +479,7 @@ def test_a_faulty_study_is_refused(change: tuple[str, str], said: str, tmp_path:
 
 def test_its_springs_are_judged_before_the_solve() -> None:
     problem = cantilever((8, 2), 1e-4)
-    assert any("0.882353 Pa" in text for text in ts.BemSprings(HALF, "lloyd").warnings(problem))
+    assert any("0.882 to 1.105" in text for text in ts.BemSprings(HALF, "lloyd").warnings(problem))
 
 
 def test_hooke_is_what_uniform_strain_is_compared_with() -> None:
