@@ -18,6 +18,7 @@ from matplotlib.patches import PathPatch, Rectangle
 
 import truespring as ts
 from truespring.mesh import Surface
+from truespring.reference import Level, Placing, Record, placed
 from truespring.report.bodies import undeformed_figure
 from truespring.report.curves import write_reactions
 from truespring.report.drawing import Drawing
@@ -32,6 +33,7 @@ from truespring.report.style import figure_style
 from truespring.report.summary import summary
 from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import (
+    carrying_sentence,
     closest_sentence,
     drive,
     force_sentence,
@@ -208,6 +210,20 @@ def test_a_reference_that_stops_early_is_named() -> None:
         "the last level that both reached. At full load: linear FEM 0 %. "
         "With Hencky FEM the comparison ends at load factor 0.4, there 0 %."
     )
+
+
+def test_the_one_that_is_carried_is_named_with_the_nodes_of_the_other() -> None:
+    problem = stretched()
+    springs = path(problem, kind="springs", label="springs (lloyd)")
+    fine = path(replace(problem, mesh=ts.rectangle(size=(0.08, 0.02), elements=(6, 1))), label="linear FEM")
+    points = np.array([[0.01, 0.005, 0.0], [0.05, 0.012, 0.0], [0.07, 0.018, 0.0]])
+    markers = placed(Record(FilePath("m.csv"), "csv", points, {}, (Level(1.0, 0 * points),)), Placing(), "markers")
+    for other, text in (
+        (fine, "linear FEM is carried to the 10 nodes of springs"),
+        (markers, "springs (lloyd) is carried to the 3 nodes of markers"),
+    ):
+        found = replace(result(springs, {"other": other}), in_detail=True)
+        assert (carrying_sentence(found) or "").startswith(text)
 
 
 def test_verdict_without_references() -> None:
