@@ -14,7 +14,7 @@ from tests.calculix import displacements, needs_ccx
 from tests.exports import difference, exported
 from truespring.arrays import Floats
 from truespring.errors import ExportError
-from truespring.exports import Exported, solve_springs, target_files
+from truespring.exports import Exported, target_files
 from truespring.exports.calculix import fem_deck, spring_deck
 from truespring.loading.pressure import SurfacePressure
 from truespring.mesh import read_mesh
@@ -105,7 +105,7 @@ def on_nodes(card: Card, shape: tuple[int, int], value: int) -> Floats:
 def check_springs(text: str, one: Exported, unit: float) -> None:
     """All numbers of a deck of springs are those of the network and the problem."""
     model, steps = model_and_steps(text)
-    network, loading = one.network("the test"), one.problem.loading
+    network, loading = one.network, one.problem.loading
     (nodes,) = among(model, "NODE")
     assert numbers(nodes)[:, 1:] == pytest.approx(network.nodes, rel=1e-11, abs=1e-18)
     found = springs_of(model)
@@ -320,7 +320,7 @@ def test_other_readers_see_the_same_mesh(target: str, tmp_path: Path) -> None:
         order = np.argsort(np.concatenate([one.numbers for one in lines]))
         assert {one.kind for one in lines} == {"line"}
         ends = np.concatenate([one.nodes for one in lines])[order]
-        assert (ends == exported(case).network("").springs + 1).all()
+        assert (ends == exported(case).network.springs + 1).all()
 
 
 # --- settling ----------------------------------------------------------------------------------------------------
@@ -394,36 +394,13 @@ def test_without_a_continuum_there_are_springs_alone(target: str) -> None:
     ).replace("\n**   ", "")
 
 
-def bent(model: ts.Springs, *loads: object) -> Exported:
-    section = ts.PlaneStrain(0.01)
-    problem = ts.Problem(
-        ts.rectangle((0.08, 0.04), (8, 4)), ts.Material(10e3, 0.25), section, [ts.Fixed("left")], loads
-    )  # type: ignore[arg-type]
-    return solve_springs(problem, model, ts.Newton(load_steps=2), "bent")
-
-
-@targets
-def test_what_springs_cannot_be_is_refused_with_the_way_out(target: str) -> None:
-    force, moment = ts.Force("right", (0.0, -0.01)), ts.Moment("right", 1e-5)
-    refused = [
-        (bent(ts.Springs("isotropic", volume=True), force), "volume = true.*npz"),
-        (bent(ts.Springs("biquadratic"), force), "each other's lengths.*another rule"),
-        (bent(ts.Springs("lloyd"), moment), r"moment .* follows a face.*rotation of a support"),
-        (exported("pressed"), r"pressure .* follows a face.*traction"),
-        (exported("prestressed"), "2 springs have another, the first, number 0, 9 m instead of 10 m.*mujoco"),
-    ]
-    for one, words in refused:
-        with pytest.raises(ExportError, match=words):
-            target_files(one, [target])
-
-
 def test_levels_laws_and_elements_that_are_none_are_refused() -> None:
     problem = exported("bending").problem
     for levels in ([], [0.0, 1.0], [0.5, 0.5], [1.0, 0.5], [0.5, 1.1]):
         with pytest.raises(ExportError, match="ascending"):
             fem_deck(problem, levels, "linear")
         with pytest.raises(ExportError, match="ascending"):
-            spring_deck(problem, exported("bending").network(""), levels)
+            spring_deck(problem, exported("bending").network, levels)
     with pytest.raises(ExportError, match="neo-hookean"):
         fem_deck(problem, [1.0], "neo-hookean")
     with pytest.raises(ExportError, match="tetrahedra"):

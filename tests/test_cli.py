@@ -77,7 +77,8 @@ def test_summary(out: Path) -> None:
     assert springs["moduli"]["poisson"] == pytest.approx(7 / 17)
     assert springs["moduli"]["anisotropy"] == pytest.approx(7 / 5)
     # What the springs realise differs from the material (nu 0.3): both numbers are named.
-    assert "0.4118" in springs["warnings"][0] and "0.3" in springs["warnings"][0]
+    assert "0.882 to 1.105" in springs["warnings"][0]
+    assert "0.412" in springs["warnings"][1] and "0.300" in springs["warnings"][1]
     assert springs["moduli"]["young_max"] == pytest.approx(21 / 19 * 10e3)
     assert "moduli" not in linear and linear["warnings"] == []
     assert summary["closest"] == "linear"
@@ -155,10 +156,14 @@ def test_solve_writes_no_comparison(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path)
-    assert main(["check", str(file)]) == 0
+    out = tmp_path / "out"
+    assert main(["check", str(file), "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "8.824 to 11.05 kPa" in shown and "0.263 to 0.412" in shown and "Zener" not in shown
-    assert main(["check", str(file), "-v"]) == 0
+    assert shown.splitlines()[-1] == f"picture: {out / 'study' / 'check.png'}"
+    assert {one.name for one in (out / "study").iterdir()} == {"check.png", ".truespring.json"}
+    assert (out / "study" / "check.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["check", str(file), "-v", "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     for text in ("27 nodes", "16 elements", "48 unknowns", "Zener", "1.4000", "bending factor EI, 2 elements deep"):
         assert text in shown
@@ -167,7 +172,7 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
     assert plan["total_force"] == pytest.approx([0, -0.01])
     assert plan["models"]["springs"]["n_springs"] == 8 * 3 + 2 * 9 + 2 * 16
-    assert {path.name for path in tmp_path.iterdir()} == {"study.toml"}
+    assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "out"}
 
 
 def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
@@ -295,7 +300,7 @@ def test_a_network_is_checked_and_solved_as_any_study(tmp_path: Path, capsys: py
     told = json.loads(capsys.readouterr().out)
     assert told["models"]["truss"] == {"kind": "network", "label": "springs", "n_springs": 2, "warnings": []}
     assert told["material"] is None and told["load_steps"] == 18
-    assert main(["check", truss]) == 0 and "total force (0, -4) N" in capsys.readouterr().out
+    assert main(["check", truss, "--out", str(tmp_path)]) == 0 and "total force (0, -4) N" in capsys.readouterr().out
     assert main(["verify", truss, "--out", str(tmp_path)]) == 0
     assert "limit points at load factors 0.7401 and -0.7401" in " ".join(capsys.readouterr().out.split())
     rows = (tmp_path / "truss" / "curves.csv").read_text().splitlines()

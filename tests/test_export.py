@@ -4,10 +4,12 @@ Every file is read by another reader than its writer: MuJoCo itself, ElementTree
 """
 
 import ast
+import io
 import json
 import re
+import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -21,12 +23,14 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import truespring as ts
+from tests.calculix import displacements
 from tests.exports import CASES, difference, expected, exported
 from tests.studies import changed, written
 from truespring.arrays import Floats
 from truespring.cli import main
 from truespring.errors import ExportError
-from truespring.exports import TARGETS, Exported, solve_springs, target_files
+from truespring.exports import TARGETS, Exported, check_targets, solve_springs, target_files
+from truespring.exports.features import Feature, features
 
 
 def text_of(one: Exported, target: str) -> str:
@@ -517,33 +521,134 @@ def test_files_tell_units_supports_loads_and_what_to_expect(case: str, target: s
     assert ("turned places" in head) == (case == "turned")
 
 
-def test_springs_that_a_program_has_not_are_refused_before_they_are_solved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+# --- the contract of every target ------------------------------------------------------------------------------------
+
+_BLOCK = ts.box(size=(0.08, 0.04, 0.04), elements=(4, 2, 2))
+_CLAMPED = [ts.Fixed(on="left")]
+
+
+def _pulled(mesh: ts.Mesh = _BLOCK) -> ts.Problem:
+    section = ts.PlaneStress(0.01) if mesh.dim == 2 else None
+    pull = ts.Force(on="right", total=(0.01, 0.0, 0.0)[: mesh.dim])
+    return ts.Problem(mesh, ts.Material(10e3, 0.25), section, supports=_CLAMPED, loads=[pull])
+
+
+def _with_feature() -> dict[Feature, tuple[ts.Problem, Any]]:
+    """A body that has a feature, of each."""
+    flat = _pulled(ts.rectangle(size=(0.3, 0.02), elements=(10, 2)))
+    prestressed = exported("prestressed")
+    return {
+        Feature.VOLUME_TERM: (_pulled(), ts.Springs("isotropic", volume=True)),
+        Feature.COUPLING: (_pulled(), ts.Springs("biquadratic")),
+        Feature.NEGATIVE: (flat, ts.Springs("isotropic", allow_negative=True)),
+        Feature.PRESTRESS: (prestressed.problem, network_of(prestressed)),
+        Feature.FOLLOWING: (exported("pressed").problem, ts.Springs("lloyd")),
+    }
+
+
+@pytest.mark.parametrize("feature", Feature)
+def test_a_target_takes_what_it_names_and_no_more(
+    feature: Feature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    problem, model = _with_feature()[feature]
+    solved = solve_springs(problem, model, ts.Newton(load_steps=1))
+    found = {one for one, _ in features(problem, solved.springs)}
+    assert found == {feature}, "the body shows nothing else"
     monkeypatch.setattr("truespring.exports.exported.solve", None)
-    mesh = ts.box(size=(0.08, 0.04, 0.04), elements=(4, 2, 2))
-    pull = [ts.Force(on="right", total=(0.0, -1.0, 0.0))]
-    problem = ts.Problem(mesh, ts.Material(10e3, 0.3), supports=[ts.Fixed(on="left")], loads=pull)
-    for springs, what in (
-        (ts.Springs("isotropic", volume=True), "volume term"),
-        (ts.Springs("biquadratic"), "other's lengths"),
-    ):
-        for target in ("calculix", "abaqus", "mujoco", "sofa"):
-            with pytest.raises(ExportError, match=what):
-                ts.export(problem, springs, target, tmp_path)
-    long = ts.Problem(
-        ts.rectangle(size=(0.3, 0.02), elements=(10, 2)),
-        ts.Material(10e3, 1 / 3),
-        ts.PlaneStress(0.01),
-        [ts.Fixed(on="left")],
-        [ts.Force(on="right", total=(0.01, 0.0))],
-    )
-    with pytest.raises(ExportError, match=r"no negative stiffness: \d+ springs .* -\d"):
-        ts.export(long, ts.Springs("isotropic", allow_negative=True), "mujoco", tmp_path)
+    taking = [name for name, target in TARGETS.items() if feature in target.takes]
+    assert taking
+    for name, target in TARGETS.items():
+        if name in taking:
+            check_targets([name], problem, model)
+            assert target_files(solved, [name])[name]
+            continue
+        words = re.escape(f"{target.program} takes no {feature}: ") + f".*; targets that take it: {', '.join(taking)}$"
+        with pytest.raises(ExportError, match=words):
+            ts.export(problem, model, name, tmp_path)
+        with pytest.raises(ExportError, match=words):
+            target_files(solved, [name])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_target_writes_the_files_that_it_names(target: str) -> None:
+    names, seen = TARGETS[target].names, set()
+    for case in CASES:
+        one = exported(case)
+        if {feature for feature, _ in features(one.problem, one.springs)} <= TARGETS[target].takes:
+            files = target_files(one, [target])[target]
+            assert next(iter(files)) == names[0] and all(files.values())
+            seen |= files.keys()
+    assert seen == set(names)
+
+
+def _by_calculix(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    return displacements(str(files["springs.inp"]), folder)[-1]
+
+
+def _by_mujoco(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    model = mujoco.MjModel.from_xml_string(str(files["springs.xml"]))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
+    mujoco.mj_step(model, data, 50)
+    mujoco.mj_forward(model, data)
+    return np.asarray(data.site_xpos - in_space(exported("bending").problem.mesh.nodes))
+
+
+def _by_arrays(values: Mapping[str, Any]) -> Floats:
+    """Newton's method in a few lines, from the arrays alone."""
+    nodes, springs, held = (np.asarray(values[name]) for name in ("nodes", "springs", "held"))
+    stiffness, rest, force = (np.asarray(values[name]) for name in ("stiffness", "rest_length", "external_force"))
+    here, free = nodes + np.asarray(values["prescribed_displacement"]), ~held.ravel()
+    for share in np.linspace(0.1, 1.0, 10):
+        for _ in range(20):
+            along = here[springs[:, 1]] - here[springs[:, 0]]
+            length = np.linalg.norm(along, axis=1)
+            unit = along / length[:, None]
+            residual, tangent = share * force, np.zeros((nodes.size, nodes.size))
+            outer = unit[:, :, None] * unit[:, None, :]
+            blocks = (1 - rest / length)[:, None, None] * (np.eye(2) - outer) + outer
+            for (a, b), block, pull in zip(
+                springs, stiffness[:, None, None] * blocks, (stiffness * (length - rest))[:, None] * unit, strict=True
+            ):
+                residual[a] += pull
+                residual[b] -= pull
+                for row, column, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
+                    tangent[2 * row : 2 * row + 2, 2 * column : 2 * column + 2] += sign * block
+            step = np.zeros(nodes.size)
+            step[free] = np.linalg.solve(tangent[free][:, free], residual.ravel()[free])
+            here = here + step.reshape(nodes.shape)
+            if np.abs(step).max() < 1e-13:
+                break
+    return here - nodes
+
+
+#: How a file is run, by target.
+RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
+    "calculix": _by_calculix,
+    "mujoco": _by_mujoco,
+    "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
+    "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
+}
+
+
+def test_every_target_is_run_or_says_why_not() -> None:
+    assert RUNS.keys() == {name for name, target in TARGETS.items() if not target.unrun}
+
+
+@pytest.mark.parametrize("target", RUNS)
+def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
+    if target == "calculix" and shutil.which("ccx") is None:
+        pytest.skip("CalculiX is not installed")
+    found = RUNS[target](target_files(exported("bending"), [target])[target], tmp_path)
+    assert difference(found, "bending") < 1e-6
+
+
+def test_models_and_targets_that_are_none_are_errors(tmp_path: Path) -> None:
     with pytest.raises(ExportError, match="no model of springs"):
-        ts.export(problem, ts.Fem("linear"), "npz", tmp_path)  # type: ignore[arg-type]
+        ts.export(_pulled(), ts.Fem("linear"), "npz", tmp_path)  # type: ignore[arg-type]
     with pytest.raises(ExportError, match="did you mean 'mujoco'"):
-        ts.export(problem, ts.Springs("isotropic"), "mujocco", tmp_path)
+        ts.export(_pulled(), ts.Springs("isotropic"), "mujocco", tmp_path)
     assert not list(tmp_path.iterdir())
 
 

@@ -174,10 +174,11 @@ ALLOWED = {
     "arrays": set(),
     "completing": set(),
     "memory": set(),
+    "remembering": set(),
     "deprecation": set(),
     "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels"}
+OPEN_TO_ALL = {"arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels", "remembering"}
 HEAVY = {
     "matplotlib",
     "pyvista",

@@ -278,3 +278,11 @@ def test_refinement_is_left_out_where_the_study_says_so(tmp_path: FilePath) -> N
     assert "Linear FEM on this mesh is itself" in verdict(told) and "against refined references, linear FEM" in verdict(
         told
     )
+
+
+def test_a_time_limit_ends_refinement() -> None:
+    problem, model = cantilever((4, 1)), ts.Fem("linear")
+    path = ts.solve(problem, model, ts.Newton(load_steps=1))
+    late = own_error(path, model, ts.Newton(load_steps=1), math.inf, timeout=1e-9)
+    assert late.value is None and "time limit of 1e-09 s" in late.how
+    assert own_error(path, model, ts.Newton(load_steps=1), math.inf, timeout=1000).value is not None

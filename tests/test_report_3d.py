@@ -31,6 +31,7 @@ from truespring.report.series import write_series, write_stl
 from truespring.report.style import BLUE, INK, error_colors, figure_style
 from truespring.report.surfaces import VIEW, edges_of, facets_of, lines_on, normals, outline, seen, triangles_of
 from truespring.report.tables import result_tables
+from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import drive
 from truespring.report.viewer import viewer
 
@@ -293,8 +294,8 @@ def test_pictures_hold_the_lines_that_lie_on_the_surface() -> None:
     assert blue.faces == pytest.approx(seen(comparison.model.states[-1].positions)[facets_of(found.problem.mesh)])
     assert black.faces == pytest.approx(seen(comparison.reference.states[-1].positions)[facets_of(found.problem.mesh)])
     assert over.title == "Full load: 10 % apart (root mean square)"
-    asked = undeformed_picture(found)
-    assert asked.title == f"As asked: 30 nodes, 8 elements, {59 + 2 * 38 + 4 * 8} springs"  # of edges, faces, cubes
+    asked = undeformed_picture(undeformed_of(found))
+    assert asked.title == f"Undeformed: 30 nodes, 8 elements, {59 + 2 * 38 + 4 * 8} springs"  # of edges, faces, cubes
 
 
 def test_the_surface_is_coloured_by_the_distance_of_its_nodes() -> None:
@@ -340,7 +341,7 @@ def test_tiny_displacements_are_magnified_and_the_distance_is_not() -> None:
 
 def test_the_probe_the_arrow_and_the_scale_are_where_they_belong() -> None:
     found = result(body())
-    picture = undeformed_picture(found)
+    picture = undeformed_picture(undeformed_of(found))
     with figure_style():
         figure = figure_of(picture, draw(shot(picture)))
     (dot,) = called(figure, "probe")
@@ -365,7 +366,7 @@ def test_the_probe_the_arrow_and_the_scale_are_where_they_belong() -> None:
 def test_rollers_stand_on_the_sides_that_they_hold() -> None:
     held = [ts.Fixed(on=side, fix=[axis]) for side, axis in (("left", "x"), ("bottom", "y"), ("back", "z"))]
     found = result(body(supports=held))
-    picture = undeformed_picture(found)
+    picture = undeformed_picture(undeformed_of(found))
     with figure_style():
         figure = figure_of(picture, draw(shot(picture)))
     pins = [one for one in called(figure, "support") if isinstance(one, Line2D)]

@@ -10,7 +10,7 @@ from tests.studies import changed, written
 from truespring.arrays import Floats
 from truespring.errors import StudyError
 from truespring.study import read_study, run
-from truespring.study.run import plan
+from truespring.study.plan import plan
 
 YOUNG, POISSON, THICKNESS = 7.0, 0.3, 0.4
 SECTIONS = (ts.PlaneStress(THICKNESS), ts.PlaneStrain(THICKNESS))

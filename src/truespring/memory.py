@@ -1,16 +1,9 @@
-"""Memory: how much of it there is, work in slices so that little of it is taken, and answers that are kept."""
+"""Memory: how much of it this process may use, and slices of work that take little of it."""
 
-from collections.abc import Callable, Iterator
-from functools import update_wrapper
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
 
 import psutil
-
-Owner = TypeVar("Owner")
-Given = ParamSpec("Given")
-Answer = TypeVar("Answer")
 
 # What the temporary arrays of one slice may take: little beside a body, and still within reach of a cache.
 _SLICE = 2**23
@@ -50,20 +43,3 @@ def slices(n: int, bytes_each: float) -> Iterator[slice]:
     step = max(1, int(_SLICE / bytes_each))
     for first in range(0, n, step):
         yield slice(first, min(first + step, n))
-
-
-def remembered(function: Callable[Concatenate[Owner, Given], Answer]) -> Callable[Concatenate[Owner, Given], Answer]:
-    """Keep the answers of a function of an object, and of values that can be hashed, for as long as the object lives.
-
-    The answers must not hold the object themselves.
-    """
-    kept: WeakKeyDictionary[Owner, dict[object, Answer]] = WeakKeyDictionary()
-
-    def remembering(owner: Owner, /, *given: Given.args, **named: Given.kwargs) -> Answer:
-        answers = kept.setdefault(owner, {})
-        key = given, tuple(sorted(named.items()))
-        if key not in answers:
-            answers[key] = function(owner, *given, **named)
-        return answers[key]
-
-    return update_wrapper(remembering, function)

@@ -1,6 +1,7 @@
 """Refining: how far a path is from its own limit, by the same law on a finer mesh or by elements of second order."""
 
 import math
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -107,7 +108,7 @@ def reference_error(
     return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
-def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> OwnError:
+def own_error(path: Solution, model: Any, solver: Solver, most_work: float, timeout: float | None = None) -> OwnError:
     """Return how far the path of a model is from its own limit at full load.
 
     A model of first order whose law has elements of second order is held against these, on simplices of the same
@@ -115,19 +116,20 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> O
     little, of a quarter of the size, which have the share 2^(-p k) of it after k halvings, p = ORDER (Richardson).
     Where that takes more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if
     elements are alike and along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path
-    that did not reach full load, was read from a file, or finds no equilibrium on other meshes.
+    that did not reach full load, was read from a file, or finds no equilibrium on other meshes. All of it ends after
+    `timeout` [s]; what was found until then counts.
     """
     if not path.complete or not path.solved:
         return OwnError(None, "it was not solved to full load here")
     model = as_model(model)
-    found, spent = None, 0.0
+    found, spent, clock = None, 0.0, _Clock(timeout)
     try:
         for finer in _finer(path, model):
             cost = min(_ITERATIONS, max(path.newton_iterations, 1)) * finer.n_unknowns**_GROWTH
             if spent + cost > (min(most_work, COST * work_of(path)) if found else most_work):
                 break
             try:
-                limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent)
+                limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent, clock)
             except MeshError:  # an element is too far from convex to be divided into simplices: halved it is as good
                 continue
             spent += work_of(limit)
@@ -139,19 +141,20 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float) -> O
     except (TruespringError, MemoryError):
         pass  # what was found before stands, else a coarser mesh tells
     if found is None:
-        found = _from_coarser(path, model, solver, most_work - spent)
+        found = _from_coarser(path, model, solver, most_work - spent, clock)
     return replace(found, work=spent + found.work)
 
 
-def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float) -> OwnError:
+def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float, clock: "_Clock") -> OwnError:
     """How far a path is from its limit by the distance of a mesh of twice the size."""
     if not model.any_mesh:
         return OwnError(None, _OWN_MESH.format(model.label))
     try:
+        clock.check()
         problem = coarser_problem(path.problem)
         if path.newton_iterations * int((~problem.loading.held).sum()) ** _GROWTH > most_work:
             return OwnError(None, "other meshes cost too much")
-        coarse = solve(problem, model, solver)
+        coarse = clock.solve(problem, model, solver)
         against = compare(coarse, path)
     except TruespringError as error:
         return OwnError(None, str(error))
@@ -279,21 +282,42 @@ def _by_groups(problem: Problem) -> Problem:
     return replace(problem, mesh=mesh, supports=supports, loads=loads, regions=regions)
 
 
-def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float) -> Solution:
+def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float, clock: "_Clock") -> Solution:
     """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
     problem = finer.problem()
     # From a state that is near, so that the path is not taken again, and on the same branch.
     nearby = solver.starting_at(_carrying(coarse), _MOST_ITERATIONS)
     if nearby is not None:
-        path = solve(problem, finer.model, nearby)
+        path = clock.solve(problem, finer.model, nearby)
         if _sound(path):
             return path
     if coarse.newton_iterations * finer.n_unknowns**_GROWTH > most_work:
         raise ModelError("other meshes cost too much")
-    path = solve(problem, finer.model, solver)
+    path = clock.solve(problem, finer.model, solver)
     if not _sound(path):
         raise ModelError("a finer mesh finds no stable equilibrium")
     return path
+
+
+class _Clock:
+    """Solves until a time limit [s]; None is no limit."""
+
+    def __init__(self, timeout: float | None) -> None:
+        self._timeout, self._end = timeout, math.inf if timeout is None else time.monotonic() + timeout
+
+    def check(self) -> None:
+        """Raise ModelError where the time is up."""
+        if time.monotonic() > self._end:
+            raise ModelError(f"the time limit of {self._timeout:g} s was reached (--timeout)")
+
+    def solve(self, problem: Problem, model: Model, solver: Solver) -> Solution:
+        """Return the path of a model; raise ModelError where the time is up."""
+        self.check()
+        left = self._end - time.monotonic()
+        path = solve(problem, model, solver, timeout=None if math.isinf(left) else left)
+        if not path.complete:
+            self.check()
+        return path
 
 
 def _sound(path: Solution) -> bool:

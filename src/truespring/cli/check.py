@@ -1,10 +1,11 @@
 """The verb `check`: read a study and print what would be solved."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.cli.moduli import print_moduli
-from truespring.cli.printing import console, print_each
+from truespring.cli.printing import console, print_each, print_file, reserve, writing
 from truespring.cli.verb import CONVERGED, Verb, add_studies
 
 if TYPE_CHECKING:
@@ -13,18 +14,33 @@ if TYPE_CHECKING:
 
 def _add(parser: argparse.ArgumentParser) -> None:
     add_studies(parser)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder for the picture of supports and loads, default: out; with --quiet or --json none unless given",
+    )
 
 
 def _run(options: argparse.Namespace) -> int:
     from truespring.study import plan, read_studies, realised_moduli
+    from truespring.study.picture import write_picture
 
     studies = read_studies(options.study)
-    plans = {study.stem: plan(study) for study in studies}
     screen = console(options)
+    if options.out is None and not screen.quiet:
+        options.out = Path("out")
+    if options.out is not None:
+        reserve(options, studies)
+    plans = {study.stem: plan(study) for study in studies}
     for study in studies:
         _print_plan(screen, plans[study.stem])
         if not screen.quiet:
             print_moduli(screen, study.stem, realised_moduli(study), options.verbose)
+        if options.out is not None:
+            with writing(options.out):
+                picture = write_picture(study, options.out)
+            print_file(options, "picture", picture)
     if options.json:
         print_each(plans)
     return CONVERGED

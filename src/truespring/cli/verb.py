@@ -107,7 +107,7 @@ def add_timeout(parser: argparse.ArgumentParser) -> None:
         "--timeout",
         type=seconds,
         metavar="SECONDS",
-        help="stop a model after this time, default: no limit, 3600 for other programs",
+        help="time limit of each model, and of refining each reference; default: none, 3600 for other programs",
     )
 
 

@@ -9,13 +9,15 @@ from truespring.errors import ExportError, nearest
 from truespring.exports.abaqus import abaqus
 from truespring.exports.arrays import as_json, npz
 from truespring.exports.calculix import calculix
-from truespring.exports.decks import check_springs
+from truespring.exports.decks import SPRINGA
 from truespring.exports.exported import Exported as Exported
-from truespring.exports.exported import plain_springs
 from truespring.exports.exported import solve_springs as solve_springs
+from truespring.exports.exported import spring_data
+from truespring.exports.features import ALL, Feature, UntakenError, refuse_others
 from truespring.exports.mujoco import mujoco
 from truespring.exports.sofa import sofa
-from truespring.models import Model, SpringNetwork, as_model
+from truespring.models import Model, as_model
+from truespring.models.spring_data import SpringData
 from truespring.outputs import Output
 from truespring.problem import Problem
 from truespring.solvers import Solver
@@ -29,23 +31,24 @@ class Target:
     """Where springs are carried to.
 
     Attributes:
-        files: writes a solved spring model as files; raises ExportError for what they cannot express.
+        files: writes solved springs, of what the target takes, as files.
         about: what they are, in a sentence.
-        program: the name of a program that knows nothing but springs, empty for what takes any.
-        negative: whether it takes springs of negative stiffness.
-        names: the files that it writes.
-        check: raises ExportError for plain springs or loads that it cannot take, None where it takes all.
+        program: its name in errors.
+        names: the files that it writes; all but the first may be missing where they do not apply.
+        takes: the features of springs and loads that it takes; for all others `check_targets` raises ExportError.
+        unrun: why no test runs the program itself on the files, in a sentence; empty where one does.
     """
 
     files: Callable[[Exported], Files]
     about: str
-    program: str = ""
-    negative: bool = True
-    names: tuple[str, ...] = ()
-    check: Callable[[Problem, SpringNetwork], None] | None = None
+    program: str
+    names: tuple[str, ...]
+    takes: frozenset[Feature]
+    unrun: str = ""
 
 
 _DECKS = ("springs.inp", "fem.inp")
+_FOLLOWED = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
 
 TARGETS: Mapping[str, Target] = MappingProxyType(
     {
@@ -53,22 +56,34 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             calculix,
             "CalculiX decks: springs.inp of SPRINGA elements, fem.inp of finite elements",
             "CalculiX",
-            names=_DECKS,
-            check=check_springs,
+            _DECKS,
+            SPRINGA,
         ),
         "abaqus": Target(
             abaqus,
-            "the same for Abaqus; Abaqus itself was not run on them",
+            "the same for Abaqus",
             "Abaqus",
-            names=_DECKS,
-            check=check_springs,
+            _DECKS,
+            SPRINGA,
+            unrun="Abaqus was not run; CalculiX reads the same keywords",
         ),
-        "mujoco": Target(mujoco, "MuJoCo's MJCF: springs.xml of sliding bodies and tendons", "MuJoCo", negative=False),
+        "mujoco": Target(
+            mujoco,
+            "MuJoCo's MJCF: springs.xml of sliding bodies and tendons",
+            "MuJoCo",
+            ("springs.xml",),
+            _FOLLOWED,
+        ),
         "sofa": Target(
-            sofa, "a Python scene for SOFA, of springs and finite elements; experimental: SOFA was not run", "SOFA"
+            sofa,
+            "a Python scene for SOFA, of springs and finite elements; experimental",
+            "SOFA",
+            ("springs_scene.py",),
+            _FOLLOWED | {Feature.NEGATIVE},
+            unrun="SOFA was not run; the scene is checked against its sources",
         ),
-        "npz": Target(npz, "NumPy arrays: springs.npz"),
-        "json": Target(as_json, "the same arrays as text: springs.json"),
+        "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL),
+        "json": Target(as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL),
     }
 )
 
@@ -107,15 +122,11 @@ def check_targets(names: Collection[str], problem: Problem, model: Model) -> Non
     """Raise ExportError for what a target cannot take, and for two that write one file; solve nothing."""
     if not as_model(model).has_springs:
         raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
-    springs = model.potential(problem)
+    springs = spring_data(model.potential(problem))
     written: dict[str, str] = {}
     for name in names:
-        target = TARGETS[name]
-        if target.program:
-            network = plain_springs(springs, target.program, target.negative)
-            if target.check:
-                target.check(problem, network)
-        for file in target.names:
+        refuse_untaken(name, problem, springs)
+        for file in TARGETS[name].names:
             if file in written:
                 raise ExportError(
                     f"targets {written[file]} and {name} both write {file}: export them one at a time, "
@@ -124,8 +135,19 @@ def check_targets(names: Collection[str], problem: Problem, model: Model) -> Non
             written[file] = name
 
 
+def refuse_untaken(name: str, problem: Problem, springs: SpringData) -> None:
+    """Raise ExportError for springs and loads that a target does not take, with the targets that do."""
+    try:
+        refuse_others(problem, springs, TARGETS[name].takes, TARGETS[name].program)
+    except UntakenError as error:
+        others = ", ".join(other for other, target in TARGETS.items() if error.feature in target.takes)
+        raise ExportError(f"{error}; targets that take it: {others}") from None
+
+
 def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]:
     """Return the files of each target; raise ExportError for what one cannot express."""
+    for name in names:
+        refuse_untaken(name, exported.problem, exported.springs)
     return {name: TARGETS[name].files(exported) for name in names}
 
 

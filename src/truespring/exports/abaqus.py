@@ -26,7 +26,7 @@ from truespring.exports.exported import Exported
 
 def abaqus(exported: Exported) -> dict[str, str]:
     """Return `springs.inp`, and `fem.inp` where the problem has a continuum that Abaqus can express."""
-    network, levels, problem, files = exported.network("Abaqus"), levels_of(exported), exported.problem, {}
+    network, levels, problem, files = exported.network, levels_of(exported), exported.problem, {}
     notes = [
         "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
     ]

@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 
 from truespring.exports.exported import Exported
-from truespring.models import SpringNetwork, VolumeSprings
-from truespring.models.biquadratic import BiquadraticSprings
-from truespring.models.summed import SummedLinks
 
 # The unit of each key that has one.
 _UNITS = {
@@ -58,7 +55,7 @@ def _values(exported: Exported) -> dict[str, Any]:
         "truespring": version("truespring"),
         "model": exported.path.label,
         "nodes": mesh.nodes,
-        **_springs(exported),
+        **exported.springs.arrays,
         "held": exported.held,
         "prescribed_displacement": exported.motion,
         "external_force": exported.external_force,
@@ -77,31 +74,6 @@ def _values(exported: Exported) -> dict[str, Any]:
         "poisson": [material.poisson for material in materials],
         "density": [material.density for material in materials],
         "header": list(exported.header),
-    }
-
-
-def _springs(exported: Exported) -> dict[str, Any]:
-    """The springs, and what they are beyond: an area or volume term, or coupling within elements."""
-    springs, mesh = exported.path.potential, exported.problem.mesh
-    if isinstance(springs, BiquadraticSprings):
-        coupling = np.broadcast_to(springs.coupling, (len(mesh.elements), *springs.coupling.shape[1:]))
-        return {"springs": springs.springs, "links": list(mesh.kind.links), "coupling": coupling}
-    if isinstance(springs, SummedLinks):
-        found: dict[str, Any] = {"springs": springs.springs}
-        for (numbers, block), part in zip(mesh.blocks, springs.parts, strict=True):
-            coupling = np.broadcast_to(part.coupling, (len(numbers), *part.coupling.shape[1:]))
-            found[f"elements_{block.element}"] = numbers
-            found[f"links_{block.element}"] = list(block.kind.links)
-            found[f"coupling_{block.element}"] = coupling
-        return found
-    beyond = {"kappa": springs.term.kappa} if isinstance(springs, VolumeSprings) else {}
-    network = springs.network if isinstance(springs, VolumeSprings) else springs
-    assert isinstance(network, SpringNetwork)  # all that is exported
-    return {
-        "springs": network.springs,
-        "stiffness": network.stiffness,
-        "rest_length": network.rest_length,
-        **beyond,
     }
 
 

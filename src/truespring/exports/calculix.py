@@ -70,7 +70,7 @@ def spring_deck(problem: Problem, network: SpringNetwork, levels: Sequence[float
 
 def calculix(exported: Exported) -> dict[str, str]:
     """Return `springs.inp`, and `fem.inp` where the problem has a continuum that CalculiX can express."""
-    network, levels, files = exported.network("CalculiX"), levels_of(exported), {}
+    network, levels, files = exported.network, levels_of(exported), {}
     notes = [
         "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
     ]

@@ -16,6 +16,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
+from truespring.exports.features import Feature, refuse_others
 from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
 from truespring.mesh import Mesh, plural
 from truespring.mesh.facets import facet_keys
@@ -25,17 +26,18 @@ from truespring.models.quadratic import QuadraticPotential
 from truespring.potential import Loading
 from truespring.problem import Problem
 
-# The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
 #: Of results of a step: the last increment is always written.
 LAST_ONLY = "FREQUENCY=1000000"
 
+#: What SPRINGA elements take beside springs at rest under dead loads: their length at rest is that of their nodes.
+SPRINGA = frozenset({Feature.NEGATIVE})
+
+# The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
 _LARGEST_INCREMENT = 0.25
 # How long a step is that is no load level.
 _NO_TIME = 1e-9
 # Nodes are led aside by this share of their longest spring; a stiffness below that share of the largest is none.
 _ASIDE, _LOOSE = 1e-2, 1e-9
-# How far lengths at rest may be from the distances of the nodes, a share of them: rounding.
-_AT_REST = 1e-12
 # Numbers in a line.
 _A_LINE = 16
 
@@ -339,9 +341,9 @@ def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats
 def spring_twin(problem: Problem, network: SpringNetwork, force_unit: float) -> Twin:
     """Return every spring as a SPRINGA element, one set of elements for each stiffness as it is written.
 
-    Raises ExportError for what cannot be said.
+    Raises ExportError for what such elements are not: see SPRINGA.
     """
-    check_springs(problem, network)
+    refuse_others(problem, network.spring_data(), SPRINGA, "a SPRINGA element")
     members: dict[str, list[int]] = {}
     for number, stiffness in enumerate((network.stiffness / force_unit).tolist()):
         members.setdefault(real(stiffness), []).append(number)
@@ -388,25 +390,6 @@ def _aside(network: SpringNetwork, loading: Loading) -> Floats:
     size = np.linalg.norm(pulled, axis=1)
     share = np.divide(_ASIDE * reach, size, out=np.zeros(n_nodes), where=size > 0)
     return np.asarray(share[:, None] * pulled)
-
-
-def check_springs(problem: Problem, network: SpringNetwork) -> None:
-    """Raise ExportError where SPRINGA elements cannot be these springs under these loads."""
-    distance = np.linalg.norm(np.diff(network.nodes[network.springs], axis=1)[:, 0], axis=1)
-    tensed = np.abs(distance - network.rest_length) > _AT_REST * distance
-    if tensed.any():
-        first = int(tensed.argmax())
-        raise ExportError(
-            f"a SPRINGA element has the length at rest that its nodes are apart: {int(tensed.sum())} springs have "
-            f"another, the first, number {first}, {network.rest_length[first]:g} m instead of {distance[first]:g} m; "
-            "other targets take them: mujoco, sofa, npz, json"
-        )
-    for load in problem.loads:
-        if load.follows:
-            raise ExportError(
-                f"{load.words()} follows a face, and SPRINGA elements have none: use {load.instead}, or finite "
-                "elements instead"
-            )
 
 
 # --- headers -------------------------------------------------------------------------------------

@@ -12,8 +12,8 @@ from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import vector_words
 from truespring.mesh import counted
-from truespring.models import Model, SpringNetwork, VolumeSprings
-from truespring.potential import Potential
+from truespring.models import Model, SpringNetwork
+from truespring.models.spring_data import HasSprings, SpringData
 from truespring.problem import Problem
 from truespring.solvers import Newton, Reporter, Solver, as_solver
 
@@ -25,8 +25,7 @@ class Exported:
     Attributes:
         title: of the study.
         problem: mesh, material, supports and loads.
-        path: the springs' equilibria up to full load; `path.potential` is what was solved: a SpringNetwork,
-            VolumeSprings or BiquadraticSprings.
+        path: the springs' equilibria up to full load; `path.potential` is what was solved, and HasSprings.
         probe: number of the node that is watched.
         load_steps: load levels that the study asks for.
         remarks: what else the reader of the file should know, in sentences.
@@ -47,9 +46,16 @@ class Exported:
         found = self.path.at(1.0)
         return found if found is not None and found.load_factor == 1.0 else None
 
-    def network(self, program: str, negative: bool = True) -> SpringNetwork:
-        """Return the springs, for a program that knows nothing but springs; see `plain_springs`."""
-        return plain_springs(self.path.potential, program, negative)
+    @cached_property
+    def springs(self) -> SpringData:
+        """The springs and what they have beside."""
+        return spring_data(self.path.potential)
+
+    @property
+    def network(self) -> SpringNetwork:
+        """The springs alone; of a target that takes no coupled springs."""
+        assert self.springs.network is not None  # refused before
+        return self.springs.network
 
     @property
     def held(self) -> Bools:
@@ -173,28 +179,11 @@ class Exported:
         yield from (f"Warning of truespring: {warning}." for warning in self.path.warnings)
 
 
-def plain_springs(springs: Potential | None, program: str, negative: bool = True) -> SpringNetwork:
-    """Return springs for a program that knows nothing but springs; `negative` are stiffnesses it takes.
-
-    Raises ExportError where the model is more than springs.
-    """
-    if isinstance(springs, VolumeSprings):
-        raise ExportError(
-            f"{program} has no volume term, which these springs have: take a model without volume = true, "
-            "or the target npz or json, which carries it"
-        )
-    if not isinstance(springs, SpringNetwork):
-        raise ExportError(
-            f"{program} has no springs that answer to each other's lengths, as those of the rule biquadratic do: "
-            "take another rule, or the target npz or json, which carries their coupling"
-        )
-    below = np.flatnonzero(springs.stiffness < 0)
-    if below.size and not negative:
-        raise ExportError(
-            f"{program} takes no negative stiffness: {below.size} springs have one, the first, number {below[0]}, "
-            f"{springs.stiffness[below[0]]:g} N/m; take another rule, or elements nearer to squares and cubes"
-        )
-    return springs
+def spring_data(potential: object) -> SpringData:
+    """Return the springs of a potential; raise ExportError where it has none."""
+    if not isinstance(potential, HasSprings):
+        raise ExportError(f"{type(potential).__name__} is no model of springs: use Springs(rule=...) or SpringNetwork")
+    return potential.spring_data()
 
 
 def solve_springs(

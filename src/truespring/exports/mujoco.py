@@ -16,11 +16,8 @@ from truespring.models import SpringNetwork
 
 
 def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.xml: MJCF that loads itself and settles on the equilibrium.
-
-    Raises ExportError for volume terms, coupled springs and negative stiffness.
-    """
-    network = exported.network("MuJoCo", negative=False)
+    """Return springs.xml: MJCF that loads itself and settles on the equilibrium."""
+    network = exported.network
     return {"springs.xml": "\n".join([*_lines(exported, network, motion_of(exported, network)), ""])}
 
 

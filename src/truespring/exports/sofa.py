@@ -43,11 +43,8 @@ _ELEMENTS = {
 
 
 def sofa(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs_scene.py, with createScene(root) for runSofa and a main for plain Python.
-
-    Raises ExportError for volume terms and coupled springs.
-    """
-    network = exported.network("SOFA")
+    """Return springs_scene.py, with createScene(root) for runSofa and a main for plain Python."""
+    network = exported.network
     lines = [
         '"""' + "\n".join(_docstring(exported)),
         '"""',

@@ -6,7 +6,6 @@ from types import MappingProxyType
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.memory import remembered
 from truespring.mesh import Mesh
 from truespring.models.by_rule import SpringsByRule
 from truespring.models.fem_potential import FemPotential, element_matrices
@@ -16,6 +15,7 @@ from truespring.models.links import CORNERS, all_alike, link_vectors
 from truespring.models.rules import require_body
 from truespring.models.volume import VolumeTerm
 from truespring.problem import Problem, sample
+from truespring.remembering import remembered
 
 
 def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:

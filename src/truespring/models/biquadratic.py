@@ -11,6 +11,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_coupling
+from truespring.models.spring_data import COUPLING, SpringData
 from truespring.potential import SparseMatrix
 
 
@@ -24,6 +25,13 @@ class BiquadraticSprings(LinkedElements):
     def coupling(self) -> Floats:
         """M [J/m^4], shape (n_elements, links, links), or one for all elements."""
         return link_coupling(self.problem)
+
+    def spring_data(self) -> SpringData:
+        """Return the pairs of nodes, the links of an element, and their coupling [J/m^4] in each element."""
+        mesh = self.problem.mesh
+        coupling = np.broadcast_to(self.coupling, (len(mesh.elements), *self.coupling.shape[1:]))
+        links = list(mesh.kind.links)
+        return SpringData(None, {"springs": self.springs, "links": links, "coupling": coupling}, COUPLING)
 
     def energy(self, positions: Floats) -> float:
         """Stored energy [J]."""

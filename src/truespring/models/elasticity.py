@@ -3,13 +3,14 @@
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.memory import remembered, slices
+from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.mesh.forms import rounded
 from truespring.mesh.rows import distinct_rows
 from truespring.models.links import link_vectors
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
+from truespring.remembering import remembered
 
 # A mesh made of so few kinds of elements, up to translation, is a lattice: 12 make the body-centred-cubic one,
 # and divisions about several diagonals some more.

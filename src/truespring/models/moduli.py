@@ -11,7 +11,6 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
-from truespring.memory import remembered
 from truespring.mesh import MIXED, Mesh
 from truespring.mesh.rows import distinct_rows
 from truespring.models.bending import bending_factors, cell_counts, fem_bending_factors
@@ -22,6 +21,7 @@ from truespring.models.relaxation import relaxed_elasticity
 from truespring.models.rules import require_body
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
+from truespring.remembering import remembered
 
 #: Depths, in elements, at which the bending factor is shown.
 DEPTHS = (1, 2, 3, 4, 6, 8)

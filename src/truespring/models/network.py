@@ -12,6 +12,7 @@ from truespring.errors import ModelError
 from truespring.mesh import Mesh
 from truespring.models.mechanism import refuse_mechanism
 from truespring.models.model import Model
+from truespring.models.spring_data import SpringData
 from truespring.potential import Pattern, SparseMatrix
 from truespring.problem import Problem
 
@@ -83,6 +84,11 @@ class SpringNetwork(Model):
     def mesh(self) -> Mesh:
         """The network as a mesh of lines: what a Problem of a plain network takes."""
         return Mesh(self.nodes, self.springs, "line")
+
+    def spring_data(self) -> SpringData:
+        """Return the springs as plain springs."""
+        names = ("springs", "stiffness", "rest_length")
+        return SpringData(self, {name: getattr(self, name) for name in names})
 
     @property
     def cells(self) -> dict[str, Ints]:

@@ -13,6 +13,7 @@ from truespring.mesh import Mesh
 from truespring.models.fem_potential import FemPotential
 from truespring.models.law import Law
 from truespring.models.linked import LinkedElements
+from truespring.models.spring_data import COUPLING, SpringData
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
@@ -155,6 +156,15 @@ class SummedLinks(_Summed[Any]):
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length of each element's links, kind after kind."""
         return np.concatenate([part.stretch(positions) for part in self.parts])
+
+    def spring_data(self) -> SpringData:
+        """Return the pairs of nodes, and of each kind of element the numbers, links and coupling [J/m^4]."""
+        arrays: dict[str, Any] = {"springs": self.springs}
+        for (numbers, block), part in zip(self.problem.mesh.blocks, self.parts, strict=True):
+            own = part.spring_data().arrays
+            arrays[f"elements_{block.element}"] = numbers
+            arrays |= {f"{name}_{block.element}": own[name] for name in ("links", "coupling")}
+        return SpringData(None, arrays, COUPLING)
 
     @property
     def cells(self) -> dict[str, Ints]:

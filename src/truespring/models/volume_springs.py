@@ -7,6 +7,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
 from truespring.models.network import SpringNetwork
+from truespring.models.spring_data import VOLUME_TERM, SpringData
 from truespring.models.volume import VolumeTerm
 from truespring.potential import SparseMatrix
 
@@ -69,6 +70,11 @@ class VolumeSprings:
     def stretch(self, positions: Floats) -> Floats:
         """Length over rest length of the springs, shape (n_springs,)."""
         return self.network.stretch(positions)
+
+    def spring_data(self) -> SpringData:
+        """Return the springs, and kappa of the area or volume term [Pa], shape (n_elements,)."""
+        plain = self.network.spring_data()
+        return SpringData(self.network, {**plain.arrays, "kappa": self.term.kappa}, VOLUME_TERM)
 
     @property
     def cells(self) -> dict[str, Ints]:

@@ -11,9 +11,10 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ModelError, ReferenceFileError
+from truespring.exports import refuse_untaken
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
-from truespring.exports.decks import check_fem, check_springs, fem_element, is_led_aside, second_order, usual_element
-from truespring.exports.exported import plain_springs
+from truespring.exports.decks import check_fem, fem_element, is_led_aside, second_order, usual_element
+from truespring.exports.exported import spring_data
 from truespring.loading import FacePressure
 from truespring.models import Fem, Model, SpringNetwork
 from truespring.models.quadratic import QuadraticPotential
@@ -96,9 +97,9 @@ class CalculiX(Program):
         """The springs; refused where they are more than SPRINGA elements can be."""
         if self.springs is None:
             return None
-        network = plain_springs(self.springs.potential(problem), "CalculiX")
-        check_springs(problem, network)
-        return network
+        springs = spring_data(self.springs.potential(problem))
+        refuse_untaken("calculix", problem, springs)
+        return springs.network
 
     def run(
         self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None

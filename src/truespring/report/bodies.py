@@ -11,6 +11,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
 from truespring.potential import Visible
+from truespring.problem import Problem
 from truespring.report.bar import BAR, Bar, bar_of, draw_error_bar
 from truespring.report.frame import draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
@@ -21,19 +22,9 @@ from truespring.report.shades import draw_shaded, draw_shaded_dots
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
 from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_outside, draw_pin, find_arrows
+from truespring.report.undeformed import Undeformed, spring_lines
 from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
-
-
-def spring_lines(path: Solution) -> Ints | None:
-    """Return the pairs of nodes that the springs of a path join, shape (n, 2); None where it has none."""
-    springs: Ints | None = getattr(path.potential, "springs", None)
-    return springs
-
-
-def spring_word(path: Solution) -> str:
-    """Return what these are called."""
-    return path.lines
 
 
 def path_lines(path: Solution) -> Ints:
@@ -234,42 +225,31 @@ def over_title(result: Result, level: float, comparison: Comparison) -> str:
     return at
 
 
-def as_asked(result: Result) -> str:
-    """Return how the picture of a body before it moves is called."""
-    return "As asked" if result.problem.stated else "At rest"
-
-
-def undeformed_figure(result: Result) -> Sheet:
-    """The body as it is asked for: mesh, springs, supports, loads and the probe."""
-    mesh = result.problem.mesh
-    model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
+def undeformed_figure(body: Undeformed) -> Sheet:
+    """Return the undeformed body: mesh, springs, supports, loads and the probe."""
+    problem, springs = body.problem, body.springs
+    mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
-    arrows = find_arrows(result, size)
+    arrows = find_arrows(problem, size)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    springs, called = spring_lines(model), spring_word(model)
-    legend = [Entry("elements", INK)] if mesh.element != "line" else []
-    legend += [Entry(called, BLUE)] if springs is not None else []
-    legend += [Entry("probe", RED, "o", "")]
-    title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
-    title = f"At rest: {mesh.n_nodes} markers" if model.is_cloud else title
-    title += f", {len(springs)} {called}" if springs is not None else ""
-    area, scale = _body_figure(title, lower, upper, legend)
+    area, scale = _body_figure(body.title, lower, upper, body.legend(mesh.element != "line"))
     if mesh.element != "line":
         _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
     if springs is not None:
         _lines(area, mesh.nodes / scale.size, springs, BLUE, 0.6, 3, "springs")
-    _supports(area, result, scale, 0.028 * size)
+    _supports(area, problem, scale, 0.028 * size)
     for arrow in arrows:
         draw_loaded(area, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
         draw_drive(area, arrow, scale)
-    draw_dot(area, mesh.nodes[result.probe] / scale.size)
+    if body.probe is not None:
+        draw_dot(area, mesh.nodes[body.probe] / scale.size)
     return area.sheet
 
 
-def _supports(area: Area, result: Result, scale: Scale, size: float) -> None:
+def _supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
     """Clamped edges hatched, edges held in one direction on rollers, single nodes on a pin or roller."""
-    mesh, loading = result.problem.mesh, result.problem.loading
+    mesh, loading = problem.mesh, problem.loading
     still = loading.held & (loading.motion() == 0)
     clamped = loading.held.all(axis=1) & still.all(axis=1)
     hatched = np.zeros(mesh.n_nodes, dtype=bool)

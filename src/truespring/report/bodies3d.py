@@ -10,15 +10,13 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
+from truespring.problem import Problem
 from truespring.report.bar import Bar, bar_of
 from truespring.report.bodies import (
-    as_asked,
     magnification,
     over_title,
     path_lines,
     picture_box,
-    spring_lines,
-    spring_word,
 )
 from truespring.report.frame3d import Picture
 from truespring.report.legend import Entry
@@ -32,6 +30,7 @@ from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, f
 from truespring.report.supports3d import clamped_nodes, draw_supports
 from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, draw_outside, find_arrows
+from truespring.report.undeformed import Undeformed
 from truespring.report.verdict import display_name, level_name
 
 # Surfaces: of the body as asked for, of a reference, where it is held; their light comes from above, left of the eye.
@@ -40,38 +39,33 @@ _LIGHT = np.array([-0.3, 0.6, 0.74]) / np.linalg.norm([-0.3, 0.6, 0.74])
 _DASHES = (0, (3, 2))
 
 
-def undeformed_picture(result: Result) -> Picture:
-    """The body as it is asked for: mesh, springs, supports, loads and the probe."""
-    mesh = result.problem.mesh
-    model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
-    springs, called = spring_lines(model), spring_word(model)
+def undeformed_picture(body: Undeformed) -> Picture:
+    """Return the undeformed body: mesh, springs, supports, loads and the probe."""
+    problem, springs = body.problem, body.springs
+    mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
     points, facets = seen(mesh.nodes), facets_of(mesh)
-    arrows = find_arrows(result, size, lambda places: seen(places)[:, :2])
+    arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2])
     layers = []
     if len(facets):
-        layers.append(_solid(points, facets, _tinted(result, facets, arrows), edges_of(facets), INK, 1.0))
+        layers.append(_solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
     if springs is not None:
         layers.append(_wires(points, facets, springs, 0.6))
     elif not len(facets):
         layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
-    title = f"{as_asked(result)}: {mesh.n_nodes} nodes, {len(mesh.elements)} elements"
-    title += f", {len(springs)} {called}" if springs is not None else ""
-    legend = [Entry("elements", INK)] if len(facets) else []
-    legend += [Entry(called, BLUE)] if springs is not None else []
     taken = np.concatenate([_spots(points, facets, mesh.edges), *(np.stack([*one.ends, one.room]) for one in arrows)])
 
     def marks(area: Area, scale: Scale) -> None:
-        draw_supports(area, result, scale, 0.028 * size)
+        draw_supports(area, problem, scale, 0.028 * size)
         for arrow in arrows:
             if not _within(facets, arrow.nodes, mesh.n_nodes).any():
                 draw_loaded(area, points[arrow.nodes, :2] / scale.size, arrow.color)
             draw_drive(area, arrow, scale)
-        draw_dot(area, points[result.probe, :2] / scale.size)
+        if body.probe is not None:
+            draw_dot(area, points[body.probe, :2] / scale.size)
 
     lower, upper = taken.min(axis=0) - 0.03 * size, taken.max(axis=0) + 0.03 * size
-    entries = (*legend, Entry("probe", RED, "o", ""))
-    return Picture(title, "", entries, lower, upper, taken, tuple(layers), marks)
+    return Picture(body.title, "", body.legend(len(facets) > 0), lower, upper, taken, tuple(layers), marks)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -250,11 +244,11 @@ def _one_color(facets: Ints, color: str) -> Floats:
     return np.broadcast_to(rgb(color), (*facets.shape, 3))
 
 
-def _tinted(result: Result, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
+def _tinted(problem: Problem, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
     """Colours of the body as asked for: darker where it is clamped, those of the arrows where they act."""
-    mesh = result.problem.mesh
+    mesh = problem.mesh
     colors = _one_color(facets, _BODY).copy()
-    clamped = clamped_nodes(result)[facets].all(axis=1)
+    clamped = clamped_nodes(problem)[facets].all(axis=1)
     colors[clamped] = _one_color(facets[clamped], _HELD)
     for arrow in arrows:
         acted = _within(facets, arrow.nodes, mesh.n_nodes)

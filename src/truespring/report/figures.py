@@ -17,6 +17,7 @@ from truespring.report.render import render
 from truespring.report.result import Result
 from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
+from truespring.report.undeformed import Undeformed, undeformed_of
 
 # A Result does not change, and its files and its pages show the same pictures: they are drawn once.
 _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()
@@ -41,6 +42,18 @@ def save_figures(result: Result, folder: Path) -> dict[str, Drawing]:
     drawings = render_figures(result)
     save_drawings(drawings, folder)
     return drawings
+
+
+def save_undeformed(body: Undeformed, file: Path) -> None:
+    """Write the picture of a body before it moves as a PNG file."""
+    with figure_style():
+        if body.problem.mesh.dim == 2:
+            sheet = undeformed_figure(body)
+        else:
+            picture = undeformed_picture(body)
+            images, _ = render([shot(picture)])()
+            sheet = figure_of(picture, images[0])
+        file.write_bytes(sheet.png())
 
 
 def over_name(result: Result, reference: str) -> str:
@@ -76,7 +89,7 @@ def _draw(result: Result) -> Iterator[_Named]:
 
 
 def _plane_bodies(result: Result) -> Iterator[_Named]:
-    yield "undeformed", undeformed_figure(result), ""
+    yield "undeformed", undeformed_figure(undeformed_of(result)), ""
     for name, comparison in result.comparisons.items():
         pictures = {over_name: over_figure} | ({distance_name: distance_figure} if result.in_detail else {})
         for called, draw in pictures.items():
@@ -86,7 +99,7 @@ def _plane_bodies(result: Result) -> Iterator[_Named]:
 
 
 def _bodies_in_space(result: Result) -> Callable[[], Iterator[_Named]]:
-    pictures = {"undeformed": undeformed_picture(result)}
+    pictures = {"undeformed": undeformed_picture(undeformed_of(result))}
     for name, comparison in result.comparisons.items():
         for called, draw in ((over_name, over_picture), (distance_name, distance_picture)):
             picture = draw(result, name, comparison)

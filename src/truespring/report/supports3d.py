@@ -3,9 +3,9 @@
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.problem import Problem
 from truespring.report.lines import draw_lines
 from truespring.report.quantity import Scale
-from truespring.report.result import Result
 from truespring.report.sheet import Area
 from truespring.report.surfaces import VIEW, facets_of, normals, seen
 from truespring.report.symbols import draw_pin
@@ -13,18 +13,18 @@ from truespring.report.symbols import draw_pin
 _SUPPORT = "#3d4248"
 
 
-def clamped_nodes(result: Result) -> Bools:
+def clamped_nodes(problem: Problem) -> Bools:
     """Tell which nodes are held in every direction, shape (n_nodes,)."""
-    loading = result.problem.loading
+    loading = problem.loading
     return np.asarray((loading.held & (loading.motion() == 0)).all(axis=1))
 
 
-def draw_supports(area: Area, result: Result, scale: Scale, size: float) -> None:
+def draw_supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
     """Hatch the rim of clamped faces; nodes that are held besides stand on pins or rollers. `size` of a stroke [m]."""
-    mesh, loading = result.problem.mesh, result.problem.loading
+    mesh, loading = problem.mesh, problem.loading
     points, facets = seen(mesh.nodes), facets_of(mesh)
     facing = normals(points, facets)
-    clamped = clamped_nodes(result)
+    clamped = clamped_nodes(problem)
     patch = np.flatnonzero(clamped[facets].all(axis=1))
     _hatch(area, points, facets[patch], facing[patch], scale, size)
     hatched = np.zeros(mesh.n_nodes, dtype=bool)

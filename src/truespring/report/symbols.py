@@ -11,7 +11,6 @@ from truespring.loading import Mark
 from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, given
-from truespring.report.result import Result
 from truespring.report.sheet import Area
 from truespring.report.style import LOAD, MOTION, POINT, RED
 from truespring.report.words import draw_words
@@ -79,12 +78,12 @@ def _acting(mark: Mark, color: str) -> Acting:
     return Acting(mark.nodes, mark.vector, text, color)
 
 
-def find_arrows(result: Result, size: float, view: View = as_it_is) -> list[Arrow]:
+def find_arrows(problem: Problem, size: float, view: View = as_it_is) -> list[Arrow]:
     """Return the arrows of all loads and motions of a body that is about `size` [m] large."""
-    mesh = result.problem.mesh
+    mesh = problem.mesh
     middle = (mesh.lower + mesh.upper) / 2
     found = []
-    for nodes, vector, text, color in find_acting(result.problem):
+    for nodes, vector, text, color in find_acting(problem):
         if not vector.any():
             continue
         direction = vector / np.linalg.norm(vector)

@@ -1,0 +1,76 @@
+"""Features of springs and loads that not every target takes, and the errors where one does not."""
+
+from collections.abc import Collection, Iterator
+from enum import StrEnum
+
+import numpy as np
+
+from truespring.errors import ExportError
+from truespring.models.spring_data import COUPLING, VOLUME_TERM, SpringData
+from truespring.problem import Problem
+
+# How far rest lengths may be from the distances of the nodes, a share of them: rounding.
+_AT_REST = 1e-12
+
+
+class Feature(StrEnum):
+    """What a body of springs may have beside springs of positive stiffness, at rest, under dead loads."""
+
+    VOLUME_TERM = VOLUME_TERM
+    COUPLING = COUPLING
+    NEGATIVE = "negative stiffness"
+    PRESTRESS = "prestress"
+    FOLLOWING = "load that follows a face"
+
+
+#: What a target takes that carries all numbers.
+ALL = frozenset(Feature)
+
+
+def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, str]]:
+    """Yield the features of springs and loads, each with a sentence: where it is, and how to do without it."""
+    if springs.beyond == VOLUME_TERM:
+        yield Feature.VOLUME_TERM, "these springs have one: use a model without volume = true"
+    if springs.beyond == COUPLING:
+        yield (
+            Feature.COUPLING,
+            "the springs of an element depend on each other's lengths, as those of the rule biquadratic do: use "
+            "another rule",
+        )
+    network = springs.network
+    if network is not None:
+        below = np.flatnonzero(network.stiffness < 0)
+        if below.size:
+            yield (
+                Feature.NEGATIVE,
+                f"{below.size} springs have one, the first, number {below[0]}, {network.stiffness[below[0]]:g} N/m: "
+                "use another rule, or elements nearer to squares and cubes",
+            )
+        distance = np.linalg.norm(np.diff(network.nodes[network.springs], axis=1)[:, 0], axis=1)
+        tensed = np.flatnonzero(np.abs(distance - network.rest_length) > _AT_REST * distance)
+        if tensed.size:
+            first = int(tensed[0])
+            yield (
+                Feature.PRESTRESS,
+                f"the rest lengths of {tensed.size} springs are not the distances of their nodes, the first, number "
+                f"{first}, {network.rest_length[first]:g} m instead of {distance[first]:g} m: use springs at rest",
+            )
+    for load in problem.loads:
+        if load.follows:
+            yield Feature.FOLLOWING, f"{load.words()} follows a face: use {load.instead}, or finite elements instead"
+
+
+def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
+    """Raise UntakenError for the first feature of springs or loads that is not among those that a program takes."""
+    for feature, where in features(problem, springs):
+        if feature not in takes:
+            raise UntakenError(feature, f"{program} takes no {feature}: {where}")
+
+
+class UntakenError(ExportError):
+    """A feature of springs or loads that a program does not take."""
+
+    def __init__(self, feature: Feature, message: str) -> None:
+        """Keep the feature."""
+        super().__init__(message)
+        self.feature = feature

@@ -1,0 +1,57 @@
+"""A body before it moves, as it is drawn: its mesh and springs, supports, loads and the probe."""
+
+from dataclasses import dataclass
+
+from truespring.arrays import Ints
+from truespring.equilibrium import Solution
+from truespring.problem import Problem
+from truespring.report.legend import Entry
+from truespring.report.result import Result
+from truespring.report.style import BLUE, INK, RED
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Undeformed:
+    """A body before it moves.
+
+    Attributes:
+        problem: mesh, supports and loads.
+        probe: number of the node that is marked; None where it is not known before solving.
+        springs: pairs of nodes that springs join, shape (n, 2); None where the model has none.
+        springs_are: what these are called, "springs" or "links".
+        is_cloud: whether the body was read as points alone.
+    """
+
+    problem: Problem
+    probe: int | None
+    springs: Ints | None
+    springs_are: str = "springs"
+    is_cloud: bool = False
+
+    @property
+    def title(self) -> str:
+        """The title of the picture: counts of nodes, elements and springs."""
+        mesh = self.problem.mesh
+        counts = [f"{mesh.n_nodes} {'markers' if self.is_cloud else 'nodes'}"]
+        counts += [] if self.is_cloud else [f"{len(mesh.elements)} elements"]
+        counts += [f"{len(self.springs)} {self.springs_are}"] if self.springs is not None else []
+        return f"Undeformed: {', '.join(counts)}"
+
+    def legend(self, elements: bool) -> tuple[Entry, ...]:
+        """Return the legend, with an entry for `elements` where they are drawn."""
+        entries = [Entry("elements", INK)] if elements else []
+        entries += [Entry(self.springs_are, BLUE)] if self.springs is not None else []
+        entries += [Entry("probe", RED, "o", "")] if self.probe is not None else []
+        return tuple(entries)
+
+
+def spring_lines(path: Solution) -> Ints | None:
+    """Return the pairs of nodes that the springs of a model join, shape (n, 2); None where it has none."""
+    springs: Ints | None = getattr(path.potential, "springs", None)
+    return springs
+
+
+def undeformed_of(result: Result) -> Undeformed:
+    """Return the undeformed body of a result, with the springs of the compared model, else of the first one."""
+    model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
+    return Undeformed(result.problem, result.probe, spring_lines(model), model.lines, model.is_cloud)

@@ -1,0 +1,140 @@
+"""The effective moduli of the springs of a study, known without solving."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truespring.material import Material
+from truespring.models import (
+    RULES,
+    Finding,
+    Fitness,
+    Moduli,
+    Springs,
+    follows_poisson,
+    judge,
+    moduli,
+    springs_by_rule,
+)
+from truespring.outputs import Output
+from truespring.report.summary import moduli_values
+from truespring.study.read import Study
+
+
+@dataclass(frozen=True, eq=False)
+class Realised:
+    """What the springs of a model realise, known without solving.
+
+    Attributes:
+        name: of the model in the study.
+        springs: the model.
+        by_material: the moduli beside each material, that of the body first, then those of its regions.
+        fitness: whether the springs are fit for all of them, and which are better.
+    """
+
+    name: str
+    springs: Springs
+    by_material: tuple[tuple[Material, Moduli], ...]
+    fitness: Fitness
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """What the moduli beside each material are called: by the material where there are several."""
+        what = f"what '{self.name}' realises, {self.springs.label}"
+        if len(self.by_material) == 1:
+            return (what,)
+        return tuple(
+            f"{what}, where E is {material.young:g} Pa and Poisson's ratio {material.poisson:g}"
+            for material, _ in self.by_material
+        )
+
+
+def realised_moduli(study: Study) -> Iterator[Realised]:
+    """Yield what each springs model of a study realises, solving nothing."""
+    for name, entry in springs_by_rule(study.entries).items():
+        found = []
+        for twin in study.problem.homogeneous:
+            assert twin.material is not None  # a study has one
+            found.append((twin.material, moduli(twin, entry)))
+        yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance))
+
+
+def realised_values(realised: Realised) -> dict[str, Any]:
+    """Return what springs realise as values that JSON can hold: of the body's own material, then of its regions'."""
+    (material, first), *others = realised.by_material
+    fitness, better = realised.fitness, realised.fitness.better
+    return {
+        "label": realised.springs.label,
+        "material": _material(material),
+        **moduli_values(first),
+        **(
+            {"regions": [{"material": _material(one), **moduli_values(found)} for one, found in others]}
+            if others
+            else {}
+        ),
+        "fit": fitness.fit,
+        "reasons": list(fitness.reasons),
+        "better": None if better is None else {"rule": better.rule, "volume": better.volume},
+        "sentence": fitness.sentence,
+        "findings": finding_values(fitness.findings),
+    }
+
+
+def finding_values(findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    """Return findings as values that JSON can hold; a number that is not finite is None."""
+    return [
+        {
+            "code": one.code,
+            "numbers": {name: value if math.isfinite(value) else None for name, value in one.numbers.items()},
+            "sentence": one.sentence,
+        }
+        for one in findings
+    ]
+
+
+def _material(material: Material) -> dict[str, float]:
+    return {"young": material.young, "poisson": material.poisson}
+
+
+def write_moduli(study: Study, realised: Sequence[Realised], out: Path) -> Path | None:
+    """Write moduli.json and a picture of Young's modulus by direction into out/STEM; return the picture, if any."""
+    with Output(out / study.stem, "moduli.json") as output:
+        values = {one.name: realised_values(one) for one in realised}
+        text = json.dumps(values, indent=2, allow_nan=False)
+        (output.staging / "moduli.json").write_text(text + "\n", encoding="utf-8")
+        picture = _draw_moduli(study, realised, output.staging / "figures") if realised else None
+        output.publish()
+    return None if picture is None else out / study.stem / "figures" / picture.name
+
+
+def _draw_moduli(study: Study, realised: Sequence[Realised], folder: Path) -> Path:
+    from truespring.report.young import save_young
+
+    labels = [one.springs.label for one in realised]
+    several = {
+        one.springs.label if labels.count(one.springs.label) == 1 else f"{one.springs.label} ({one.name})": moduli
+        for one in realised
+        for moduli in [one.by_material[0][1]]
+    }
+    within = study.problem.section.within if study.problem.section else ""
+    return save_young(several, f"material{within}", folder)
+
+
+def rule_values() -> dict[str, dict[str, Any]]:
+    """Return the stiffness rules with what they realise and their source, as values that JSON can hold."""
+    return {
+        name: {
+            "elements": list(rule.elements),
+            "idea": rule.idea,
+            "realises": rule.realises,
+            "shapes": dict(rule.shapes),
+            "follows_poisson": follows_poisson(name),
+            "coupled": rule.coupled,
+            "parameters": list(rule.parameters),
+            "source": rule.source,
+        }
+        for name, rule in RULES.items()
+    }

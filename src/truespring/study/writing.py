@@ -1,0 +1,69 @@
+"""The files of a study: curves, summary, VTU series, STL, figures and a page."""
+
+import json
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from truespring.equilibrium import Solution
+from truespring.outputs import Output, write_whole
+from truespring.reactions import moved_supports
+from truespring.report.curves import write_curves, write_reactions
+from truespring.report.result import Result
+from truespring.report.series import write_mesh, write_series, write_stl
+from truespring.report.summary import summary
+from truespring.study.read import Study
+
+
+def output(study: Study | Result, out: Path) -> Output:
+    """Return the output of a study, in out/STEM."""
+    return Output(out / study.stem, "summary.json")
+
+
+def write(result: Result, out: Path, report: bool = True) -> None:
+    """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures and a page too."""
+    with output(result, out) as own:
+        for name, path in result.paths.items():
+            write_model(path, own, name)
+        write_rest(result, own, verify_command([result], out) if report else None)
+
+
+def write_model(path: Solution, output: Output, name: str) -> None:
+    """Write what a model alone leaves, its VTU series and STL, as soon as it is solved."""
+    write_series(path, output.staging, name)
+    write_stl(path, output.staging / f"deformed_{name}.stl")
+
+
+def write_rest(result: Result, output: Output, command: str | None) -> None:
+    """Write what all models leave together and publish it; figures and a page, which tells the `command`, with one."""
+    folder = output.staging
+    write_curves(result, folder / "curves.csv")
+    if moved_supports(result.problem):
+        write_reactions(result, folder / "reactions.csv")
+    if result.problem.mesh.element != "line":
+        write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
+    if command is not None:
+        from truespring.report.figures import save_figures
+        from truespring.report.page import write_page
+
+        save_figures(result, folder / "figures")
+        write_page([result], folder / "report.html", command)
+    text = json.dumps(summary(result), indent=2, allow_nan=False)
+    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    output.publish()
+
+
+def write_overview(results: Sequence[Result], out: Path) -> None:
+    """Write out/report.html over all studies, each written before; over one alone, its own page once more."""
+    from truespring.report.page import render_page
+
+    if len(results) == 1:
+        page = (out / results[0].stem / "report.html").read_bytes()
+    else:
+        page = render_page(results, verify_command(results, out)).encode()
+    write_whole(out / "report.html", page)
+
+
+def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
+    """Return the command line that verifies studies."""
+    return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])
