@@ -41,7 +41,7 @@ OWN_FAULTS = (
 Tables = dict[str, Any]
 
 
-def words(table: type[schema.Table], key: str) -> tuple[str, ...]:
+def words(table: type[schema.Keys], key: str) -> tuple[str, ...]:
     """What a key takes that is one of several words."""
     return tuple(get_args(table.model_fields[key].annotation))
 
@@ -178,7 +178,7 @@ def _vector(rng: random.Random, dim: int, size: float) -> list[float]:
 
 def _solver(rng: random.Random, dim: int, size: list[float], driven: bool) -> Tables:
     solver: Tables = {"load_steps": rng.choice((1, 1, 2, 3)), "max_iterations": rng.choice((10, 15, 20))}
-    solver["control"] = rng.choice(("load", *words(schema.SolverTable, "control")))
+    solver["control"] = rng.choice(("load", *words(schema.SolverKeys, "control")))
     if driven and solver["control"] == "displacement":  # what moves is held
         solver["control"] = "load"
     if solver["control"] == "displacement":
@@ -188,9 +188,9 @@ def _solver(rng: random.Random, dim: int, size: list[float], driven: bool) -> Ta
     if solver["control"] == "arc-length":
         solver["max_steps"] = rng.choice((1, 10, 20))
     if solver["control"] == "load":
-        solver["method"] = rng.choice(words(schema.SolverTable, "method"))
+        solver["method"] = rng.choice(words(schema.SolverKeys, "method"))
         if rng.random() < 0.3:
-            solver["linear"] = rng.choice([one for one in words(schema.SolverTable, "linear") if one != "pardiso"])
+            solver["linear"] = rng.choice([one for one in words(schema.SolverKeys, "linear") if one != "pardiso"])
     return solver
 
 
@@ -209,11 +209,11 @@ def _model(rng: random.Random, element: str) -> Tables:
             else:
                 model["rule"] = rng.choice([name for name, rule in RULES.items() if element in rule.elements])
             if rng.random() < 0.2 and model.get("rule") != "biquadratic":
-                model["sharing"] = rng.choice(words(schema.SpringsTable, "sharing"))
+                model["sharing"] = rng.choice(words(schema.SpringsKeys, "sharing"))
             model["allow_negative"] = rng.random() < 0.9
             model["volume"] = rng.random() < (0.4 if model.get("rule") == "isotropic" else 0.02)
         case "terzopoulos":
-            model["boundary"] = rng.choice(words(schema.TerzopoulosTable, "boundary"))
+            model["boundary"] = rng.choice(words(schema.TerzopoulosKeys, "boundary"))
         case "mass-tensor":
             model["law"] = rng.choice(("linear", "saint-venant-kirchhoff")) if simplices else "linear"
         case "heml":
@@ -356,9 +356,7 @@ def spoil(rng: random.Random, tables: Tables) -> None:
                 other = other[part]
             holder[last] = copy.deepcopy(other)
         case "add" if isinstance(holder, dict):
-            key = rng.choice(
-                (*schema.SupportTable.model_fields, *schema.StudyTable.model_fields, "x" * 300, "a b", "é")
-            )
+            key = rng.choice((*schema.SupportKeys.model_fields, *schema.StudyKeys.model_fields, "x" * 300, "a b", "é"))
             holder[key] = copy.deepcopy(rng.choice(HOSTILE))
         case _:
             if isinstance(holder, dict) and isinstance(last, str):

@@ -445,7 +445,7 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
     assert study.entries["springs"] == ts.BemSprings(ts.Box((0.0, 0.0), (0.02, 0.01)), "isotropic", True)
     told = plan(study)["models"]["springs"]
     assert told["kind"] == "bem-springs" and told["label"] == "BEM + springs (isotropic, corotated)"
-    assert any("beside the block: these springs realise" in text for text in told["warnings"])
+    assert any(text.startswith("beside the block: ") for text in told["warnings"])
     result = run(study)
     assert result.converged
     assert 0 < result.comparisons["linear"].rms_error < 0.15  # of which FEM on so coarse a mesh has most
@@ -479,7 +479,7 @@ def test_a_faulty_study_is_refused(change: tuple[str, str], said: str, tmp_path:
 
 def test_its_springs_are_judged_before_the_solve() -> None:
     problem = cantilever((8, 2), 1e-4)
-    assert any("0.882353 Pa" in text for text in ts.BemSprings(HALF, "lloyd").warnings(problem))
+    assert any("0.882 to 1.105" in text for text in ts.BemSprings(HALF, "lloyd").warnings(problem))
 
 
 def test_hooke_is_what_uniform_strain_is_compared_with() -> None:

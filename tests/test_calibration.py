@@ -75,6 +75,21 @@ def test_unknowns_of_one_are_the_rule(sharing: str) -> None:
         assert len(set(unknowns.names)) == len(unknowns)
 
 
+def test_unknowns_do_not_depend_on_where_the_body_lies() -> None:
+    """Nor on its unit; around the origin, where places that are opposite add up to nothing, and far from it."""
+    problem, springs = cantilever((12, 3)), ts.Springs("lloyd")
+    mesh = problem.mesh
+    for kind in ("class", "direction-row"):
+        expected = make_unknowns(problem, springs, kind)
+        for shift, factor in ((mesh.nodes.mean(axis=0), 1.0), (mesh.nodes[0] - 1e4, 1.0), (mesh.nodes[0], 1e6)):
+            moved = replace(problem, mesh=replace(mesh, nodes=factor * (mesh.nodes - shift)))
+            found = make_unknowns(moved, springs, kind)
+            assert found.names == expected.names
+            assert found.potential(2 * expected.start).stiffness == pytest.approx(
+                expected.potential(2 * expected.start).stiffness
+            )
+
+
 def test_the_volume_term_and_regions_are_unknowns_too() -> None:
     problem = Problem(
         mesh=ts.box((0.08, 0.02, 0.02), (8, 2, 2)),

@@ -143,7 +143,7 @@ def test_a_closed_pipe_is_no_error() -> None:
 
 def undescribed(schema: dict[str, Any]) -> list[str]:
     """Return the keys of the study file without a description, as TABLE.KEY."""
-    tables = {"StudyTable": schema, **schema["$defs"]}
+    tables = {"StudyKeys": schema, **schema["$defs"]}
     keys = [(f"{name}.{key}", one) for name, table in tables.items() for key, one in table["properties"].items()]
     assert len(keys) > 80
     return [key for key, one in keys if len(one.get("description", "").split()) < 2]

@@ -219,6 +219,18 @@ def test_markers_are_compared_where_they_are(coarse: ts.Solution, solid: ts.Solu
         ts.compare(markers, other)
 
 
+def test_a_surface_in_space_is_as_far_from_the_body_as_it_was_moved(solid: ts.Solution) -> None:
+    """The outside of a solid as quadrilaterals of their own: a shift along x is all of the distance there is."""
+    mesh, state = solid.problem.mesh, solid.states[-1]
+    used, facets = np.unique(mesh.boundary, return_inverse=True)
+    for shift in (0.0, 0.002):
+        moved = state.displacement[used] + [shift, 0.0, 0.0]
+        record = Record(FILE, "vtu", mesh.nodes[used], {"quad": facets.reshape(-1, 4)}, (Level(1.0, moved),))
+        found = ts.compare(placed(record, Placing(), "surface"), solid)
+        assert found.hausdorff is not None and found.hausdorff.max == pytest.approx(shift, rel=0.05, abs=1e-12)
+        assert found.max_distances == pytest.approx([shift], abs=1e-15)
+
+
 # --- units and axes that do not fit -----------------------------------------------------------
 
 

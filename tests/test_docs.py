@@ -11,7 +11,7 @@ from tests.test_examples import EXAMPLES
 from truespring.mesh import ELEMENT_KINDS
 from truespring.models import ELEMENTS, LAWS, RULES
 from truespring.study import read_study, run
-from truespring.study.schema import MODEL_KINDS, StudyTable
+from truespring.study.schema import MODEL_KINDS, StudyKeys
 
 ROOT = EXAMPLES.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "export").glob("*.md"))]
@@ -51,7 +51,7 @@ def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
 
 def test_every_key_rule_and_law_is_documented() -> None:
     study, models = (ROOT / "docs" / "study.md").read_text("utf-8"), (ROOT / "docs" / "models.md").read_text("utf-8")
-    tables = StudyTable.model_json_schema()
+    tables = StudyKeys.model_json_schema()
     keys = set(tables["properties"]) | {key for one in tables["$defs"].values() for key in one["properties"]}
     assert len(keys) > 25
     assert not missing(keys, study)
@@ -62,11 +62,11 @@ def test_every_key_rule_and_law_is_documented() -> None:
 
 def test_the_schema_names_what_the_tables_hold() -> None:
     """Rules and laws with their description, elements and kinds of model: as values, each a word of its own."""
-    tables = StudyTable.model_json_schema()["$defs"]
+    tables = StudyKeys.model_json_schema()["$defs"]
     for table, key, names in (
-        ("SpringsTable", "rule", RULES),
-        ("FemTable", "law", LAWS),
-        ("FemTable", "element", ELEMENTS),
+        ("SpringsKeys", "rule", RULES),
+        ("FemKeys", "law", LAWS),
+        ("FemKeys", "element", ELEMENTS),
     ):
         found = tables[table]["properties"][key]
         forms = found.get("anyOf", [found])

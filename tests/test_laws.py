@@ -184,7 +184,7 @@ def test_constants_of_a_material_are_values() -> None:
 
 
 def test_a_study_takes_them_with_units() -> None:
-    table = schema.with_constants(schema.MaterialTable, "Material", SCRATCH.constants)
+    table = schema.with_constants(schema.MaterialKeys, "Material", SCRATCH.constants)
     found = table.model_validate({"young": "2 kPa", "poisson": 0.3, "c1": "0.4 kPa", "exponent": 3})
     assert found.model_dump() == {
         "young": 2000.0,
@@ -199,4 +199,4 @@ def test_a_study_takes_them_with_units() -> None:
             table.model_validate({"young": 1.0, "poisson": 0.3, key: value})
     described = table.model_json_schema()["properties"]["c1"]["description"]
     assert "half of the shear modulus" in described and "[Pa]" in described
-    assert set(material_constants()) == set(schema.MaterialTable.model_fields) - {"young", "poisson", "density"}
+    assert set(material_constants()) == set(schema.MaterialKeys.model_fields) - {"young", "poisson", "density"}

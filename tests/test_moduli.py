@@ -13,6 +13,7 @@ from scipy.spatial import Delaunay
 import truespring as ts
 from tests.closed_forms import periodic_elasticity, square_moduli, tensile_test, young_extremes
 from truespring.arrays import Floats
+from truespring.models import findings
 
 THIRD = 1 / 3
 LLOYD, BULK, FULL = (5 / 16, 7 / 16), (3 / 8, 3 / 8), (17 / 56, 23 / 56)
@@ -129,7 +130,7 @@ def test_springs_with_other_moduli_than_the_material_say_so() -> None:
         path = ts.solve(block(young=1e6), ts.Springs(rule=rule), small)
         assert any("Young's modulus" in warning for warning in path.warnings) == said
     other = ts.solve(block(poisson=0.45, young=1e6), ts.Springs(rule="isotropic"), small)
-    assert any("0.3333" in warning and "0.45" in warning for warning in other.warnings)
+    assert any("0.333" in warning and "0.450" in warning for warning in other.warnings)
 
 
 def test_edges_without_diagonals_do_not_resist_shear() -> None:
@@ -149,7 +150,7 @@ def test_what_differs_in_another_direction_only_is_said_too() -> None:
     path = ts.solve(problem, ts.Springs(stiffness=ts.UserStiffness(edge=5 / 12, diagonal=5 / 24)))
     assert path.moduli is not None
     assert path.moduli.young() == pytest.approx(1.0) and path.moduli.young(45) == pytest.approx(0.625)
-    assert any("0.625 Pa" in warning and "45 degrees" in warning for warning in path.warnings)
+    assert any("0.625 to 1.000" in warning for warning in path.warnings)
 
 
 # --- triangles and bodies in space ----------------------------------------------------------------
@@ -428,7 +429,7 @@ def test_a_small_irregular_mesh_is_no_lattice(element: str, counts: tuple[int, i
     told = ts.moduli(problem, springs)
     assert not told.lattice
     assert told.patch_score > 1e-3
-    assert any("patch test" in said for said in springs.warnings(problem))
+    assert "patch-score" in [one.code for one in findings(problem, springs)]
 
 
 def patch_error(mesh: ts.Mesh, model: ts.Springs | ts.Fem, poisson: float) -> float:

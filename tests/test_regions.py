@@ -255,9 +255,9 @@ def test_what_is_told_of_springs_is_told_of_each_material() -> None:
         [ts.Force("right", (1e-3, 0.0))],
         ts.Region([0, 1], ts.Material(2e3, 0.45)),
     )
-    said = [text for text in ts.solve(problem, ts.Springs("isotropic")).warnings if "Young's modulus" in text]
+    said = [text for text in ts.solve(problem, ts.Springs("isotropic")).warnings if "Poisson's ratio" in text]
     assert len(said) == 1
-    assert said[0].startswith("where E is 2000 Pa and Poisson's ratio 0.45: ")
+    assert said[0].startswith("where E is 2000 Pa and nu 0.45, ")
 
 
 def test_lames_constants_of_a_region_are_its_own() -> None:

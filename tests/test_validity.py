@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,6 +159,13 @@ def test_what_a_clamp_leaves_is_told_of_cubes() -> None:
     assert apart < found.error < 8 * apart  # of three meshes no order is believed: it is told with the first
 
 
+@pytest.mark.parametrize("asked", [0.1, 40.0])
+def test_a_reference_says_why_it_ends_only_where_it_ends_early(asked: float) -> None:
+    for share, end in ((0.97, "why"), (0.99, ""), (1.0, "")):
+        one = SimpleNamespace(solved=SimpleNamespace(end="why"), reached=share * asked, asked=asked)
+        assert reference.Reference.end.fget(one) == end
+
+
 def test_richardson_and_roache_to_the_letter() -> None:
     """Meshes whose error is h^p: what is left is the last change over 2^p - 1, and a quarter more for safety."""
     for order in (0.5, 1.0, 1.2, 2.0):
@@ -259,6 +267,11 @@ def test_sentences_follow_from_the_numbers(bent: Validity) -> None:
     part = _with_errors(bent, dict.fromkeys(range(1, 9), (0.1, 0.0)))
     assert "within 5 % of neo-Hookean FEM from 15 to 30 % of the length on every mesh" in verdict(part, part.maps[0])
     assert headline(part, part.maps[0]).startswith("Within 5 % of neo-Hookean FEM from 15 to 30 %")
+    # Errors that only grow are within from the start; of the same error at all loads the smallest load is named.
+    begun = _with_errors(bent, dict.fromkeys(range(1, 9), (0.0, 0.1)))
+    assert "within 5 % of neo-Hookean FEM up to 15 % of the length on every mesh" in verdict(begun, begun.maps[0])
+    level = _with_errors(bent, dict.fromkeys(range(1, 9), (0.3, 0.3)))
+    assert "nearest under a small load, 30 % off" in verdict(level, level.maps[0])
     small = {spot.depth: deviation.stiffness_on_grid[0] for spot, deviation in bent.maps[0].deviations.items()}
     assert f"{100 * small[1]:.0f} % too stiff (1 element)" in said.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -306,6 +319,7 @@ def test_other_axes(study: Path) -> None:
     assert np.isfinite(lloyd.errors[0]).tolist() == [True, False, False]
     assert "made for squares" in next(iter(lloyd.failures.values()))
     assert "negative stiffness" in next(iter(isotropic.failures.values()))  # beyond sqrt(3)
+    assert set(found.table()["aspect"]) == {1.0, 1.5}
     ratios = map_validity(
         study,
         loads=["stretch"],
@@ -386,6 +400,7 @@ def test_the_verb_leaves_a_table_pictures_and_a_page(
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.index("12\N{NO-BREAK SPACE}% too soft") < page.index("How to read a map")
     assert "src=" in page and not re.search(r'(src|href)="http', page)
+    assert "From left to right" in page  # the load grows; else errors are those at full load
 
 
 @pytest.mark.parametrize(
@@ -394,6 +409,7 @@ def test_the_verb_leaves_a_table_pictures_and_a_page(
         (["--load", "strech"], "did you mean 'stretch'"),
         (["--load", "twist"], "is for bodies in space"),
         (["--rule", "loyd"], "did you mean 'lloyd'"),
+        (["--rule", "lloyd+volumes"], "did you mean 'lloyd+volume'"),
         (["--rule", "van-gelder"], "not for quadrilateral elements"),
         (["--law", "mooney"], "'mooney' is unknown"),
         (["--x", "rule"], "names go along y"),
@@ -421,6 +437,7 @@ def test_a_mesh_from_a_file_is_mapped_as_it_is() -> None:
 
 def test_the_table_has_a_row_for_each_level(bent: Validity) -> None:
     table = bent.table()
+    assert set(table["aspect"]) == {1.0} and set(table["depth"]) == {spot.depth for spot in bent.maps[0].deviations}
     assert (
         table.height
         == len(bent.rows)

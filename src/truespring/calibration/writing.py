@@ -109,11 +109,11 @@ def calibrated_study(found: Calibrated, folder: Path, tables: list[str]) -> str:
 
 def _tables(study: Study) -> dict[str, Any]:
     """The tables of a study as they were read, with as many elements as its mesh has."""
-    tables = copy.deepcopy(dict(study.text.tables))
+    tables = copy.deepcopy(dict(study.text.document))
     if study.halvings:
-        if not isinstance(study.table.mesh, schema.RectangleTable | schema.BoxTable):
+        if not isinstance(study.keys.mesh, schema.ShapeKeys):
             raise StudyError(f"{study.file}: a mesh that was read and made finer cannot be written into a study")
-        tables["mesh"]["elements"] = list(study.table.mesh.elements)
+        tables["mesh"]["elements"] = list(study.keys.mesh.elements)
     return tables
 
 

@@ -22,9 +22,9 @@ def _rules(options: argparse.Namespace) -> int:
 
 
 def _schema(options: argparse.Namespace) -> int:
-    from truespring.study.schema import StudyTable
+    from truespring.study.schema import StudyKeys
 
-    print_json(StudyTable.model_json_schema())
+    print_json(StudyKeys.model_json_schema())
     return CONVERGED
 
 

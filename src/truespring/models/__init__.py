@@ -5,6 +5,10 @@ from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprin
 from truespring.models.fem import Fem as Fem
 from truespring.models.fem_potential import FemPotential as FemPotential
 from truespring.models.fem_potential import FiniteElements as FiniteElements
+from truespring.models.findings import CODES as CODES
+from truespring.models.findings import Finding as Finding
+from truespring.models.findings import findings as findings
+from truespring.models.findings import moduli_findings as moduli_findings
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge

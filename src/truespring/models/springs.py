@@ -9,9 +9,9 @@ from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.mesh import Mesh
-from truespring.models.advice import springs_warnings
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
+from truespring.models.findings import springs_warnings
 from truespring.models.linked import LinkedElements
 from truespring.models.links import in_a_row
 from truespring.models.model import Model

@@ -9,9 +9,9 @@ from truespring.arrays import Floats
 from truespring.comparison import Comparison, SupportError, decisive
 from truespring.equilibrium import Solution, State, Status
 from truespring.mesh.selections import AXES
-from truespring.models import Fem, Moduli
+from truespring.models import Fem, moduli_findings
 from truespring.reactions import SupportForce, leading_support, moved_supports
-from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
+from truespring.report.quantity import percent, quantity, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.standing import equally_wrong_sentence, own_error_sentence
 
@@ -225,41 +225,12 @@ def deep(depth: int) -> str:
 
 
 def moduli_sentence(path: Solution) -> str | None:
-    """Return what the springs of a path realise against the material; None where it has no moduli."""
-    moduli = path.moduli
-    if moduli is None:
+    """Return the effective moduli of the springs of a path beside the material's; None where it has no moduli."""
+    if path.moduli is None:
         return None
-    bending = ""
-    if moduli.depth is not None:
-        factor, other = (significant(known[moduli.depth], 4) for known in (moduli.bending, moduli.fem_bending))
-        bending = (
-            f" Bent {deep(moduli.depth)}, they have {factor} times the material's bending stiffness EI; "
-            f"{linear_fem(path)} on this mesh has {other} times."
-        )
+    said = [one.sentence for one in moduli_findings(path.problem, path.moduli)]
     regions = " This is for the body's own material, outside its regions." if path.problem.regions else ""
-    return f"{_stiffness_sentence(moduli)}{bending}{regions}"
-
-
-def _stiffness_sentence(moduli: Moduli) -> str:
-    wanted = f"{given(float(f'{moduli.young_wanted:.4g}'), 'Pa')} and {moduli.poisson_wanted:.2f}"
-    found = [*(np.array(moduli.young_range) / moduli.young_wanted - 1), *moduli.poisson_range]
-    if np.allclose(found, [0.0, 0.0] + 2 * [moduli.poisson_wanted], rtol=0, atol=1e-3):
-        return f"These springs realise the material, in every direction: E and Poisson's ratio are {wanted}."
-    if moduli.dim == 2 and np.allclose(sorted([moduli.young(), moduli.young(45)]), moduli.young_range, rtol=1e-3):
-        along, diagonal = (
-            f"{quantity(moduli.young(angle), 'Pa')} and {moduli.poisson(angle):.2f}" for angle in (0.0, 45.0)
-        )
-        return (
-            f"These springs realise a Young's modulus and a Poisson's ratio of {along} along x, "
-            f"{diagonal} at 45 degrees; the material in its section has {wanted}."
-        )
-    youngs = " to ".join(dict.fromkeys(quantity(value, "Pa") for value in moduli.young_range))
-    poissons = " to ".join(dict.fromkeys(f"{value:.2f}" for value in moduli.poisson_range))
-    in_section = " in its section" if moduli.dim == 2 else ""
-    return (
-        f"These springs realise a Young's modulus of {youngs} and a Poisson's ratio of {poissons} over all directions; "
-        f"the material{in_section} has {wanted}."
-    )
+    return f"{'; '.join(said)}.{regions}"
 
 
 def path_trouble(result: Result, name: str) -> str | None:

@@ -24,7 +24,7 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         for depth, part in enumerate(way):
             holder = _entered(holder, part, key, depth)
         if holder is new:
-            _refuse_unknown(str(last), schema.StudyTable.model_fields, key)
+            _refuse_unknown(str(last), schema.StudyKeys.model_fields, key)
         place = _place(holder, last, key) if isinstance(last, int) else _word(holder, last, key)
         holder[place] = copy.deepcopy(value)
     return new
@@ -41,7 +41,7 @@ def key_parts(key: str) -> list[str | int]:
 
 
 def value_at(table: Any, key: str) -> Any:
-    """Return what a checked study, a StudyTable, holds at a key, in SI."""
+    """Return what a checked study, a StudyKeys, holds at a key, in SI."""
     for part in key_parts(key):
         if isinstance(part, int):
             table = table[part]
@@ -56,7 +56,7 @@ def _entered(holder: Any, part: str | int, key: str, depth: int) -> Any:
         return holder[_place(holder, part, key)]
     if _word(holder, part, key) not in holder:
         if depth == 0:
-            _refuse_unknown(part, schema.StudyTable.model_fields, key)
+            _refuse_unknown(part, schema.StudyKeys.model_fields, key)
         if depth == 1 and key.startswith("models."):
             raise StudyError(f"{key}: '{part}' is no model of the study{nearest(part, holder)}: {', '.join(holder)}")
         holder[part] = {}

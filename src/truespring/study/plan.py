@@ -14,6 +14,7 @@ from truespring.models import (
 from truespring.potential import Stretched
 from truespring.problem import Problem
 from truespring.report.summary import moduli_values
+from truespring.study.moduli import finding_values
 from truespring.study.read import Study
 
 
@@ -60,7 +61,7 @@ def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
     """Return what is known of a model before it is solved."""
     problem, model = study.problem, study.entries[name]
     realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
-    plan: dict[str, Any] = {"kind": study.table.models[name].kind, "label": model.label_on(problem)}
+    plan: dict[str, Any] = {"kind": study.keys.models[name].kind, "label": model.label_on(problem)}
     plan |= {} if model.law is None else {"law": model.law}
     element = model.chosen_element(problem)
     plan |= {} if element is None else {"element": element}
@@ -71,5 +72,5 @@ def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
         plan |= {"n_springs": len(potential.springs)} if isinstance(potential, Stretched) else {}
     for springs in springs_by_rule({name: model}).values():
         fitness = judge(problem, springs, study.tolerance)
-        plan |= {"fit": fitness.fit, "sentence": fitness.sentence}
+        plan |= {"fit": fitness.fit, "sentence": fitness.sentence, "findings": finding_values(fitness.findings)}
     return plan | {"warnings": list(model.warnings(problem))}

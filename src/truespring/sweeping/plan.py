@@ -54,7 +54,7 @@ class Plan:
     @cached_property
     def frame(self) -> str:
         """Digest of all that is not varied."""
-        fixed = changed(self.text.tables, dict.fromkeys(self.keys))
+        fixed = changed(self.text.document, dict.fromkeys(self.keys))
         files = digests(self.text.file.parent, fixed, {})
         return _digest(json.dumps([fixed, files, version("truespring")], sort_keys=True, default=str))
 
@@ -89,8 +89,8 @@ def make_plan(text: StudyText, several: Sequence[Mapping[str, Any]]) -> Plan:
 
 
 def _point(text: StudyText, changes: Mapping[str, Any], keys: Sequence[str], known: dict[Path, str]) -> Point:
-    table = text.table(changes)
-    files = digests(text.file.parent, changed(text.tables, changes), known)
+    table = text.keys(changes)
+    files = digests(text.file.parent, changed(text.document, changes), known)
     # The checked table, not the text: comments, and 4 kPa beside 4000, change nothing.
     name = _digest(json.dumps([repr(table), files, version("truespring")], sort_keys=True))[:20]
     return Point(name, changes, {key: _plain(value_at(table, key), changes[key]) for key in keys}, files)

@@ -148,7 +148,7 @@ def run_sweep(
         left = {name: point for name, point in plan.points.items() if name not in records}
         n_before = len(records)
         if left:
-            models = len(plan.text.tables.get("models", ()))
+            models = len(plan.text.document.get("models", ()))
             hard = None if timeout is None else 2 * models * timeout + _GRACE
             pool = Pool(workers, scheduler, threads=threads, timeout=hard, report=report)
             _Tally(plan, store, records, progress).solve(left, pool, partial(solve_point, timeout=timeout))
@@ -206,7 +206,7 @@ def solve_point(asked: tuple[StudyText, Point], timeout: float | None = None) ->
 
 def _refuse_other_than_planned(text: StudyText, point: Point) -> None:
     """A record is of the files and the version that it is named after."""
-    now = digests(text.file.parent, changed(text.tables, point.changes), {})
+    now = digests(text.file.parent, changed(text.document, point.changes), {})
     for name in {**now, **point.files}:
         if now.get(name) != point.files.get(name):
             raise TruespringError(f"{text.file.parent / name}: is not the file that it was when the sweep began")
@@ -258,7 +258,7 @@ def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:
     """
     from truespring.sweeping.page import render_sweep
 
-    page = render_sweep(done.plan.text.file, done.plan.text.tables.get("title"), done.plan.keys, done.rows, command)
+    page = render_sweep(done.plan.text.file, done.plan.text.document.get("title"), done.plan.keys, done.rows, command)
     with Output(out, "sweep.csv") as output:
         write_table(done.rows, output.staging)
         (output.staging / "report.html").write_text(page, encoding="utf-8")

@@ -178,11 +178,11 @@ def _takes_whole_numbers_only(text: StudyText, key: str, values: Range) -> bool:
     """Whether a study takes both ends of a range, and nothing between two whole numbers of it."""
     try:
         for end in (values.first, values.last):
-            text.table({key: int(end)})
+            text.keys({key: int(end)})
     except StudyError:
         return False
     try:
-        text.table({key: (values.first + values.last) / 2 + 0.37})
+        text.keys({key: (values.first + values.last) / 2 + 0.37})
     except StudyError:
         return True
     return False

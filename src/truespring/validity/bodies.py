@@ -36,14 +36,13 @@ class Body:
     """
 
     problem: Problem
-    shape: schema.RectangleTable | schema.BoxTable | None
+    shape: schema.ShapeKeys | None
     probe: tuple[float, ...] | None
 
     @staticmethod
     def of(study: Study) -> "Body":
         """Return the body of a study; raise StudyError where it is none of elements."""
-        table = study.table.mesh
-        shape = table if isinstance(table, schema.RectangleTable | schema.BoxTable) else None
+        shape = study.keys.mesh if isinstance(study.keys.mesh, schema.ShapeKeys) else None
         problem = study.problem
         if problem.material is None or problem.mesh.element == "line":
             raise StudyError(f"{study.file}: a plain network has no material: there is no FEM to map it against")
@@ -94,9 +93,7 @@ class Body:
         if shape is None or (spot.depth is None and spot.aspect is None):
             return self.problem.mesh
         counts, _ = self.counts(spot.depth or self.depth, self.aspect if spot.aspect is None else spot.aspect)
-        if isinstance(shape, schema.RectangleTable):
-            return rectangle(shape.size, counts, shape.element, shape.diagonal)
-        return box(shape.size, counts, shape.element)
+        return shape.divided(counts)
 
     def springs_problem(self, load: LoadType, factor: float, spot: Spot) -> Problem:
         """Return the problem of the springs at a share of the load."""

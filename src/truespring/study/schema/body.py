@@ -1,0 +1,195 @@
+"""The keys of `[material]`, `[[region]]`, `[section]`, `[[support]]` and `[[load]]`, each of which builds its part."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from pydantic import Field, create_model, model_validator
+
+from truespring.errors import StudyError
+from truespring.loading import LOADS, Fixed, Load, LoadKind
+from truespring.material import SECTIONS, Material, Section
+from truespring.mesh import Mesh, select, select_elements
+from truespring.models import Constant, material_constants
+from truespring.problem import Region
+from truespring.study.places import Places
+from truespring.study.schema.values import (
+    QUANTITIES,
+    SELECTION_FORMS,
+    Angle,
+    Density,
+    Direction,
+    Keys,
+    Length,
+    Number,
+    On,
+    SectionKind,
+    Stress,
+    three,
+    two_or_three,
+)
+
+
+class PlainMaterialKeys(Keys):
+    """What the body is made of."""
+
+    young: Stress = Field(description='Young\'s modulus: a number in Pa, or a string with its unit such as "10 kPa"')
+    poisson: Number = Field(description="Poisson's ratio")
+    density: Density | None = Field(default=None, description="density, needed for gravity")
+
+    def build(self) -> Material:
+        """Return the material."""
+        constants = {name: getattr(self, name, None) for name in material_constants()}
+        given = {name: value for name, value in constants.items() if value is not None}
+        return Material(self.young, self.poisson, self.density, given)
+
+
+def with_constants(keys: type[Keys], name: str, constants: Mapping[str, Constant]) -> type[Keys]:
+    """Return a class of this name that takes the constants of laws too, each an optional key with its unit."""
+    fields: dict[str, Any] = {}
+    for key, constant in constants.items():
+        quantity = Number if constant.dimension is None else QUANTITIES[constant.dimension]
+        described = Field(default=None, description=f"{constant.meaning} [{constant.unit}]")
+        fields[key] = (quantity | None, described)
+    return create_model(name, __base__=keys, __doc__=keys.__doc__, **fields)
+
+
+if TYPE_CHECKING:
+    MaterialKeys = PlainMaterialKeys
+else:
+    MaterialKeys = with_constants(PlainMaterialKeys, "MaterialKeys", material_constants())
+
+
+class RegionKeys(MaterialKeys):
+    """A part of the body of another material."""
+
+    on: On = Field(
+        description="elements of this material: a group of an imported mesh, or a box that holds their centres"
+    )
+
+    def region(self, mesh: Mesh) -> Region:
+        """Return the region; raise MeshError where it selects no element."""
+        select_elements(mesh, self.on)
+        return Region(self.on, self.build())
+
+
+class SectionKeys(Keys):
+    """How a plane body behaves across the plane."""
+
+    kind: SectionKind = Field(description="whether stress or strain vanishes across the plane")
+    thickness: Length = Field(
+        description='thickness of the body: a number in m, or a string with its unit such as "10 mm"'
+    )
+
+    def build(self) -> Section:
+        """Return the section."""
+        return SECTIONS[self.kind](self.thickness)
+
+
+class SupportKeys(Keys):
+    """Nodes that are held or moved."""
+
+    on: On = Field(description=f"nodes that are held or moved: {SELECTION_FORMS}")
+    fix: Annotated[list[Direction], Field(min_length=1)] | None = Field(
+        default=None, description="directions that are held or prescribed; default: all"
+    )
+    displacement: Annotated[list[Length], two_or_three] | None = Field(
+        default=None, description="prescribed displacement at full load; default: none, the nodes are held"
+    )
+    rotation: Angle = Field(
+        default=0.0,
+        description='prescribed rotation at full load, anticlockwise in 2D, about an axis in 3D: radians, or "10 deg"',
+    )
+    about: Annotated[list[Length], two_or_three] | None = Field(
+        default=None, description="centre of the rotation; default: the centre of the selection"
+    )
+    axis: Annotated[list[Number], three] | None = Field(default=None, description="axis of the rotation in 3D")
+
+    def build(self, places: Places, number: int, mesh: Mesh) -> Fixed:
+        """Return the support, number `number` from 0; raise StudyError where it does not fit the mesh."""
+        with places.at("support", number, "on"):
+            select(mesh, self.on)
+        for key in ("displacement", "about"):
+            with places.at("support", number, key):
+                check_length(getattr(self, key), mesh)
+        return Fixed(self.on, self.fix, self.displacement, self.rotation, self.about, self.axis)
+
+
+class LoadKeys(Keys):
+    """A load: one key names it; all but those of the whole body act on a selection."""
+
+    on: On = None
+    kinds: ClassVar[Mapping[str, LoadKind]] = {}
+
+    @model_validator(mode="after")
+    def _one_load(self) -> Self:
+        given = [name for name in self.kinds if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = f"{' and '.join(given)} are given" if given else "nothing is given"
+            raise ValueError(f"{found}: a load has one of {', '.join(self.kinds)}")
+        if self.kind.on_selection and self.on is None:
+            raise ValueError(f"on is required and missing: where the {self.key} acts")
+        if not self.kind.on_selection and self.on is not None:
+            raise ValueError(f"{self.key} acts on the whole body: leave out on")
+        for key in sorted(self.model_fields_set - {"on", self.key, *self.kind.further}):
+            raise ValueError(f"{key} does not go with {self.key}: leave it out")
+        for key, quantity in self.kind.further.items():
+            if getattr(self, key) is None and quantity.default is None:
+                raise ValueError(f"{key} is required and missing: {quantity.about}")
+        return self
+
+    @property
+    def key(self) -> str:
+        """The key that names the load."""
+        return next(name for name in self.kinds if getattr(self, name) is not None)
+
+    @property
+    def kind(self) -> LoadKind:
+        """What the load is."""
+        return self.kinds[self.key]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values of the load's keys in SI, by key."""
+        given = {key: getattr(self, key) for key in (self.key, *self.kind.further)}
+        return {key: self.kind.quantities(self.key)[key].default if one is None else one for key, one in given.items()}
+
+    def load(self) -> Load:
+        """Return the load."""
+        quantities = self.kind.quantities(self.key)
+        arguments: dict[str, Any] = {quantities[key].argument: value for key, value in self.values.items()}
+        return self.kind.load(**({"on": self.on} if self.kind.on_selection else {}), **arguments)
+
+    def build(self, places: Places, number: int, mesh: Mesh) -> Load:
+        """Return the load, number `number` from 0; raise StudyError where it does not fit the mesh."""
+        if self.on is not None:
+            with places.at("load", number, "on"):
+                select(mesh, self.on)
+        for key, value in self.values.items():
+            with places.at("load", number, key):
+                check_length(value, mesh)
+        return self.load()
+
+
+def load_form(kinds: Mapping[str, LoadKind]) -> type[LoadKeys]:
+    """Return the schema of `[[load]]` that takes these loads."""
+    keys = {key: one for name, kind in kinds.items() for key, one in kind.quantities(name).items()}
+    fields: dict[str, Any] = {}
+    for key, quantity in keys.items():
+        number: Any = QUANTITIES[quantity.dimension]
+        form: Any = Annotated[list[number], two_or_three] if quantity.vector else number
+        fields[key] = (form | None, Field(None, description=quantity.about))
+    made: type[LoadKeys] = create_model("LoadKeys", __base__=LoadKeys, __doc__=LoadKeys.__doc__, **fields)
+    made.kinds = kinds
+    return made
+
+
+if TYPE_CHECKING:
+    AnyLoad = LoadKeys
+else:
+    AnyLoad = load_form(LOADS)
+
+
+def check_length(values: Any, mesh: Mesh) -> None:
+    """Raise StudyError for a list that has not one value a direction of the mesh."""
+    if isinstance(values, list) and len(values) != mesh.dim:
+        raise StudyError(f"{values} has {len(values)} values, the body has {mesh.dim} directions")

@@ -1,0 +1,313 @@
+"""The keys of `[models.NAME]`, one class a kind, each of which builds its model."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
+
+from pydantic import Discriminator, Field, model_validator
+
+from truespring.errors import StudyError, nearest
+from truespring.models import (
+    ELEMENTS,
+    LAWS,
+    RULES,
+    BemSprings,
+    Fem,
+    GivenSprings,
+    Heml,
+    MassTensor,
+    Model,
+    SpringNetwork,
+    Springs,
+    Terzopoulos,
+    UserStiffness,
+)
+from truespring.problem import Problem
+from truespring.program import ReadSolution
+from truespring.reference import CalculiX, read_stl
+from truespring.solvers import Solver
+from truespring.study.given import read_given
+from truespring.study.places import Places
+from truespring.study.schema.values import FemElement, FileName, Keys, LawName, Number, On, PlainRuleName, RuleName
+
+
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """What a model of a study is built for.
+
+    Attributes:
+        places: the study's file.
+        problem, solver: those of the study.
+        network: the springs of a mesh that is a plain network, else None.
+        models: the keys of all models of the study by name.
+        name: the name of this one.
+    """
+
+    places: Places
+    problem: Problem
+    solver: Solver
+    network: SpringNetwork | None
+    models: Mapping[str, "ModelKeys"]
+    name: str
+
+
+class ModelKeys(Keys):
+    """A model; a subclass has the key `kind`, whose one value names it.
+
+    Attributes:
+        of_springs: whether it is springs, which another program may solve too.
+    """
+
+    of_springs: ClassVar[bool] = False
+    if TYPE_CHECKING:  # with one value and a description in the subclass
+        kind: Any
+
+    @abstractmethod
+    def build(self, scope: Scope) -> Model:
+        """Return the model."""
+
+    def check(self, scope: Scope, model: Any) -> None:
+        """Raise TruespringError where the model that was built does not fit the problem; solve nothing."""
+        model.check(scope.problem)
+
+
+class StiffnessKeys(Keys):
+    """Springs of the user's own, in units of thickness times Young's modulus; in 3D of Young's modulus times size.
+
+    Or spring by spring: `file` is a CSV file with columns a, b and stiffness, `volume` one with element and kappa.
+    """
+
+    edge: Number | None = Field(default=None, description="stiffness of the springs along edges")
+    diagonal: Number = Field(default=0.0, description="stiffness of the springs along diagonals of faces")
+    body: Number = Field(default=0.0, description="stiffness of the springs along body diagonals, in 3D")
+    file: FileName | None = Field(
+        default=None,
+        description="CSV file of the stiffness of each spring, relative to the study: columns a, b, stiffness [N/m]",
+    )
+    volume: FileName | None = Field(
+        default=None,
+        description="CSV file of the volume term of each element, relative to the study: columns element, kappa [Pa]",
+    )
+
+    @model_validator(mode="after")
+    def _numbers_or_file(self) -> Self:
+        if self.file is None and self.edge is None:
+            raise ValueError("edge is required and missing; or file, with the stiffness of each spring")
+        if self.file is not None and {"edge", "diagonal", "body"} & self.model_fields_set:
+            raise ValueError("file gives the stiffness of each spring: leave edge, diagonal and body out")
+        if self.file is None and self.volume is not None:
+            raise ValueError("volume, the moduli of the volume term, goes with a file of springs: file is missing")
+        return self
+
+
+class SpringsKeys(ModelKeys):
+    """A mass-spring model."""
+
+    of_springs: ClassVar[bool] = True
+
+    kind: Literal["springs"] = Field(description="springs along edges and diagonals of the elements")
+    rule: RuleName | None = Field(
+        default=None,
+        description=f"stiffness rule, which sets the stiffness of springs from the material: {', '.join(RULES)}",
+    )
+    stiffness: StiffnessKeys | None = Field(default=None, description="stiffness of the springs, instead of a rule")
+    sharing: Literal["summed", "single"] = Field(
+        default="summed",
+        description="whether a spring sums the stiffness of all elements that share it, or takes that of one",
+    )
+    allow_negative: bool = Field(default=False, description="whether springs of negative stiffness are accepted")
+    volume: bool = Field(
+        default=False,
+        description="whether an area or volume term is added, so that the body has the Poisson's ratio of the material",
+    )
+    k_body: Number | None = Field(
+        default=None,
+        description="stiffness of the body diagonals of a cube, in Young's modulus times edge; rule isotropic only",
+    )
+
+    @model_validator(mode="after")
+    def _stiffness_read(self) -> Self:
+        if self.stiffness is not None and self.stiffness.file is not None:
+            named = sorted({"rule", "sharing", "volume", "k_body"} & self.model_fields_set)
+            if named:
+                raise ValueError(f"stiffness is read from a file, spring by spring: leave {' and '.join(named)} out")
+        return self
+
+    def build(self, scope: Scope) -> Springs | GivenSprings:
+        """Return springs by a rule, by numbers, or as read spring by spring."""
+        own = self.stiffness
+        if own is not None and own.file is not None:
+            volume = None if own.volume is None else scope.places.beside(own.volume)
+            return read_given(scope.problem, scope.places.beside(own.file), volume, self.allow_negative)
+        numbers = None if own is None or own.edge is None else UserStiffness(own.edge, own.diagonal, own.body)
+        return Springs(self.rule, numbers, self.sharing, self.allow_negative, self.volume, self.k_body)
+
+
+class FemKeys(ModelKeys):
+    """A finite element model."""
+
+    kind: Literal["fem"] = Field(description="finite elements")
+    law: LawName = Field(description=f"constitutive law: {', '.join(LAWS)}")
+    element: FemElement | None = Field(
+        default=None, description=f"interpolation: {', '.join(ELEMENTS)}; default: one that does not lock"
+    )
+
+    def build(self, scope: Scope) -> Fem:
+        """Return finite elements."""
+        return Fem(self.law, self.element)
+
+
+class HemlKeys(ModelKeys):
+    """Hyper-elastic mass links."""
+
+    kind: Literal["heml"] = Field(description="hyper-elastic mass links")
+    law: LawName = Field(description="constitutive law")
+
+    def build(self, scope: Scope) -> Heml:
+        """Return the links."""
+        return Heml(self.law)
+
+
+class MassTensorKeys(ModelKeys):
+    """The mass-tensor method."""
+
+    kind: Literal["mass-tensor"] = Field(description="the mass-tensor method")
+    law: LawName = Field(description="constitutive law")
+
+    def build(self, scope: Scope) -> MassTensor:
+        """Return the model."""
+        return MassTensor(self.law)
+
+
+class NetworkKeys(ModelKeys):
+    """The network of the mesh itself."""
+
+    of_springs: ClassVar[bool] = True
+
+    kind: Literal["network"] = Field(description="the springs of the mesh, a plain network")
+
+    def build(self, scope: Scope) -> SpringNetwork:
+        """Return the network."""
+        if scope.network is None:
+            raise StudyError('kind = "network" is for a mesh of nodes and springs')
+        return scope.network
+
+
+class CalculixKeys(ModelKeys):
+    """The problem in CalculiX, as finite elements of a law, or as the springs of another model of the study."""
+
+    kind: Literal["calculix"] = Field(description="the same problem, solved by CalculiX")
+    law: Literal["linear", "saint-venant-kirchhoff"] | None = Field(
+        default=None, description="constitutive law of the finite elements"
+    )
+    springs: str | None = Field(
+        default=None,
+        description="name of a springs model of the study, to be solved by CalculiX instead of finite elements",
+    )
+    element: Literal["linear", "quadratic"] | None = Field(default=None, description="order of the finite elements")
+
+    @model_validator(mode="after")
+    def _one_body(self) -> Self:
+        if self.element is not None and self.springs is not None:
+            raise ValueError(
+                "element and springs are given: an element is of a continuum, springs name a model; give one"
+            )
+        if self.law is not None and self.springs is not None:
+            raise ValueError("law and springs are given: a law is for a continuum, springs name a model; give one")
+        return self
+
+    def build(self, scope: Scope) -> CalculiX:
+        """Return CalculiX, which is not run."""
+        springs = None if self.springs is None else self._named(scope, self.springs)
+        law = {} if self.law is None else {"law": self.law}
+        return CalculiX(springs=springs, element=self.element, **law)
+
+    def check(self, scope: Scope, model: CalculiX) -> None:
+        """Raise TruespringError where CalculiX cannot be run."""
+        model.check_run(scope.problem, scope.solver)
+
+    def _named(self, scope: Scope, name: str) -> Model:
+        """The springs of another model of the study."""
+        known = [one for one, keys in scope.models.items() if keys.of_springs]
+        with scope.places.at("models", scope.name, "springs"):
+            if name in known:
+                return scope.models[name].build(scope)
+            there = f"there are {', '.join(known)}" if known else "there are none"
+            raise StudyError(f"'{name}' is not a springs model of this study{nearest(name, known)}: {there}")
+
+
+class TerzopoulosKeys(ModelKeys):
+    """The metric-tensor model on a regular grid."""
+
+    kind: Literal["terzopoulos"] = Field(description="the metric-tensor model of Terzopoulos et al.")
+    boundary: Literal["paper", "trapezoid"] = Field(
+        default="paper", description="weights at the boundary: those of the paper, or of the trapezoidal rule"
+    )
+
+    def build(self, scope: Scope) -> Terzopoulos:
+        """Return the model."""
+        return Terzopoulos(self.boundary)
+
+
+class BemSpringsKeys(ModelKeys):
+    """A block of boundary elements, and springs beside it."""
+
+    kind: Literal["bem-springs"] = Field(description="a block of boundary elements, springs elsewhere")
+    block: On = Field(
+        description="elements of the block: a group of an imported mesh, or a box that holds their centres"
+    )
+    rule: PlainRuleName = Field(default="isotropic", description="stiffness rule of the springs")
+    corotated: bool = Field(default=False, description="whether the block may rotate without strain")
+
+    def build(self, scope: Scope) -> BemSprings:
+        """Return the block and the springs."""
+        return BemSprings(self.block, self.rule, self.corotated)
+
+
+class StlKeys(ModelKeys):
+    """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
+
+    kind: Literal["stl"] = Field(description="a deformed mesh computed by another program")
+    file: FileName = Field(description="STL file of the deformed body, relative to the study")
+    undeformed: FileName | None = Field(
+        default=None, description="STL file of the undeformed body with the same triangles"
+    )
+    load_factor: Annotated[Number, Field(gt=0, le=1)] = Field(default=1.0, description="load level of the file")
+    unit: str = Field(default="m", description='length unit of the files, such as "mm", which STL files do not state')
+
+    def build(self, scope: Scope) -> ReadSolution:
+        """Return what the files hold."""
+        undeformed = None if self.undeformed is None else scope.places.beside(self.undeformed)
+        file = scope.places.beside(self.file)
+        return ReadSolution(read_stl(scope.problem, file, self.load_factor, undeformed, self.unit))
+
+    def check(self, scope: Scope, model: Model) -> None:
+        """Find no fault: the files were read."""
+
+
+def _by_kind(*classes: type[ModelKeys]) -> Mapping[str, type[ModelKeys]]:
+    """Return classes by the value of their key `kind`."""
+    return MappingProxyType({get_args(one.model_fields["kind"].annotation)[0]: one for one in classes})
+
+
+#: The kinds of models; a new one is a class above, and its name here.
+MODEL_KINDS = _by_kind(
+    SpringsKeys,
+    FemKeys,
+    HemlKeys,
+    MassTensorKeys,
+    TerzopoulosKeys,
+    BemSpringsKeys,
+    NetworkKeys,
+    CalculixKeys,
+    StlKeys,
+)
+
+if TYPE_CHECKING:
+    AnyModel = ModelKeys
+else:
+    AnyModel = Annotated[reduce(or_, MODEL_KINDS.values()), Discriminator("kind")]

@@ -1,0 +1,154 @@
+"""Values of study files as pydantic types: quantities in SI, names of tables, selections, files."""
+
+import math
+from collections.abc import Callable, Collection
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+
+from truespring.errors import TruespringError, nearest, shown
+from truespring.material import SECTIONS
+from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
+from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
+
+
+def _as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a conversion that raises ValueError, which pydantic collects, instead of TruespringError."""
+
+    def converted(value: Any) -> Any:
+        try:
+            return convert(value)
+        except TruespringError as error:
+            raise ValueError(str(error)) from None
+
+    return converted
+
+
+def _si(dimension: Dimension) -> BeforeValidator:
+    return BeforeValidator(_as_value_error(lambda value: to_si(value, dimension)))
+
+
+def _quantity(dimension: Dimension) -> WithJsonSchema:
+    unit, example = SI_UNITS[dimension]
+    description = f"a {dimension}: a number in {unit}, or a text with its unit such as {example}"
+    return WithJsonSchema({"type": ["number", "string"], "description": description})
+
+
+def _key_of(names: Collection[str]) -> BeforeValidator:
+    """Accept the keys of a mapping such as RULES, so that it is the one list of them."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, str) or value not in names:
+            raise ValueError(f"{shown(value)} is unknown{nearest(shown(value), names)}; allowed: {', '.join(names)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def _strict_number(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{shown(value)} is not a number")
+    if value == value and abs(value) != math.inf and value and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"{shown(value)} is out of range: must be a number {SIZES}, or zero")
+    return value
+
+
+def _file_name(value: Any) -> Any:
+    if isinstance(value, str) and not value.isprintable():
+        raise ValueError(f"{shown(value)} is not a file name: it has a non-printing character")
+    return value
+
+
+Length = Annotated[float, _si("length"), _quantity("length")]
+Stress = Annotated[float, _si("stress"), _quantity("stress")]
+Density = Annotated[float, _si("density"), _quantity("density")]
+Angle = Annotated[float, _si("angle"), _quantity("angle")]
+QUANTITIES: dict[Dimension, Any] = {
+    dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
+}
+_RULES = {"description": "; ".join(f"{name}: {rule.idea}" for name, rule in RULES.items())}
+RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)} | _RULES)]
+_PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
+PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
+_LAWS = {"description": "; ".join(f"{name}: {law.source}" for name, law in LAWS.items())}
+LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
+FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
+PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
+SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
+Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
+SectionKind = Annotated[str, _key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
+Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
+#: A file, beside the study's own where the name is no absolute one.
+FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
+Direction = Literal["x", "y", "z"]
+
+SELECTION_FORMS = (
+    'a side ("left", "right", "bottom", "top", "back", "front"), a group of an imported mesh, a point '
+    '("right-middle"), { x = "0 mm" }, { box = [[xmin, ymin], [xmax, ymax]] } or { near = [x, y] }'
+)
+
+
+def _selection(value: Any) -> Selection:
+    if isinstance(value, str):
+        return value
+    if not isinstance(value, dict) or len(value) != 1:
+        raise TruespringError(f"{shown(value)} is not a selection; allowed: {SELECTION_FORMS}")
+    ((key, what),) = value.items()
+    if key in ("x", "y", "z"):
+        return Plane(key, to_si(what, "length"))
+    if key == "near":
+        return Near(_point(what))
+    if key == "box":
+        if isinstance(what, list) and len(what) in (4, 6):  # the corners in one list
+            what = [what[: len(what) // 2], what[len(what) // 2 :]]
+        if not isinstance(what, list) or len(what) != 2:
+            raise TruespringError(f"box = {shown(what)}: must be two corners, [[xmin, ymin], [xmax, ymax]]")
+        return Box(_point(what[0]), _point(what[1]))
+    known = ("x", "y", "z", "box", "near")
+    raise TruespringError(f"{shown(key)} is not a selection{nearest(key, known)}; allowed: {SELECTION_FORMS}")
+
+
+def _point(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) not in (2, 3):
+        raise TruespringError(f'{shown(value)} is not a point: give coordinates such as ["160 mm", "20 mm"]')
+    return tuple(to_si(coordinate, "length") for coordinate in value)
+
+
+def _probe(value: Any) -> str | tuple[float, ...]:
+    return value if isinstance(value, str) else _point(value)
+
+
+_ON_SCHEMA = {
+    "description": SELECTION_FORMS,
+    "anyOf": [
+        {"type": "string"},
+        *(
+            {"type": "object", "properties": {key: form}, "required": [key], "additionalProperties": False}
+            for key, form in (
+                ("x", {"type": ["number", "string"]}),
+                ("y", {"type": ["number", "string"]}),
+                ("z", {"type": ["number", "string"]}),
+                ("box", {"type": "array", "minItems": 2, "maxItems": 6}),
+                ("near", {"type": "array", "items": {"type": ["number", "string"]}}),
+            )
+        ),
+    ],
+}
+On = Annotated[Any, PlainValidator(_as_value_error(_selection)), WithJsonSchema(_ON_SCHEMA)]
+_POINT_SCHEMA = {"type": "array", "items": {"type": ["number", "string"]}}
+Probe = Annotated[
+    Any, PlainValidator(_as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
+]
+
+
+Count = Annotated[int, Field(ge=1, le=10**9)]
+#: Numbers of values of lists: one a direction in 2D, in 3D, or in either.
+two, three = Field(min_length=2, max_length=2), Field(min_length=3, max_length=3)
+two_or_three = Field(min_length=2, max_length=3)
+
+
+class Keys(BaseModel):
+    """The keys of a part of a study file: frozen, and no others are allowed."""
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, protected_namespaces=())

@@ -1,0 +1,169 @@
+"""The keys of a whole study file: `[solver]`, `[compare]`, and what the other parts are."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator
+
+from truespring.equilibrium import check_solver
+from truespring.errors import StudyError, nearest
+from truespring.mesh import Mesh, named_point, nearest_node, select
+from truespring.models import Model
+from truespring.problem import Problem
+from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
+from truespring.study.places import Places
+from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, SectionKeys, SupportKeys
+from truespring.study.schema.meshes import AnyMesh
+from truespring.study.schema.models import AnyModel, ModelKeys
+from truespring.study.schema.values import Direction, Keys, Length, Number, On, Probe
+
+
+class SolverKeys(Keys):
+    """How equilibrium is found."""
+
+    load_steps: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=10, description="number of load levels between no load and full load"
+    )
+    control: Literal["load", "displacement", "arc-length"] = Field(
+        default="load",
+        description="what is prescribed at each step: the load, a displacement, or the arc length of the path",
+    )
+    on: On = Field(
+        default=None, description="with control by displacement: the nodes whose mean displacement is prescribed"
+    )
+    direction: Direction | None = Field(
+        default=None, description="with control by displacement: the direction of that displacement"
+    )
+    to: Length | None = Field(
+        default=None, description="with control by displacement: the displacement at the end of the path"
+    )
+    max_steps: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=200, description="with control by arc length: largest number of steps"
+    )
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-10,
+        description="unbalanced force over the larger of applied and internal force at which a level is solved",
+    )
+    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=50, description="largest number of Newton iterations per load level, before the step is reduced"
+    )
+    method: Literal["auto", "mixed", "line-search"] = Field(
+        default="auto",
+        description="Newton's method with mixed integration points, with a line search, or one after the other",
+    )
+    linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = Field(
+        default="auto",
+        description="solver of linear systems: direct or multigrid, by size; or a library that factorises",
+    )
+
+    def build(self, places: Places, problem: Problem) -> Solver:
+        """Return the solver; raise StudyError where it does not fit the problem."""
+        common: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
+        past = {**common, "linear": "direct" if self.linear == "auto" else self.linear}
+        self._check_control(places)
+        if self.direction is not None and self.to is not None:
+            with places.at("solver", "on"):
+                select(problem.mesh, self.on)
+            with places.at("solver"):
+                control = DisplacementControl(self.on, self.direction, self.to, self.load_steps, **past)
+                check_solver(problem, control)
+                return control
+        with places.at("solver", "linear"):
+            if self.control == "arc-length":
+                return ArcLength(self.load_steps, self.max_steps, **past)
+            return Newton(self.load_steps, method=self.method, linear=self.linear, **common)
+
+    def _check_control(self, places: Places) -> None:
+        """Raise StudyError where keys of displacement control are missing, or given for another control."""
+        for key in ("on", "direction", "to"):
+            given = getattr(self, key) is not None
+            if given != (self.control == "displacement"):
+                with places.at("solver", key):
+                    fault = "is" if given else "is required and missing"
+                    raise StudyError(f'{fault} for control = "displacement"')
+
+
+class CompareKeys(Keys):
+    """Which path is compared with which, and where one looks."""
+
+    model: str | None = Field(
+        default=None, description="name of the model that is compared with the others; default: the first springs"
+    )
+    references: list[str] | None = Field(
+        default=None, description="names of the models that it is compared with; default: all others"
+    )
+    probe: Probe = Field(
+        default=None,
+        description='node that the curves follow: "right-middle", or coordinates; default: the node that moves most',
+    )
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.05, description="largest error at which two models agree"
+    )
+    refine: bool = Field(
+        default=True, description="whether each reference is solved on finer meshes too, to estimate its own error"
+    )
+
+    def node(self, places: Places, mesh: Mesh) -> int | None:
+        """Return the number of the probe's node, None for the one that moves most."""
+        with places.at("compare", "probe"):
+            if self.probe is None:
+                return None
+            return named_point(mesh, self.probe) if isinstance(self.probe, str) else nearest_node(mesh, self.probe)
+
+    def names(self, places: Places, models: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
+        """Return the model that is compared, by default the first springs, and its references, by default the rest."""
+        springs = [name for name, model in models.items() if model.has_springs]
+        compared = self.model or (springs or list(models))[0]
+        self._check_known(places, "model", compared, models)
+        if self.references is None:
+            return compared, tuple(name for name in models if name != compared)
+        for reference in self.references:
+            self._check_known(places, "references", reference, models)
+            if reference == compared:
+                with places.at("compare", "references"):
+                    raise StudyError(f"'{reference}' is the model itself: name others, or leave the list empty")
+        return compared, tuple(dict.fromkeys(self.references))
+
+    def _check_known(self, places: Places, key: str, name: str, models: Mapping[str, Model]) -> None:
+        if name not in models:
+            with places.at("compare", key):
+                raise StudyError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
+
+
+ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+
+
+class StudyKeys(Keys):
+    """A whole study file."""
+
+    title: str | None = Field(default=None, description="title of the report; default: the file's name")
+    mesh: AnyMesh = Field(description="the body: a shape, a mesh file, a label image or a network")
+    material: MaterialKeys | None = Field(default=None, description="material of the body")
+    region: list[RegionKeys] = Field(
+        default=[], description="parts of another material; where regions overlap, the last one applies"
+    )
+    section: SectionKeys | None = Field(default=None, description="section of a plane body; absent in 3D")
+    support: Annotated[list[SupportKeys], Field(min_length=1)] = Field(
+        description="supports, which together prevent rigid-body motion"
+    )
+    load: list[AnyLoad] = Field(default=[], description="loads; load_factor scales all of them, linearly")
+    solver: SolverKeys = Field(default=SolverKeys(), description="how equilibrium is found")
+    models: Annotated[dict[ModelName, AnyModel], Field(min_length=1)] = Field(
+        description="models to solve, by names of your choice"
+    )
+    compare: CompareKeys = Field(default=CompareKeys(), description="which models are compared, and where")
+
+    @field_validator("models")
+    @classmethod
+    def _names_of_files(cls, models: dict[str, ModelKeys]) -> dict[str, ModelKeys]:
+        """Refuse names of files that some system takes for another: they differ by case only, or Windows keeps them."""
+        seen: set[str] = set()
+        for name in models:
+            if name.casefold() in seen | _TAKEN_NAMES:
+                raise ValueError(f"'{name}' names the same file as another name on some systems: choose another name")
+            seen.add(name.casefold())
+        return models
+
+
+_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
+_TAKEN_NAMES = {"figures"} | _DEVICES
