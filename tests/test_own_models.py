@@ -1,0 +1,142 @@
+"""Models and solvers of a user's own in the place of ours: what they lack has the default of Model and Solver."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+import truespring as ts
+from truespring.conditions import Loading
+from truespring.equilibrium import check_solver
+from truespring.models import as_model
+from truespring.potential import Potential
+from truespring.refining import reference_error
+from truespring.solvers import Equilibrium, as_solver
+
+PROBLEM = ts.Problem(
+    ts.rectangle((4.0, 1.0), (4, 1)),
+    ts.Material(10e3, 1 / 3),
+    ts.PlaneStress(0.1),
+    [ts.Fixed("left")],
+    [ts.Force("right", (0.0, -2.0))],
+)
+OURS = ts.solve(PROBLEM, ts.Springs("lloyd"))
+
+
+class PlainNewton:
+    """Newton's method in a few lines: whole steps, at each of two levels."""
+
+    def follow(self, potential: Potential, loading: Loading, report: Any, geometry: Any) -> Iterator[Equilibrium]:
+        positions, free = potential.nodes.copy(), ~loading.held.ravel()
+        for factor in (0.0, 0.5, 1.0):
+            for _ in range(30):
+                applied = loading.force(positions, factor)
+                force = (applied - potential.gradient(positions)).ravel()
+                residual = np.linalg.norm(force[free]) / max(float(np.linalg.norm(applied)), 1e-30)
+                if residual < 1e-12 or not factor:
+                    break
+                matrix = potential.hessian(positions).tocsc()[free][:, free]
+                positions.ravel()[free] += spsolve(matrix, force[free])
+            internal, energy = potential.gradient(positions), potential.energy(positions)
+            yield Equilibrium(factor, positions.copy(), internal, applied, energy, 0, float(residual), True)
+
+
+class Heavier:
+    """A model with nothing but a potential: springs of twice the stiffness."""
+
+    def potential(self, problem: ts.Problem) -> ts.SpringNetwork:
+        springs = ts.Springs("lloyd").potential(problem)
+        assert isinstance(springs, ts.SpringNetwork)
+        return ts.SpringNetwork(springs.nodes, springs.springs, 2 * springs.stiffness)
+
+
+def test_a_solver_of_ones_own_finds_the_same_equilibrium() -> None:
+    path = ts.solve(PROBLEM, ts.Springs("lloyd"), PlainNewton())  # type: ignore[arg-type]
+    assert path.complete and path.at(0.5) is not None
+    assert path.states[-1].displacement == pytest.approx(OURS.states[-1].displacement, abs=1e-9)
+    assert any("stability not proven" in text for text in path.warnings)  # it does not answer that
+
+
+def test_what_a_solver_does_not_answer_has_a_default() -> None:
+    solver = as_solver(PlainNewton())
+    check_solver(PROBLEM, solver)
+    assert solver.follows_load and solver.keeps_to_stable_states and solver.load_steps == 1
+    assert solver.starting_at(lambda potential: potential.nodes, 5) is None
+
+
+@pytest.mark.parametrize("solver", [ts.Newton(3), ts.ArcLength(4), ts.DisplacementControl("right", "y", 0.1, 5)])
+def test_solvers_answer_for_themselves(solver: Any) -> None:
+    assert as_solver(solver) is solver
+    assert solver.load_steps == {"Newton": 3, "ArcLength": 4, "DisplacementControl": 5}[type(solver).__name__]
+    assert solver.follows_load == solver.keeps_to_stable_states == isinstance(solver, ts.Newton)
+
+
+@pytest.mark.parametrize("solver", [3, "newton", object()])
+def test_what_is_no_solver_is_an_error(solver: Any) -> None:
+    with pytest.raises(ts.TruespringError, match="is no solver"):
+        ts.solve(PROBLEM, ts.Springs("lloyd"), solver)
+
+
+def test_a_model_of_ones_own_needs_a_potential_only() -> None:
+    path = ts.solve(PROBLEM, Heavier())  # type: ignore[arg-type]
+    assert (path.label, path.kind, path.moduli, path.element) == ("Heavier", "potential", None, None)
+    assert path.finite and not path.has_springs
+    twice = ts.Problem(
+        PROBLEM.mesh, PROBLEM.material, PROBLEM.section, PROBLEM.supports, [ts.Force("right", (0, -4.0))]
+    )
+    assert ts.solve(twice, Heavier()).states[-1].displacement == pytest.approx(  # type: ignore[arg-type]
+        OURS.states[-1].displacement, abs=1e-9
+    )
+
+
+def test_what_a_model_answers_is_asked_of_it() -> None:
+    class Named(Heavier):
+        kind, label, law = "heavier", "heavier springs", "hooke"
+
+        def warnings(self, problem: ts.Problem) -> tuple[str, ...]:
+            return (f"{problem.mesh.n_nodes} nodes",)
+
+    path = ts.solve(PROBLEM, Named())  # type: ignore[arg-type]
+    assert (path.kind, path.label, path.warnings[0]) == ("heavier", "heavier springs", "10 nodes")
+    assert as_model(Named()).law == "hooke"
+
+
+def test_a_model_of_ones_own_is_refined_as_ours_are() -> None:
+    own = reference_error(PROBLEM, Heavier(), ts.Newton(2))  # type: ignore[arg-type]
+    assert own.how == "refined" and own.value is not None and own.value > 0
+
+
+def test_a_linear_theory_of_ones_own_has_loads_on_the_undeformed_body() -> None:
+    class Linear:
+        finite = False
+
+        def potential(self, problem: ts.Problem) -> Any:
+            return ts.Fem("linear").potential(problem)
+
+    problem = replace(PROBLEM, supports=[ts.Fixed("left"), ts.Fixed("right")], loads=[ts.Pressure("top", 300.0)])
+    path, ours = ts.solve(problem, Linear()), ts.solve(problem, ts.Fem("linear"))  # type: ignore[arg-type]
+    assert np.array_equal(path.states[-1].positions, ours.states[-1].positions)
+    halves = [path.states[k].displacement for k in (5, 10)]
+    assert 2 * halves[0] == pytest.approx(halves[1], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "finite", "law", "springs"),
+    [
+        (ts.Springs("lloyd"), True, None, True),
+        (ts.Fem("linear"), False, "linear", False),
+        (ts.Fem("hencky"), True, "hencky", False),
+        (ts.MassTensor("linear"), False, "linear", False),
+        (ts.Heml("saint-venant-kirchhoff"), True, "saint-venant-kirchhoff", False),
+        (ts.Terzopoulos(), True, None, False),
+    ],
+)
+def test_models_answer_for_themselves(model: Any, finite: bool, law: str | None, springs: bool) -> None:
+    path = ts.solve(PROBLEM, model, ts.Newton(1))
+    assert (model.finite, model.law, model.has_springs) == (finite, law, springs)
+    assert (path.finite, path.has_springs, path.kind, path.label) == (finite, springs, model.kind, model.label)
+    assert path.lines == ("links" if model.kind == "heml" else "springs")
+    assert (path.element is not None) == (model.kind == "fem") and (path.moduli is not None) == springs
