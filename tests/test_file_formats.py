@@ -11,8 +11,7 @@ import pytest
 import truespring as ts
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh.files import FORMATS, read_mesh
-from truespring.mesh.files.heads import HEAD
-from truespring.reference import READERS, format_of, read_record
+from truespring.reference import READERS, read_record
 
 DATA = Path(__file__).parent / "data"
 MESHES = {
@@ -21,15 +20,6 @@ MESHES = {
     ".vtu": ["block.vtu", "quads_raw.vtu"],
     ".vtk": ["block.vtk", "block_51_binary.vtk"],
 }
-
-
-def test_every_format_of_meshes_is_recognised_by_itself_alone() -> None:
-    for suffix in FORMATS:
-        for name in MESHES.get(suffix, []):
-            data = (DATA / name).read_bytes()
-            fitting = [key for key, form in FORMATS.items() if form.recognises(data)]
-            assert fitting == [suffix] == [key for key, form in FORMATS.items() if form.recognises(data[:HEAD])]
-    assert {".msh", ".inp", ".vtu", ".vtk"} <= FORMATS.keys()
 
 
 @pytest.mark.parametrize("suffix", [*MESHES, ".txt", "", ".VTK"])
@@ -81,33 +71,6 @@ def test_comments_may_stand_before_what_tells_the_format(tmp_path: Path) -> None
     assert not FORMATS[".vtu"].recognises(b"<!-- -->" * 1000 + b"<html>")
 
 
-HEADS = {
-    ".frd": b"    1C                                                                         1\n",
-    ".dat": b"\n                        S T E P       1\n\n\n"
-    + b" displacements (vx,vy,vz) for set NALL and time  0.1E+01\n\n",
-    ".vtu": b'<?xml version="1.0"?>\n<VTKFile byte_order="LittleEndian"\n type="UnstructuredGrid" version="0.1">\n',
-    ".vtk": b"# vtk DataFile Version 3.0\n",
-    ".pvd": b'<VTKFile type="Collection" version="0.1">\n',
-    ".rst": np.array([100, 1, 12, 9], "<i4").tobytes(),
-    ".stl": b"solid body\n  facet normal 0 0 1\n",
-}
-
-
-for suffix, kind in ((".vtp", "PolyData"), (".vts", "StructuredGrid"), (".vtr", "RectilinearGrid")):
-    HEADS[suffix] = f'<VTKFile type="{kind}">\n'.encode()
-for suffix in (".vtu", ".vtp", ".vts", ".vtr"):
-    HEADS[f".p{suffix[1:]}"] = HEADS[suffix].replace(b'type="', b'type="P')
-
-
-@pytest.mark.parametrize("key", HEADS)
-def test_every_format_of_results_is_recognised_by_itself_alone(tmp_path: Path, key: str) -> None:
-    assert [known for known, form in READERS.items() if form.recognises(HEADS[key])] == [key]
-    for suffix in (*READERS, ".out"):
-        (tmp_path / f"result{suffix}").write_bytes(HEADS[key])
-        assert format_of(tmp_path / f"result{suffix}") == key
-    assert format_of(tmp_path / f"none{key.upper()}") == key and format_of(tmp_path / "none.out") is None
-
-
 @pytest.mark.parametrize("key", [key for key, form in READERS.items() if form.is_marked])
 def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -> None:
     (tmp_path / f"result{key}").write_bytes(b"nothing of the kind\n")
@@ -115,10 +78,6 @@ def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -
     others = [other for other in READERS if other != key]
     with pytest.raises(ReferenceFileError, match=rf"it does not begin like {re.escape(others[0])}, .* either"):
         read_record(tmp_path / f"result{key}")
-
-
-def test_a_table_is_told_by_its_suffix() -> None:
-    assert READERS.keys() - HEADS.keys() == {".csv"}
 
 
 @pytest.mark.parametrize("key", [".vtu", ".vtk", ".pvd"])

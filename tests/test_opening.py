@@ -9,8 +9,7 @@ import pytest
 
 from truespring.errors import TruespringError
 from truespring.mesh.files import FORMATS, read_mesh
-from truespring.mesh.files.images import _READERS as IMAGES
-from truespring.mesh.files.images import read_labels
+from truespring.mesh.files.images import IMAGES, read_labels
 from truespring.opening import file_beside, open_file, read_file
 from truespring.reference.result import READERS, read_record
 from truespring.study import read_study

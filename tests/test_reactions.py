@@ -13,7 +13,8 @@ import pytest
 
 import truespring as ts
 from tests.test_report import words
-from truespring.calibration.calibration import CaseResult, _warnings
+from truespring.calibration.calibration import _warnings
+from truespring.calibration.fitted import CaseResult
 from truespring.calibration.unknowns import make_unknowns
 from truespring.cli import main
 from truespring.comparing import compare_sources, find_sources

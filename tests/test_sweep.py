@@ -494,7 +494,7 @@ def test_any_cluster_will_do(cluster: str, study: Path) -> None:
         wait_until(lambda: len(pool._client.scheduler_info()["workers"]) == 2)
         pids = {pid for _, pid in pool.run({number: number for number in range(20)}, who)}
         assert len(pids) == 2 and os.getpid() not in pids and pool.pids == ()
-    theirs = ts.sweep(study, vary, scheduler=cluster)
+    theirs = ts.sweep(study, vary, scheduler=cluster).table()
     # Here, without any cluster.
     for row in theirs.iter_rows(named=True):
         here = run(read_study(study, changes={"material.poisson": row["material.poisson"]}))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.calibration.calibration import Calibration, CaseResult
+from truespring.calibration.fitted import CaseResult, Fitted
 from truespring.report.frame import EDGE, GRID, draw_bar, draw_frame, round_numbers, written
 from truespring.report.lines import draw_lines
 from truespring.report.plots import Curve, plot
@@ -23,7 +23,7 @@ _ROW, _BAR = 0.2, 0.11
 _WIDEST = 3.0
 
 
-def calibration_figures(found: Calibration) -> Iterator[tuple[str, Sheet]]:
+def calibration_figures(found: Fitted) -> Iterator[tuple[str, Sheet]]:
     """Yield the pictures by the stem of a file name."""
     yield "errors", errors_figure(found)
     if len(found.unknowns) <= _MOST_BARS:
@@ -37,7 +37,7 @@ def calibration_figures(found: Calibration) -> Iterator[tuple[str, Sheet]]:
             yield f"case_{number}", case_figure(one)
 
 
-def errors_figure(found: Calibration) -> Sheet:
+def errors_figure(found: Fitted) -> Sheet:
     """The error of each case at its last level, by the rule and calibrated."""
     rows = [
         _Row(
@@ -50,7 +50,7 @@ def errors_figure(found: Calibration) -> Sheet:
     return _bars("Error at full load: grey by the rule, blue calibrated", "relative error [%]", rows)
 
 
-def unknowns_figure(found: Calibration) -> Sheet:
+def unknowns_figure(found: Fitted) -> Sheet:
     """What each unknown has become: 1 is the rule."""
     rows = [
         _Row(name, [None, float(value)], ["", f"{value:.3g}"])
@@ -126,7 +126,7 @@ def draw_shape(area: Area, corners: Floats, color: str) -> None:
     area.add(PathPatch(Path(closed, closed=True), fc=color, lw=0, zorder=3, gid="bar"))
 
 
-def counted_figure(found: Calibration) -> Sheet:
+def counted_figure(found: Fitted) -> Sheet:
     """How many unknowns became so large, of very many."""
     counts, edges = np.histogram(found.values, bins=40, range=(0.0, max(1.2, float(found.values.max()))))
     title = f"What became of {len(found.values):,} unknowns; the line is the rule"
@@ -140,7 +140,7 @@ def counted_figure(found: Calibration) -> Sheet:
     return sheet
 
 
-def lattice_figure(found: Calibration) -> Sheet:
+def lattice_figure(found: Fitted) -> Sheet:
     """The springs of a plane body, coloured by their stiffness over that of the rule."""
     unknowns = found.unknowns
     rule, now = unknowns.stiffness @ unknowns.start, unknowns.stiffness @ found.values

@@ -1,16 +1,16 @@
 """What a calibration tells: a table for a terminal, values for JSON, and a page that loads nothing from anywhere."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truespring.calibration.calibration import Calibration, CaseResult
 from truespring.calibration.figures import calibration_figures
-from truespring.report.drawing import Drawing
+from truespring.calibration.fitted import CaseResult, Fitted
+from truespring.report.drawing import Drawing, drawings
 from truespring.report.quantity import percent
 from truespring.report.shell import picture, render
-from truespring.report.style import figure_style
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,7 +21,7 @@ _MOST = 2000
 _SHOWN = 40
 
 
-def calibration_table(title: str, found: Calibration) -> "Table":
+def calibration_table(title: str, found: Fitted) -> "Table":
     """Return the error of each load case at its last level, by the rule and calibrated."""
     from rich.table import Table
 
@@ -41,7 +41,7 @@ def calibration_table(title: str, found: Calibration) -> "Table":
     return table
 
 
-def _rows(found: Calibration) -> list[dict[str, Any]]:
+def _rows(found: Fitted) -> list[dict[str, Any]]:
     return [
         {
             "name": one.case.name,
@@ -59,7 +59,7 @@ def _percent(share: float | None) -> str:
     return "no equilibrium" if share is None else percent(share)
 
 
-def calibration_values(found: Calibration) -> dict[str, Any]:
+def calibration_values(found: Fitted) -> dict[str, Any]:
     """Return a calibration as values that JSON can hold."""
     told = found.identifiability
     each = len(found.unknowns) <= _MOST
@@ -122,17 +122,14 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def draw_calibration(found: Calibration) -> dict[str, Drawing]:
-    """Return the pictures of a calibration as PNG and SVG, by the stem of their file names."""
-    with figure_style():
-        return {
-            name: Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width)
-            for name, sheet in calibration_figures(found)
-        }
+def draw_calibration(found: Fitted) -> dict[str, Drawing]:
+    """Return the figures of a calibration as PNG and SVG; deprecated, use `Calibration.figures`."""
+    warnings.warn("draw_calibration is deprecated, use Calibration.figures()", DeprecationWarning, stacklevel=2)
+    return drawings(calibration_figures(found))
 
 
 def render_calibration(
-    title: str, what: str, found: Calibration, drawings: Mapping[str, Drawing], names: Sequence[str], command: str
+    title: str, what: str, found: Fitted, drawings: Mapping[str, Drawing], names: Sequence[str], command: str | None
 ) -> str:
     """Return the page as HTML.
 
@@ -170,7 +167,7 @@ def render_calibration(
     )
 
 
-def fitted_sentence(found: Calibration) -> str:
+def fitted_sentence(found: Fitted) -> str:
     """Return how well the springs follow what they were fitted to."""
     told = [
         f"{one.case.name} from {_percent(one.pair[0])} to {_percent(one.pair[1])}"
@@ -180,7 +177,7 @@ def fitted_sentence(found: Calibration) -> str:
     return f"The error on the loads that they were fitted to went in {'; '.join(told)}."
 
 
-def _method(found: Calibration) -> str:
+def _method(found: Fitted) -> str:
     return (
         f"{len(found.unknowns)} unknowns ({found.unknowns.kind}), each a factor on what {found.rule.label} gives, none "
         f"below zero. Found by {found.method}, {found.solves} paths solved; regularisation {found.regularisation:g} "

@@ -6,9 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from truespring.calibration.calibration import REGULARISATION, Calibration, Progress, calibrate
+from truespring.calibration.calibration import REGULARISATION, Progress, calibrate
 from truespring.calibration.cases import LoadCase, require_one_body
 from truespring.calibration.curve import read_curve
+from truespring.calibration.result import Calibration
 from truespring.calibration.turned import turned
 from truespring.calibration.unknowns import make_unknowns
 from truespring.comparison import most_moved

@@ -1,7 +1,6 @@
 """What a calibration leaves behind: a study like any other with its springs in a file, values, and a page."""
 
 import copy
-import json
 import os
 import re
 from collections.abc import Mapping
@@ -9,22 +8,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from truespring.calibration.page import (
-    calibration_values,
-    draw_calibration,
-    fitted_sentence,
-    render_calibration,
-)
+from truespring.calibration.files import NAME, write_fitted
+from truespring.calibration.page import calibration_values, fitted_sentence
 from truespring.calibration.study import Calibrated
 from truespring.errors import StudyError
 from truespring.outputs import Output
 from truespring.study import schema
-from truespring.study.given import write_given
 from truespring.study.read import Study
 from truespring.study.toml import toml_text
-
-#: What the calibrated springs are called in the study that is written.
-NAME = "calibrated"
 
 # Keys of tables that name files beside the study.
 _MESH_FILES, _MODEL_FILES = ("file", "voxels", "nodes", "springs"), ("file", "undeformed")
@@ -51,23 +42,12 @@ def write_calibrated(found: Calibrated, out: Path, command: str) -> tuple[Path, 
 
 
 def _write(found: Calibrated, output: Output, command: str) -> tuple[Path, ...]:
-    folder = output.staging
-    springs, volume, study = folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv", folder / f"{NAME}.toml"
-    tables = write_given(found.calibration.model, springs, volume)
-    study.write_text(calibrated_study(found, output.folder, [file.name for file in tables]), encoding="utf-8")
-    values = folder / "calibrate.json"
-    values.write_text(json.dumps(calibrated_values(found), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    drawings = draw_calibration(found.calibration)
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    for name, drawing in drawings.items():
-        (figures / f"calibration_{name}.png").write_bytes(drawing.png)
-        (figures / f"calibration_{name}.svg").write_bytes(drawing.svg)
-    page = folder / "report.html"
-    names = [study.name, *(file.name for file in tables), values.name]
-    text = render_calibration(found.study.title, what_was_fitted(found), found.calibration, drawings, names, command)
-    page.write_text(text, encoding="utf-8")
-    return study, *tables, values, page
+    study = output.staging / f"{NAME}.toml"
+    words = found.study.title, what_was_fitted(found)
+    files = write_fitted(found.calibration, output.staging, calibrated_values(found), words, (study.name,), command)
+    tables = [file.name for file in files if file.suffix == ".csv"]
+    study.write_text(calibrated_study(found, output.folder, tables), encoding="utf-8")
+    return study, *files
 
 
 def what_was_fitted(found: Calibrated) -> str:

@@ -8,7 +8,7 @@ from truespring.cli.printing import console, print_each, print_file, reserve, sa
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, positive, relative_error
 
 if TYPE_CHECKING:
-    from truespring.converging import Refinement
+    from truespring.converging import StudyRefinement
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -21,20 +21,19 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.converging import converge, write_settling
+    from truespring.converging import converge
     from truespring.converging.page import settling_table
     from truespring.study import read_studies
 
     studies = read_studies(options.study)
     reserve(options, studies)
     screen = console(options)
-    found: dict[str, Refinement] = {}
+    found: dict[str, StudyRefinement] = {}
     for study in studies:
         for refinement in converge(study, options.tolerance, options.meshes):
             found[study.stem] = refinement
             with writing(options.out):
-                folder = options.out / study.stem
-                page = write_settling(study.title, study.file, refinement, folder, options.command)
+                page = refinement.write(options.out, options.command)["converge.html"]
             screen.print(settling_table(f"{study.stem}: {refinement.n_nodes[-1]:,} nodes", refinement))
         screen.print(found[study.stem].sentence, soft_wrap=True)
         print_file(options, "report", page)

@@ -24,6 +24,8 @@ def print_moduli(screen: "Console", stem: str, several: "Iterable[Realised]", wh
     for one in several:
         for title, (_, moduli) in zip(one.titles, one.by_material, strict=True):
             screen.print(moduli_table(f"{stem}: {title}", moduli) if whole else moduli_line(title, moduli))
+        if one.section:
+            screen.print(one.section)
         if whole:
             screen.print(f"{one.fitness.sentence}\n")
         elif not one.fitness.fit:

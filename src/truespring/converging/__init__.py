@@ -1,5 +1,5 @@
 """Refine the mesh of a study until the watched quantities settle."""
 
 from truespring.converging.converge import converge as converge
-from truespring.converging.converge import write_settling as write_settling
+from truespring.converging.result import StudyRefinement as StudyRefinement
 from truespring.converging.settling import Refinement as Refinement

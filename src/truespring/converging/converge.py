@@ -1,22 +1,18 @@
 """The same study on finer and finer meshes, until what is watched settles."""
 
-import csv
-import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from truespring.comparison import most_moved
-from truespring.converging.page import render_settling
-from truespring.converging.settling import Attempt, Refinement, refinement
+from truespring.converging.result import StudyRefinement, refined_study
+from truespring.converging.settling import Attempt, refinement
 from truespring.deprecation import renamed_argument
 from truespring.equilibrium import Solution
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
-from truespring.outputs import Output
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 
@@ -27,7 +23,7 @@ def converge(
     tolerance: float = 0.01,
     most: int = 5,
     progress: Callable[[Study, str], None] | None = None,
-) -> Iterator[Refinement]:
+) -> Iterator[StudyRefinement]:
     """Solve a study on meshes of half the size each time; yield after each what all models tell.
 
     It ends when every watched quantity has settled to `tolerance`, where a model does not reach full load, or after
@@ -57,7 +53,7 @@ def converge(
                 place = mesh.nodes[most_moved(path) if study.probe is None else study.probe]
             for quantity, unit, value in _watched(path, nearest_node(mesh, place.tolist())):
                 values.setdefault((name, quantity, unit), []).append((mesh.n_nodes, value))
-        found = refinement(attempts, values, tolerance)
+        found = refined_study(given.title, given.file, refinement(attempts, values, tolerance))
         yield found
         if found.ended:
             return
@@ -77,19 +73,3 @@ def _watched(path: Solution, probe: int) -> Iterator[tuple[str, str, float]]:
     for one in path.support_forces(state):  # a resultant that vanishes is zero on every mesh
         yield f"force of {one.name}", "N", float(np.linalg.norm(one.force)) if one.has_force else 0.0
         yield f"torque of {one.name}", "N m", float(np.linalg.norm(one.torque)) if one.has_torque else 0.0
-
-
-def write_settling(title: str, file: Path, found: Refinement, folder: Path, command: str) -> Path:
-    """Write converge.csv, a row a model, quantity and mesh, converge.json and the page converge.html; return that."""
-    with Output(folder, "converge.json") as output:
-        with (output.staging / "converge.csv").open("w", newline="", encoding="utf-8") as stream:
-            table = csv.writer(stream)
-            table.writerow(["model", "quantity", "unit", "n_nodes", "value"])
-            for one in found.quantities:
-                for count, value in zip(one.n_nodes, one.values, strict=True):
-                    table.writerow([one.model, one.quantity, one.unit, count, repr(value)])
-        (output.staging / "converge.html").write_text(render_settling(title, file, found, command), encoding="utf-8")
-        text = json.dumps([asdict(one) for one in found.quantities], indent=1, allow_nan=False)
-        (output.staging / "converge.json").write_text(text + "\n", encoding="utf-8")
-        output.publish()
-    return folder / "converge.html"

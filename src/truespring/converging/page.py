@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truespring.converging.settling import Refinement, Settling
-from truespring.report.drawing import Drawing
+from truespring.report.drawing import drawings
 from truespring.report.plots import Curve, plot
+from truespring.report.sheet import Sheet
 from truespring.report.shell import picture, render
-from truespring.report.style import SPRING_STYLES, figure_style
+from truespring.report.style import SPRING_STYLES
 from truespring.report.tables import new_table
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def settling_table(title: str, found: Refinement) -> "Table":
     return table
 
 
-def render_settling(title: str, file: Path, found: Refinement, command: str) -> str:
+def render_settling(title: str, file: Path, found: Refinement, command: str | None) -> str:
     """Return the page as HTML; `command` is what does it again."""
     return render(
         "converging/page.html.j2",
@@ -52,25 +53,23 @@ def render_settling(title: str, file: Path, found: Refinement, command: str) -> 
             for one in found.attempts
             if not one.sound
         ],
-        picture=_figure(found),
+        pictures=[picture(drawing) for drawing in drawings(settling_figures(found)).values()],
         rows=list(settling_rows(found)),
     )
 
 
-def _figure(found: Refinement) -> dict[str, str] | None:
-    """Each quantity over what it comes to, mesh by mesh; None where there are no two meshes to tell it."""
+def settling_figures(found: Refinement) -> Iterator[tuple[str, Sheet]]:
+    """Yield the figure of each quantity over its limit, mesh by mesh; none where there are no two meshes."""
     several = [one for one in found.told if len(one.values) > 1]
     if not several:
-        return None
+        return
     curves = []
     for place, one in enumerate(several):
         meshes = np.array([found.n_nodes.index(count) + 1.0 for count in one.n_nodes])
         shares = 100 * np.array(one.values) / _limit(one)
         style = SPRING_STYLES[place % len(SPRING_STYLES)]
         curves.append(Curve(meshes, shares, *style, label=f"{one.quantity}\n{one.model}", strong=False))
-    with figure_style():
-        sheet = plot("Watched quantities over their limits", "mesh", "share [%]", curves, far=True).sheet
-        return picture(Drawing(sheet.png(), sheet.svg(), sheet.title, sheet.width))
+    yield "converge", plot("Watched quantities over their limits", "mesh", "share [%]", curves, far=True).sheet
 
 
 def _limit(one: Settling) -> float:

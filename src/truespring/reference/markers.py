@@ -158,8 +158,6 @@ def _names(data: Columns, rows: Ints, file: Path) -> tuple[str, ...]:
 def _in_order(
     data: Columns, rows: Ints, names: tuple[str, ...], n_markers: int, load_factor: float, file: Path
 ) -> Ints:
-    data: Columns, rows: Ints, names: tuple[str, ...], n_markers: int, load_factor: float, file: Path
-) -> Ints:
     """Return the rows of a level in the order of the markers at rest; raise where the markers are others."""
     level = f"at load_factor {load_factor:g}" if "load_factor" in data.columns else "here"
     if bool(names) != ("marker" in data.columns):

@@ -24,12 +24,21 @@ from truespring.reference.vtk import read_vtk_result
 
 
 class Format(NamedTuple):
-    """How files of a format begin, what reads them, and which of the options `field`, `undeformed`, `mesh` it takes."""
+    """A format of result files.
+
+    Attributes:
+        recognises: whether a file begins as those of the format do.
+        read: returns the record of a file; takes the file, what to call with the share that is read, and `options`.
+        options: which of `field`, `undeformed`, `mesh` it takes.
+        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
+        is_marked: whether every file of the format is recognised by its content.
+    """
 
     recognises: Recognises
     read: Callable[..., Record]
     options: frozenset[str] = frozenset()
-    is_marked: bool = True  # whether every file of the format is recognised
+    unnoticed: str = ""
+    is_marked: bool = True
 
 
 _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
@@ -37,12 +46,20 @@ _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
 #: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
 READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".frd": Format(is_frd, read_frd),
-        ".dat": Format(is_dat, read_dat, frozenset({"mesh"})),
+        ".frd": Format(is_frd, read_frd, unnoticed="truncated after a level it is a run that stopped; a note says so"),
+        ".dat": Format(
+            is_dat, read_dat, frozenset({"mesh"}), unnoticed="truncated after a table it is a run that stopped"
+        ),
         **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
         ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
         ".rst": Format(is_rst, read_rst),
-        ".csv": Format(lambda head: False, read_markers, _REST, is_marked=False),  # any table
+        ".csv": Format(  # any table
+            lambda head: False,
+            read_markers,
+            _REST,
+            "rows of plain text have no end mark: truncated after a digit of the last number of a row it is shorter",
+            is_marked=False,
+        ),
         ".stl": Format(is_stl, read_stl_pair, _REST, is_marked=False),  # binary files have no mark
     }
 )

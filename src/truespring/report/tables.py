@@ -28,7 +28,7 @@ def _span(first: str, last: str) -> str:
 
 
 def moduli_table(title: str, moduli: Moduli) -> "Table":
-    """Return what springs realise beside what the material has in its section."""
+    """Return the effective moduli of springs beside those of the material in its section."""
     plane = moduli.dim == 2
     # Finite elements realise the material, but for bending on a coarse mesh.
     elements = ("four-node FEM" if plane else "eight-node FEM",) if moduli.bending else ()

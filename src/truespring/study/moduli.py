@@ -26,24 +26,26 @@ from truespring.study.read import Study
 
 @dataclass(frozen=True, eq=False)
 class Realised:
-    """What the springs of a model realise, known without solving.
+    """The effective moduli of the springs of a model, known without solving.
 
     Attributes:
         name: of the model in the study.
         springs: the model.
         by_material: the moduli beside each material, that of the body first, then those of its regions.
-        fitness: whether the springs are fit for all of them, and which are better.
+        fitness: whether the springs fit all of them, and which fit better.
+        section: a note on the moduli of the material in its section, empty where they are its own.
     """
 
     name: str
     springs: Springs
     by_material: tuple[tuple[Material, Moduli], ...]
     fitness: Fitness
+    section: str = ""
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """What the moduli beside each material are called: by the material where there are several."""
-        what = f"what '{self.name}' realises, {self.springs.label}"
+        """Titles of the moduli beside each material, with the material where there are several."""
+        what = f"effective moduli of '{self.name}', {self.springs.label}"
         if len(self.by_material) == 1:
             return (what,)
         return tuple(
@@ -53,17 +55,19 @@ class Realised:
 
 
 def realised_moduli(study: Study) -> Iterator[Realised]:
-    """Yield what each springs model of a study realises, solving nothing."""
+    """Yield the effective moduli of each springs model of a study, solving nothing."""
+    section = study.problem.section
+    words = f"in {section.words} the material has {section.moduli_words}" if section and section.moduli_words else ""
     for name, entry in springs_by_rule(study.entries).items():
         found = []
         for twin in study.problem.homogeneous:
             assert twin.material is not None  # a study has one
             found.append((twin.material, moduli(twin, entry)))
-        yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance))
+        yield Realised(name, entry, tuple(found), judge(study.problem, entry, study.tolerance), words)
 
 
 def realised_values(realised: Realised) -> dict[str, Any]:
-    """Return what springs realise as values that JSON can hold: of the body's own material, then of its regions'."""
+    """Return effective moduli as values that JSON can hold: for the material of the body, then for those of regions."""
     (material, first), *others = realised.by_material
     fitness, better = realised.fitness, realised.fitness.better
     return {

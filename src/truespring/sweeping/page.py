@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truespring.report.drawing import Drawing
+from truespring.report.drawing import drawings
 from truespring.report.quantity import percent
 from truespring.report.shell import picture, render
-from truespring.report.style import figure_style
 from truespring.sweeping.figures import sweep_figures
 
 if TYPE_CHECKING:
@@ -65,8 +64,7 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         rows: a point each, as in the table.
         command: what does it again, where it was a command line.
     """
-    with figure_style():
-        drawings = [Drawing(one.png(), one.svg(), one.title, one.width) for one in sweep_figures(keys, rows)]
+    drawn = drawings((str(number), sheet) for number, sheet in enumerate(sweep_figures(keys, rows)))
     failed = [row for row in rows if row["status"] != "converged"]
     extremes = _extremes(rows)
     return render(
@@ -79,7 +77,7 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         n_failed=len(failed),
         sentences=[_sentence(reference, two, keys) for reference, two in extremes.items()],
         failed=[([_words(row[key]) for key in keys], row["reason"]) for row in failed[:_MOST_ROWS]],
-        pictures=[picture(drawing) for drawing in drawings],
+        pictures=[picture(drawing) for drawing in drawn.values()],
         references=list(extremes),
         rows=[_shown(row, keys, list(extremes)) for row in rows[:_MOST_ROWS]],
     )

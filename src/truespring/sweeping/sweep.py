@@ -2,6 +2,7 @@
 
 import math
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -11,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.errors import TruespringError
 from truespring.outputs import Lock, Output
+from truespring.report.drawing import Figures, sheets
 from truespring.report.rows import table_of
 from truespring.report.summary import summary
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
+from truespring.sweeping.figures import sweep_figures
 from truespring.sweeping.plan import Plan, Point, digests, make_plan
 from truespring.sweeping.pool import Failure, Pool, Report, require_dask
 from truespring.sweeping.store import CONVERGED, FAILED, Store
@@ -63,6 +66,37 @@ class Sweep:
         """Whether every model of every point reached full load through stable equilibria."""
         return not self.n_failed
 
+    def table(self) -> "polars.DataFrame":
+        """Return `rows` as a table of polars."""
+        return table_of(self.rows)
+
+    def figures(self) -> Figures:
+        """Return the figures by the stem of their names; `png()` and `svg()` of each are the bytes of a file."""
+        drawn = sweep_figures(self.plan.keys, self.rows)
+        return sheets((f"sweep_{number}", sheet) for number, sheet in enumerate(drawn, 1))
+
+    def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
+        """Write sweep.csv, sweep.parquet and report.html into out; return where each is.
+
+        `command` is the command line that repeats the run, named in the report.
+        """
+        folder = write_sweep(self, Path(out), command).parent
+        return {name: folder / name for name in ("sweep.csv", "sweep.parquet", "report.html")}
+
+    def __getattr__(self, name: str) -> Any:
+        """Pass what a table of polars has on to it: `ts.sweep` returned one before."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._as_table(f".{name}"), name)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._as_table(f"[{key!r}]")[key]
+
+    def _as_table(self, asked: str) -> "polars.DataFrame":
+        text = f"ts.sweep(...){asked} is deprecated, use ts.sweep(...).table(){asked}"
+        warnings.warn(text, DeprecationWarning, stacklevel=3)
+        return self.table()
+
 
 def sweep(
     study: str | Path,
@@ -76,11 +110,12 @@ def sweep(
     scheduler: str | None = None,
     retry_failed: bool = False,
     timeout: float | None = None,
-) -> "polars.DataFrame":
-    """Solve a study with many values of its keys; return a table, a row a point, sorted by them.
+) -> Sweep:
+    """Solve a study with many values of its keys.
 
-    Its columns are the varied keys, `status` and `reason` of each point, and the figures of its summary, such as
-    `models.springs.load_factor` and `comparison.linear.rms_error`; SI units.
+    The rows of the result, and its `table()`, are the points, sorted by their values; columns are the varied keys,
+    `status` and `reason` of each point, and the figures of its summary, such as `models.springs.load_factor` and
+    `comparison.linear.rms_error`; SI units.
 
     Args:
         study: a study file.
@@ -96,10 +131,10 @@ def sweep(
     plan = plan_sweep(study, vary, lhs, seed, points)
     if out is None:
         with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
-            return table_of(run_sweep(plan, Path(folder), workers, scheduler, timeout=timeout).rows)
+            return run_sweep(plan, Path(folder), workers, scheduler, timeout=timeout)
     done = run_sweep(plan, Path(out), workers, scheduler, retry_failed=retry_failed, timeout=timeout)
     write_sweep(done, Path(out))
-    return table_of(done.rows)
+    return done
 
 
 def plan_sweep(

@@ -33,14 +33,19 @@ def _alone(read: Callable[[bytes], Contents]) -> Reader:
 
 
 class Format(NamedTuple):
-    """How files of a format begin, what reads them, and how one that cannot be read may be mended.
+    """A format of mesh files.
 
-    A reader takes the bytes of a file and the folder that it lies in.
+    Attributes:
+        recognises: whether a file begins as those of the format do.
+        read: returns the contents of a file from its bytes and the folder that it lies in.
+        again: how a file that cannot be read may be mended, in a sentence; empty where nothing is known.
+        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
     """
 
     recognises: Recognises
     read: Reader
     again: str = ""
+    unnoticed: str = ""
 
 
 _GMSH = "if gmsh reads it, save it again: gmsh FILE -0 -format msh41 -o NEW.msh"
@@ -50,8 +55,14 @@ _PARAVIEW = "if ParaView reads it, save it again there as an unstructured grid, 
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".msh": Format(is_msh, _alone(read_msh), _GMSH),
-        ".inp": Format(is_inp, read_inp),
+        ".inp": Format(is_inp, read_inp, unnoticed="a deck has no end mark: truncated between two lines it is shorter"),
         **{suffix: Format(recognises, read_vtk, _PARAVIEW) for suffix, recognises in VTK_FORMATS.items()},
+        ".vtk": Format(
+            VTK_FORMATS[".vtk"],
+            read_vtk,
+            _PARAVIEW,
+            unnoticed="a legacy file has no end mark: truncated between two arrays it has fewer groups",
+        ),
     }
 )
 

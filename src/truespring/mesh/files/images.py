@@ -5,6 +5,8 @@ import math
 import tokenize
 from collections.abc import Callable
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -23,16 +25,28 @@ from truespring.opening import read_file
 _PYVISTA = "pyvista:"
 
 
+class ImageFormat(NamedTuple):
+    """A format of label images.
+
+    Attributes:
+        read: returns the labels in a file.
+        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
+    """
+
+    read: Callable[[Path], Labels]
+    unnoticed: str = ""
+
+
 def read_labels(file: str | Path) -> Labels:
     """Read a label image; raise MeshError, with the file, where it is damaged or holds no labels."""
     if str(file).startswith(_PYVISTA):
         return checked(_of_pyvista(str(file).removeprefix(_PYVISTA)))
     file = Path(file)
-    reader = next((one for suffix, one in _READERS.items() if file.name.lower().endswith(suffix)), None)
-    if reader is None:
-        raise MeshError(f"{file}: a label image ends in {', '.join(_READERS)}, not in '{file.suffix}'")
+    form = next((one for suffix, one in IMAGES.items() if file.name.lower().endswith(suffix)), None)
+    if form is None:
+        raise MeshError(f"{file}: a label image ends in {', '.join(IMAGES)}, not in '{file.suffix}'")
     try:
-        return checked(reader(file))
+        return checked(form.read(file))
     except MeshError as error:
         told = str(error)
         raise MeshError(told if told.startswith(str(file)) else f"{file}: {told}") from None
@@ -110,11 +124,13 @@ def _numbers(element: ElementTree.Element, name: str, count: int, default: str =
     return found
 
 
-# By the end of the name, in small letters.
-_READERS: dict[str, Callable[[Path], Labels]] = {
-    **dict.fromkeys((".nii", ".nii.gz"), read_nifti),
-    **dict.fromkeys((".nrrd", ".nhdr"), read_nrrd),
-    **dict.fromkeys((".mha", ".mhd"), read_metaimage),
-    ".vti": _vti,
-    ".npy": _npy,
-}
+#: By the end of the name, in small letters.
+IMAGES: MappingProxyType[str, ImageFormat] = MappingProxyType(
+    {
+        **dict.fromkeys((".nii", ".nii.gz"), ImageFormat(read_nifti)),
+        **dict.fromkeys((".nrrd", ".nhdr"), ImageFormat(read_nrrd)),
+        **dict.fromkeys((".mha", ".mhd"), ImageFormat(read_metaimage)),
+        ".vti": ImageFormat(_vti),
+        ".npy": ImageFormat(_npy),
+    }
+)

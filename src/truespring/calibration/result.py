@@ -1,0 +1,43 @@
+"""The result of `calibrate`: springs with their errors, table and figures, which can be written."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truespring.calibration.figures import calibration_figures
+from truespring.calibration.files import write_fitted
+from truespring.calibration.fitted import Fitted
+from truespring.calibration.page import calibration_values
+from truespring.outputs import Output
+from truespring.report.drawing import Figures, sheets
+from truespring.report.rows import table_of
+
+if TYPE_CHECKING:
+    import polars
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Fitted):
+    """Springs fitted to references; the attributes are those of `Fitted`."""
+
+    def __repr__(self) -> str:
+        return f"Calibration({self.headline})"
+
+    def table(self) -> "polars.DataFrame":
+        """Return `rows` as a table of polars."""
+        return table_of(self.rows)
+
+    def figures(self) -> Figures:
+        """Return the figures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
+        return sheets((f"calibration_{name}", sheet) for name, sheet in calibration_figures(self))
+
+    def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
+        """Write calibrate.json, calibrated.csv, figures and report.html into out; return where each is.
+
+        `command` is the command line that repeats the run, named in the report.
+        """
+        what = f"{self.rule.label} with {len(self.unknowns)} unknowns by {self.unknowns.kind}."
+        with Output(Path(out), "calibrate.json") as output:
+            files = write_fitted(self, output.staging, calibration_values(self), ("Calibration", what), (), command)
+            output.publish()
+        return {file.name: output.folder / file.name for file in files}

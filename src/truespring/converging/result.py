@@ -1,0 +1,68 @@
+"""The result of `converge`: a study on finer and finer meshes, with its table and figures, which can be written."""
+
+import csv
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truespring.converging.page import render_settling, settling_figures
+from truespring.converging.settling import Refinement
+from truespring.outputs import Output
+from truespring.report.drawing import Figures, sheets
+from truespring.report.rows import table_of
+
+if TYPE_CHECKING:
+    import polars
+
+
+@dataclass(frozen=True)
+class StudyRefinement(Refinement):
+    """The refinement of a study; further attributes are those of `Refinement`.
+
+    Attributes:
+        title, file: of the study.
+    """
+
+    title: str
+    file: Path
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """For each model, watched quantity and mesh a row, as in converge.csv."""
+        return [
+            {"model": one.model, "quantity": one.quantity, "unit": one.unit, "n_nodes": count, "value": value}
+            for one in self.quantities
+            for count, value in zip(one.n_nodes, one.values, strict=True)
+        ]
+
+    def table(self) -> "polars.DataFrame":
+        """Return `rows` as a table of polars."""
+        return table_of(self.rows)
+
+    def figures(self) -> Figures:
+        """Return the figures by the stem of their names; `png()` and `svg()` of each are the bytes of a file."""
+        return sheets(settling_figures(self))
+
+    def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
+        """Write converge.csv, converge.json and the page converge.html into out/STEM; return where each is.
+
+        `command` is the command line that repeats the run, named in the page.
+        """
+        with Output(Path(out) / self.file.stem, "converge.json") as output:
+            folder = output.staging
+            with (folder / "converge.csv").open("w", newline="", encoding="utf-8") as stream:
+                table = csv.writer(stream)
+                table.writerow(["model", "quantity", "unit", "n_nodes", "value"])
+                table.writerows([*list(row.values())[:-1], repr(row["value"])] for row in self.rows)
+            page = render_settling(self.title, self.file, self, command)
+            (folder / "converge.html").write_text(page, encoding="utf-8")
+            text = json.dumps([asdict(one) for one in self.quantities], indent=1, allow_nan=False)
+            (folder / "converge.json").write_text(text + "\n", encoding="utf-8")
+            output.publish()
+        return {name: output.folder / name for name in ("converge.csv", "converge.json", "converge.html")}
+
+
+def refined_study(title: str, file: Path, found: Refinement) -> StudyRefinement:
+    """Return a refinement with the title and the file of its study."""
+    return StudyRefinement(**{one.name: getattr(found, one.name) for one in fields(found)}, title=title, file=file)
