@@ -11,8 +11,9 @@ import pytest
 import truespring as ts
 from tests.closed_forms import pressed_pipe
 from truespring.arrays import Bools, Floats
+from truespring.conditions import Refined
 from truespring.errors import TruespringError
-from truespring.potential import Potential, Refined
+from truespring.potential import Potential
 
 SOFT = ts.Material(10e3, 0.3, density=1100.0)
 

@@ -17,13 +17,14 @@ from tests.closed_forms import difference_errors, material_of, observed_orders
 from tests.meshes import plane_of_two, solid_of_four
 from truespring import potential as potential_module
 from truespring.arrays import Floats
+from truespring.conditions import Refined
 from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.models import ELEMENTS, LAWS, RULES, Model, VolumeSprings, fem, heml, linked, mass_tensor, volume
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS, NonlinearTensors
 from truespring.models.terzopoulos import BOUNDARIES
-from truespring.potential import Potential, Projectable, Refined, Stressed, Stretched
+from truespring.potential import Potential, Projectable, Stressed, Stretched
 
 THIN, LONG = ts.PlaneStress(0.4), ts.PlaneStrain(0.4)
 MIXED = ("plane of two kinds", "solid of four kinds")

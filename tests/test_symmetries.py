@@ -18,11 +18,11 @@ from tests.studies import changed, written
 from tests.test_potentials import CASES, SOLVED, turn
 from truespring.arrays import Floats, Ints
 from truespring.cli import main
+from truespring.conditions import Refined
 from truespring.equilibrium import Solution, Status
 from truespring.kernels.threads import set_threads
 from truespring.mesh.merged import mirrored
 from truespring.models import LAWS, RULES, Model
-from truespring.potential import Refined
 
 NEWTON = ts.Newton(load_steps=2, tolerance=1e-13)
 

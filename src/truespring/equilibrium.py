@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading, Refined, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, TruespringError, one_line
 from truespring.mesh import select
 from truespring.models import Model, as_model
-from truespring.potential import Loading, Potential, Refined, Stretched, on_the_mesh
+from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.solution import Solution as Solution

@@ -8,13 +8,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.conditions import Loading
 from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
 from truespring.loading import LOADS, Body, Fixed, Held, Load, Spread, held_by, nodal_force
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
-from truespring.potential import Loading, Potential
+from truespring.modes import centred, modes_at, n_modes
+from truespring.potential import Potential
 
 _Found = TypeVar("_Found")
 
@@ -243,7 +245,7 @@ def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
         return None
     tolerance = 1e-9 * np.sqrt(nodes.size)  # nodes on a line have a turn that moves nothing
     hindered = _rigid_rank(nodes, held, tolerance)
-    if hindered == _n_modes(nodes) or 0 < hindered == _rigid_rank(nodes, np.ones_like(held), tolerance):
+    if hindered == n_modes(nodes.shape[1]) or 0 < hindered == _rigid_rank(nodes, np.ones_like(held), tolerance):
         return None
     free = [axis for axis, there in zip(AXES, held.T, strict=False) if not there.any()]
     return f"along {', '.join(free)}" if free else "by turning"
@@ -251,11 +253,11 @@ def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
 
 def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
     """The rank of the rigid-body modes of `nodes` [m] in the directions chosen: singular values above a tolerance."""
-    places = _centred(nodes)
-    upper = np.zeros((0, _n_modes(nodes)))
+    places = centred(nodes)
+    upper = np.zeros((0, n_modes(nodes.shape[1])))
     for part in slices(len(nodes), 8 * nodes.shape[1] * upper.shape[1]):
         if chosen[part].any():
-            modes = _modes(places[part])[chosen[part].ravel()]
+            modes = modes_at(places[part])[chosen[part].ravel()]
             upper = np.asarray(np.linalg.qr(np.concatenate([upper, modes]), mode="r"))
     return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
@@ -269,26 +271,3 @@ def _several(given: object, kind: type, name: str, allowed: str) -> tuple[Any, .
 
 
 _LOADS = " or ".join(kind.load.__name__ for kind in LOADS.values())
-
-
-def _n_modes(nodes: Floats) -> int:
-    """Translations and rotations: 3 in the plane, 6 in space."""
-    dim = int(nodes.shape[1])
-    return dim * (dim + 1) // 2
-
-
-def _centred(nodes: Floats) -> Floats:
-    """Places from the centre, the farthest coordinate 1: with them translations and rotations are of one size."""
-    centred = nodes - nodes.mean(axis=0)
-    return np.asarray(centred / max(float(np.abs(centred).max()), np.finfo(float).tiny))
-
-
-def _modes(places: Floats) -> Floats:
-    """Translations, then infinitesimal rotations of places about the origin, shape (n_dof, 3 or 6)."""
-    n_nodes, dim = places.shape
-    turns = [(first, second) for first in range(dim) for second in range(first + 1, dim)]
-    modes = np.zeros((n_nodes, dim, dim + len(turns)))
-    modes[:, :, :dim] = np.eye(dim)
-    for turn, (first, second) in enumerate(turns):
-        modes[:, first, dim + turn], modes[:, second, dim + turn] = -places[:, second], places[:, first]
-    return modes.reshape(n_nodes * dim, -1)

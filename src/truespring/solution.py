@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from truespring.arrays import Bools, Floats
+from truespring.conditions import Refined
 from truespring.mesh import Grid, Shell, Surface
 from truespring.models import Moduli
-from truespring.potential import Potential, Refined
+from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, leading_support, support_forces
 from truespring.solvers import Cost

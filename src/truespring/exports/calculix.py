@@ -23,7 +23,7 @@ from truespring.exports.decks import (
     usual_element,
 )
 from truespring.exports.exported import Exported
-from truespring.models import SpringNetwork
+from truespring.models.spring_data import PlainSprings
 from truespring.problem import Problem
 
 #: The laws that CalculiX has in common with Fem.
@@ -59,7 +59,7 @@ def fem_deck(
     return deck(_DIALECT, twin, levels, nonlinear=law != "linear", continuum=True, header=header)
 
 
-def spring_deck(problem: Problem, network: SpringNetwork, levels: Sequence[float], header: Sequence[str] = ()) -> str:
+def spring_deck(problem: Problem, network: PlainSprings, levels: Sequence[float], header: Sequence[str] = ()) -> str:
     """Write a network as SPRINGA elements; arguments and output as of `fem_deck`, without energy.
 
     Raises ExportError where springs are not at rest in the reference positions, or a load follows a face.

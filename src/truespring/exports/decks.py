@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.conditions import Loading
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
 from truespring.exports.features import Feature, refuse_others
@@ -21,9 +22,9 @@ from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
 from truespring.mesh import Mesh, plural
 from truespring.mesh.facets import facet_keys
 from truespring.mesh.files.inp_elements import FACES
-from truespring.models import Fem, SpringNetwork
+from truespring.models import Fem
 from truespring.models.quadratic import QuadraticPotential
-from truespring.potential import Loading
+from truespring.models.spring_data import PlainSprings
 from truespring.problem import Problem
 
 #: Of results of a step: the last increment is always written.
@@ -338,7 +339,7 @@ def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats
 # --- springs -------------------------------------------------------------------------------------
 
 
-def spring_twin(problem: Problem, network: SpringNetwork, force_unit: float) -> Twin:
+def spring_twin(problem: Problem, network: PlainSprings, force_unit: float) -> Twin:
     """Return every spring as a SPRINGA element, one set of elements for each stiffness as it is written.
 
     Raises ExportError for what such elements are not: see SPRINGA.
@@ -358,12 +359,12 @@ def spring_twin(problem: Problem, network: SpringNetwork, force_unit: float) -> 
     return Twin(network.nodes, lines, problem.loading, aside=aside, for_good=plane)
 
 
-def is_led_aside(problem: Problem, network: SpringNetwork) -> bool:
+def is_led_aside(problem: Problem, network: PlainSprings) -> bool:
     """Whether a deck of springs has a step before the first level."""
     return bool(_aside(network, problem.loading).any())
 
 
-def _aside(network: SpringNetwork, loading: Loading) -> Floats:
+def _aside(network: PlainSprings, loading: Loading) -> Floats:
     """How far nodes are led aside that springs do not hold at rest in a free direction [m], shape (n_nodes, dim).
 
     Such springs stiffen as the node moves, but Newton's method of a program that has no line search cannot begin.

@@ -12,8 +12,8 @@ from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import vector_words
 from truespring.mesh import counted
-from truespring.models import Model, SpringNetwork
-from truespring.models.spring_data import HasSprings, SpringData
+from truespring.models import Model
+from truespring.models.spring_data import HasSprings, PlainSprings, SpringData
 from truespring.problem import Problem
 from truespring.solvers import Newton, Reporter, Solver, as_solver
 
@@ -52,7 +52,7 @@ class Exported:
         return spring_data(self.path.potential)
 
     @property
-    def network(self) -> SpringNetwork:
+    def network(self) -> PlainSprings:
         """The springs alone; of a target that takes no coupled springs."""
         assert self.springs.network is not None  # refused before
         return self.springs.network

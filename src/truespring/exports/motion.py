@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.exports.exported import Exported
 from truespring.mesh import element_corner_measures
-from truespring.models import SpringNetwork
+from truespring.models.spring_data import PlainSprings
 from truespring.potential import SparseMatrix
 
 # Where the material has no density [kg/m^3], and of each node of a network without material [kg].
@@ -56,7 +56,7 @@ class Motion:
     words: tuple[str, ...]
 
 
-def motion_of(exported: Exported, network: SpringNetwork) -> Motion:
+def motion_of(exported: Exported, network: PlainSprings) -> Motion:
     """Return masses of the body's density, damping that is critical for its lowest frequency, and how long it takes.
 
     That is found by the motion itself, under the whole load at once, by semi-implicit Euler with implicit damping.
@@ -123,7 +123,7 @@ def _masses(exported: Exported) -> tuple[Floats, tuple[str, ...]]:
     return mass, tuple(words)
 
 
-def _lowest_frequency(exported: Exported, network: SpringNetwork, mass: Floats) -> float | None:
+def _lowest_frequency(exported: Exported, network: PlainSprings, mass: Floats) -> float | None:
     """The lowest frequency about our equilibrium [rad/s], None where it is not known."""
     state, free = exported.state, np.flatnonzero(~exported.held.ravel())
     if state is None or state.negative_eigenvalues or not free.size:
@@ -146,7 +146,7 @@ def _lowest_eigenvalue(tangent: SparseMatrix, free: Ints, root: Floats) -> float
     return float(eigsh(matrix, 1, sigma=0.0, v0=first, tol=1e-6, return_eigenvectors=False)[0])
 
 
-def _start(exported: Exported, network: SpringNetwork) -> Floats:
+def _start(exported: Exported, network: PlainSprings) -> Floats:
     """Where nodes start [m]: held ones at their places, the others displaced as the mean of their neighbours.
 
     A body whose supports jump while the rest stands still folds onto itself, and stays so.
@@ -169,7 +169,7 @@ def _start(exported: Exported, network: SpringNetwork) -> Floats:
 
 
 def _settled(
-    exported: Exported, network: SpringNetwork, motion: tuple[Floats, float, float, Floats], usual: int
+    exported: Exported, network: PlainSprings, motion: tuple[Floats, float, float, Floats], usual: int
 ) -> tuple[int, bool | None]:
     """The steps to come within 0.1 % of our equilibrium and stay, and whether that is so; by the motion itself."""
     longest = min(_LONGEST * usual, _BUDGET // len(network.springs))

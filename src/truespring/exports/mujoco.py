@@ -12,7 +12,7 @@ from truespring.arrays import Bools, Floats, in_space
 from truespring.exports.exported import Exported
 from truespring.exports.motion import Motion, motion_of
 from truespring.mesh.selections import AXES
-from truespring.models import SpringNetwork
+from truespring.models.spring_data import PlainSprings
 
 
 def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
@@ -21,7 +21,7 @@ def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
     return {"springs.xml": "\n".join([*_lines(exported, network, motion_of(exported, network)), ""])}
 
 
-def _lines(exported: Exported, network: SpringNetwork, motion: Motion) -> Iterator[str]:
+def _lines(exported: Exported, network: PlainSprings, motion: Motion) -> Iterator[str]:
     nodes = in_space(motion.start)
     length = float(np.median(network.rest_length))
     extent = float(np.ptp(nodes, axis=0).max())

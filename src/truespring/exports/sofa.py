@@ -12,7 +12,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, in_space
 from truespring.exports.exported import Exported
-from truespring.models import SpringNetwork
+from truespring.models.spring_data import PlainSprings
 
 #: What the form was checked against.
 CHECKED = "SOFA v26.12 in development, commit 2a278d8 of 2026-08-06; the names are those of v25.06 and v26.06 too"
@@ -96,7 +96,7 @@ def _of_elements(exported: Exported) -> Iterator[str]:
         yield "SOFA's hexahedra are exact for bricks along the axes only."
 
 
-def _data(exported: Exported, network: SpringNetwork) -> Iterator[str]:
+def _data(exported: Exported, network: PlainSprings) -> Iterator[str]:
     """The numbers of the scene by name."""
     nodes = in_space(network.nodes)
     held = np.ones(nodes.shape, dtype=bool)

@@ -10,7 +10,8 @@ from truespring.arrays import Bools, Floats, ShortInts
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, conjugate_gradients, lowest_eigenvalue
 from truespring.linear.multigrid import Hierarchy, Level, Matrix, build, condense, empty_level
-from truespring.potential import SparseMatrix, rigid_body_modes
+from truespring.modes import rigid_body_modes
+from truespring.potential import SparseMatrix
 
 # Coarse levels that need more iterations than this for two digits are built anew for the state at hand.
 _STALE = 25

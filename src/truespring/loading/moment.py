@@ -9,13 +9,14 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.assembly import Pattern
 from truespring.errors import ProblemError
 from truespring.loading.body import Body
 from truespring.loading.load import FollowingLoad, Mark
 from truespring.loading.values import number
 from truespring.loading.words import selection_words
 from truespring.mesh import Mesh, Selection, loaded
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import SparseMatrix
 
 
 @dataclass(frozen=True)

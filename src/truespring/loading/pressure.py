@@ -11,6 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.assembly import Pattern
 from truespring.errors import ProblemError
 from truespring.loading.body import Body
 from truespring.loading.load import FacePressure, FollowingLoad, Mark
@@ -18,7 +19,7 @@ from truespring.loading.values import number
 from truespring.loading.words import selection_words
 from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
 from truespring.mesh.rows import ascending, distinct_rows
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import SparseMatrix
 
 # Forces of a pressure are polynomials of second order along a straight line: two Gauss points integrate its work
 # exactly.

@@ -7,13 +7,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.conditions import Turn
 from truespring.errors import ProblemError
 from truespring.loading.load import Mark
 from truespring.loading.values import components, number, rotated, times
 from truespring.loading.words import selection_words, vector_words
 from truespring.mesh import Mesh, Selection, select
 from truespring.mesh.selections import AXES
-from truespring.potential import Turn
 
 # The share of a turn [rad] whose motion is a direction to draw.
 _SMALL = 1e-3

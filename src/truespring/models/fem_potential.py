@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.assembly import Pattern
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
 from truespring.models.law import Constants, Law, Response
@@ -15,7 +16,7 @@ from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, voigt_places
-from truespring.potential import Pattern, Potential, SparseMatrix
+from truespring.potential import Potential, SparseMatrix
 from truespring.problem import Problem
 
 # What laws answer is held for so many Gauss points at a time, which stays in the processor's cache.

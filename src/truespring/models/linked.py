@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats, Ints, ShortInts
-from truespring.potential import Pattern, SparseMatrix
+from truespring.assembly import Pattern
+from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
 # Threads share the elements from so many on.

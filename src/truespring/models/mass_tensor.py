@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from truespring.arrays import Floats, Ints, ShortInts
+from truespring.assembly import Pattern
 from truespring.errors import ModelError, nearest
 from truespring.memory import slices
 from truespring.models.biquadratic import BiquadraticSprings
@@ -19,7 +20,7 @@ from truespring.models.model import Model
 from truespring.models.strain import voigt_pairs
 from truespring.models.summed import SummedElements
 from truespring.models.symmetric import identity
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
 #: Laws whose energy is a polynomial of the displacements.

@@ -4,12 +4,11 @@ Some stiffen as soon as their springs are pulled; those that no state of self-st
 and Calladine, Int. J. Solids Structures 22, 1986).
 """
 
-from typing import Protocol
-
 import numpy as np
 
-from truespring.arrays import Bools, Floats, Ints
+from truespring.arrays import Bools, Floats
 from truespring.errors import ModelError
+from truespring.models.spring_data import PlainSprings
 
 # Singular values below this share of the largest are zero; larger networks than this are not looked at.
 _ZERO, _MOST = 1e-9, 1000
@@ -17,20 +16,7 @@ _ZERO, _MOST = 1e-9, 1000
 _NAMED, _SOME = 0.1, 6
 
 
-class _Network(Protocol):
-    """Nodes [m], springs by their two nodes, their stiffness [N/m] and rest length [m]."""
-
-    @property
-    def nodes(self) -> Floats: ...
-    @property
-    def springs(self) -> Ints: ...
-    @property
-    def stiffness(self) -> Floats: ...
-    @property
-    def rest_length(self) -> Floats: ...
-
-
-def refuse_mechanism(network: _Network, held: Bools) -> None:
+def refuse_mechanism(network: PlainSprings, held: Bools) -> None:
     """Raise ModelError where nodes of a network at rest can move freely; `held` of shape (n_nodes, dim)."""
     n_nodes, dim = network.nodes.shape
     if max(n_nodes * dim, len(network.springs)) > _MOST:
@@ -47,7 +33,7 @@ def refuse_mechanism(network: _Network, held: Bools) -> None:
     )
 
 
-def _loose_motion(network: _Network, free: Bools) -> Floats | None:
+def _loose_motion(network: PlainSprings, free: Bools) -> Floats | None:
     """A motion that strains no spring and that no self-stress stiffens, shape (n_nodes, dim); None where none is."""
     ends, carrying = network.springs, network.stiffness > 0
     along = network.nodes[ends[:, 1]] - network.nodes[ends[:, 0]]

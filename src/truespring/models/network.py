@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_ints
+from truespring.assembly import Pattern
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
 from truespring.models.mechanism import refuse_mechanism
 from truespring.models.model import Model
 from truespring.models.spring_data import SpringData
-from truespring.potential import Pattern, SparseMatrix
+from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import skfem
 
 from truespring.arrays import Bools, Floats, Ints
+from truespring.conditions import Loading, Turn
 from truespring.loading import Body, nodal_force
 from truespring.mesh import Grid, SecondOrder, edge_numbers
 from truespring.models.fem_potential import FemPotential
 from truespring.models.reference_element import Reference, reference_element
-from truespring.potential import Loading, Turn
 
 # scikit-fem's element of second order and its order of quadrature, 3 points in a triangle and 4 in a tetrahedron; its
 # nodes are in VTK's order.

@@ -2,13 +2,40 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-if TYPE_CHECKING:
-    from truespring.models.network import SpringNetwork
+from truespring.arrays import Floats, Ints
+from truespring.potential import Potential
 
 #: What springs may have beside springs: a modulus on each element's area or volume, or coupled lengths.
 VOLUME_TERM, COUPLING = "volume term", "coupling"
+
+
+class PlainSprings(Potential, Protocol):
+    """Springs and nothing else, as a SpringNetwork is."""
+
+    @property
+    def springs(self) -> Ints:
+        """The two nodes of each spring, shape (n_springs, 2)."""
+        ...
+
+    @property
+    def stiffness(self) -> Floats:
+        """Stiffness of each spring [N/m], shape (n_springs,)."""
+        ...
+
+    @property
+    def rest_length(self) -> Floats:
+        """Rest length of each spring [m], shape (n_springs,)."""
+        ...
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Return length over rest length of each spring, shape (n_springs,)."""
+        ...
+
+    def spring_data(self) -> "SpringData":
+        """Return the springs as arrays."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +48,7 @@ class SpringData:
         beyond: VOLUME_TERM or COUPLING; empty for plain springs.
     """
 
-    network: "SpringNetwork | None"
+    network: PlainSprings | None
     arrays: Mapping[str, Any]
     beyond: str = ""
 

@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.potential import Pattern
+from truespring.assembly import Pattern
 from truespring.problem import Problem
 
 # Threads share the elements of a slice from so many on.

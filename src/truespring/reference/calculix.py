@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import on_the_mesh
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ModelError, ReferenceFileError
 from truespring.exports import refuse_untaken
@@ -16,9 +17,9 @@ from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
 from truespring.exports.decks import check_fem, fem_element, is_led_aside, second_order, usual_element
 from truespring.exports.exported import spring_data
 from truespring.loading import FacePressure
-from truespring.models import Fem, Model, SpringNetwork
+from truespring.models import Fem, Model
 from truespring.models.quadratic import QuadraticPotential
-from truespring.potential import on_the_mesh
+from truespring.models.spring_data import PlainSprings
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.reference.ccx import Effort, Finished, find_ccx, run_ccx
@@ -93,7 +94,7 @@ class CalculiX(Program):
         if self._network(problem) is None:
             check_fem(problem, self._law, self._element(problem))
 
-    def _network(self, problem: Problem) -> SpringNetwork | None:
+    def _network(self, problem: Problem) -> PlainSprings | None:
         """The springs; refused where they are more than SPRINGA elements can be."""
         if self.springs is None:
             return None
@@ -201,7 +202,7 @@ class CalculiX(Program):
         level: Level,
         internal: Floats,
         effort: Effort | None,
-        network: SpringNetwork | None,
+        network: PlainSprings | None,
         finer: QuadraticPotential | None,
     ) -> State:
         """A state of what was read: displacement, energy, and the internal force in each node [N]."""

@@ -8,11 +8,12 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading
 from truespring.errors import ProblemError
 from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
-from truespring.potential import Loading, Potential, SparseMatrix
+from truespring.potential import Potential, SparseMatrix
 from truespring.solvers.cost import Cost
 
 #: Called after each iteration with load factor, iteration and relative residual.

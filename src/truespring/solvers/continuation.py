@@ -15,11 +15,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading
 from truespring.errors import ProblemError
 from truespring.linear import check_linear, choose
 from truespring.linear.direct import Factorisation, SingularMatrixError
 from truespring.linear.gradients import norm
-from truespring.potential import Loading, Potential, SparseMatrix
+from truespring.potential import Potential, SparseMatrix
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter, Watch
 from truespring.solvers.cost import Cost
 from truespring.solvers.line_search import descend

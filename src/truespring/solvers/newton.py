@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading
 from truespring.errors import ProblemError, nearest
 from truespring.linear.choice import check_linear, choose
 from truespring.linear.gradients import norm
-from truespring.potential import Loading, Potential, Stressed
+from truespring.potential import Potential, Stressed
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised

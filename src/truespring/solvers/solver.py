@@ -6,8 +6,9 @@ from typing import Any
 
 from truespring.arrays import Floats, Ints
 from truespring.completing import completed
+from truespring.conditions import Loading
 from truespring.errors import ProblemError
-from truespring.potential import Loading, Potential
+from truespring.potential import Potential
 from truespring.solvers.balance import Equilibrium, Reporter
 
 

@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import Refined
 from truespring.equilibrium import Solution, State, solve
 from truespring.loading import Fixed, Force
 from truespring.material import Material, PlaneStress
 from truespring.mesh import Mesh, box, rectangle
 from truespring.models import Fem
-from truespring.potential import Refined
 from truespring.problem import Problem
 from truespring.solvers import Newton
 

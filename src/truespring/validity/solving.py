@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading, Refined
 from truespring.equilibrium import Solution, State, solve
 from truespring.models import Model
-from truespring.potential import Loading, Potential, Refined
+from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.solvers import Equilibrium, Geometry, Newton, Reporter
 
