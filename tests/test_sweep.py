@@ -171,7 +171,7 @@ def test_any_key_can_have_another_value(tmp_path: Path, key: str, value: Any, re
         (["mesh.elements=[8,2]", "mesh.elements.1=8"], "both varied"),
         (["material.poisson=0:0.4:2000", "material.young=1:2:2000"], "more than 1,000,000"),
         ([], "nothing is varied"),
-        (["material.young=1,2", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one"),
+        (["material.young=1,2", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers"),
         (["material.young=1,2", "--points", "there.csv"], "leave out"),
     ],
 )

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.columns import Columns
 from truespring.errors import ReferenceFileError
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
-from truespring.table import Table
 from truespring.units import Dimension
 
 _COLUMNS: dict[str, Dimension | None] = {"load_factor": None}
@@ -52,38 +52,38 @@ def read_curve(file: str | Path, problem: Problem, probe: int) -> Curve:
     are largest. Under loads the displacement of the probe is what is fitted, under a motion alone the force. Numbers
     are SI, or in the unit behind a column's name: "fy [mN]". Rest, where all is zero, is added.
 
-    Raises ReferenceFileError, with file and line, where the table is damaged, what is needed is not there, or load
+    Raises ReferenceFileError, with file and line, where the file is damaged, what is needed is not there, or load
     factors do not ascend.
     """
     place = Path(file)
-    table = Table(place, _COLUMNS, (), ReferenceFileError)
+    data = Columns(place, _COLUMNS, (), ReferenceFileError)
     loading, dim = problem.loading, problem.mesh.dim
     driven = loading.driven_by_motion
     fitted, told = ("f", "u") if driven else ("u", "f")
     for axis in AXES[dim:]:
         for column in (f"u{axis}", f"f{axis}"):
-            if column in table.columns:
+            if column in data.columns:
                 raise ReferenceFileError(f"{place}:1: column {column}: the body has {dim} directions")
-    axes = [axis for axis in AXES[:dim] if f"{fitted}{axis}" in table.columns]
+    axes = [axis for axis in AXES[:dim] if f"{fitted}{axis}" in data.columns]
     if not axes:
         wanted = ", ".join(f"{fitted}{axis}" for axis in AXES[:dim])
         why = "a support is moved, so that its force is fitted" if driven else "loads are given, so that the probe is"
         raise ReferenceFileError(f"{place}:1: {why}: one of the columns {wanted} is wanted")
-    values = np.stack([table.numbers(f"{fitted}{axis}") for axis in axes], axis=1)
-    if "load_factor" in table.columns:
-        factors = table.numbers("load_factor")
+    values = np.stack([data.numbers(f"{fitted}{axis}") for axis in axes], axis=1)
+    if "load_factor" in data.columns:
+        factors = data.numbers("load_factor")
     else:
-        factors = _factors(table, place, told, _largest(problem), axes_of=AXES[:dim])
+        factors = _factors(data, place, told, _largest(problem), axes_of=AXES[:dim])
     at_rest = factors == 0
     if values[at_rest].any():
         raise ReferenceFileError(
-            f"{place}:{table.line(int(at_rest.argmax()))}: without load there is no {'force' if driven else 'motion'}"
+            f"{place}:{data.line(int(at_rest.argmax()))}: without load there is no {'force' if driven else 'motion'}"
         )
     factors, values = factors[~at_rest], values[~at_rest]
     later = np.flatnonzero(np.diff(np.append(0.0, factors)) <= 0)
     if later.size:
         raise ReferenceFileError(
-            f"{place}:{table.line(int(np.flatnonzero(~at_rest)[later[0]]))}: the load goes down, to "
+            f"{place}:{data.line(int(np.flatnonzero(~at_rest)[later[0]]))}: the load goes down, to "
             f"{factors[later[0]]:g} of the study's: a curve of one loading, row after row, is wanted"
         )
     if not factors.size:
@@ -107,11 +107,11 @@ def _largest(problem: Problem) -> Floats:
     return np.asarray(motion[np.linalg.norm(motion, axis=1).argmax()])
 
 
-def _factors(table: Table, file: Path, told: str, largest: Floats, axes_of: str) -> Floats:
+def _factors(data: Columns, file: Path, told: str, largest: Floats, axes_of: str) -> Floats:
     axis = int(np.abs(largest).argmax())
     column = f"{told}{axes_of[axis]}"
     if not largest[axis]:
         raise ReferenceFileError(f"{file}:1: the study's load has no total that tells how far it went: add load_factor")
-    if column not in table.columns:
+    if column not in data.columns:
         raise ReferenceFileError(f"{file}:1: column {column} is missing, or load_factor, to tell how far the load went")
-    return np.asarray(table.numbers(column) / largest[axis])
+    return np.asarray(data.numbers(column) / largest[axis])

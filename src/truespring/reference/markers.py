@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.columns import Columns
 from truespring.errors import ReferenceFileError
 from truespring.reference.checks import checked, refuse_unreadable
 from truespring.reference.components import DISPLACEMENTS, PLACES, components
 from truespring.reference.record import Level, Reading, Record
-from truespring.table import Table
 from truespring.units import Dimension
 
 _AXES = "xyz"
@@ -53,16 +53,16 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
         reading: is called with the share that is read.
         undeformed: where they were at rest; markers are the same by name, or by row where they have none.
 
-    Returns a record of kind "csv" in metres. Raises ReferenceFileError with file and line where a table is damaged, a
+    Returns a record of kind "csv" in metres. Raises ReferenceFileError with file and line where a file is damaged, a
     level has other markers than the first, or there is no displacement.
     """
-    table = _table(file)
-    notes = _notes(table, file)
-    axes = [axis for axis in _AXES if axis in table.columns]
-    moved = [axis for axis in _AXES if f"u{axis}" in table.columns]
+    data = _columns(file)
+    notes = _notes(data, file)
+    axes = [axis for axis in _AXES if axis in data.columns]
+    moved = [axis for axis in _AXES if f"u{axis}" in data.columns]
     if undeformed is None and not moved:
-        if table.unknown:
-            table.refuse_unknown()
+        if data.unknown:
+            data.refuse_unknown()
         raise ReferenceFileError(
             f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or give a second "
             f"file with the markers at rest (--undeformed); the first line may be: {_FORM}"
@@ -70,11 +70,11 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
     if undeformed is not None and moved:
         raise ReferenceFileError(f"{file} has the displacement in column u{moved[0]}: leave undeformed out")
     if moved and moved != axes:
-        if table.unknown:
-            table.refuse_unknown()
+        if data.unknown:
+            data.refuse_unknown()
         raise ReferenceFileError(f"{file}:1: places have {', '.join(axes)}, displacements u{', u'.join(moved)}")
-    groups = _levels(table)
-    rest = table if undeformed is None else _table(undeformed)
+    groups = _levels(data)
+    rest = data if undeformed is None else _columns(undeformed)
     rest_rows = groups[0][1] if undeformed is None else np.arange(rest.n_rows)
     rest_axes = [axis for axis in _AXES if axis in rest.columns]
     if rest_axes != axes:
@@ -82,37 +82,37 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
             f"{file}:1: places have {', '.join(axes)}, those in {undeformed} {', '.join(rest_axes)}"
         )
     names, points = _names(rest, rest_rows, undeformed or file), _in_space(rest, axes)[rest_rows]
-    places = _in_space(table, axes)
+    places = _in_space(data, axes)
     levels = []
     for load_factor, unordered in groups:
-        rows = _in_order(table, unordered, names, len(points), load_factor, file)
+        rows = _in_order(data, unordered, names, len(points), load_factor, file)
         if undeformed is not None:
             levels.append(Level(load_factor, places[rows] - points))
             continue
-        _refuse_other_rest(table, places[rows], points, rows, file)
-        levels.append(Level(load_factor, _in_space(table, axes, "u")[rows]))
+        _refuse_other_rest(data, places[rows], points, rows, file)
+        levels.append(Level(load_factor, _in_space(data, axes, "u")[rows]))
     if reading:
         reading(1.0)
     return checked(Record(file, "csv", points, {}, tuple(levels), names, notes))
 
 
-def _table(file: Path) -> Table:
+def _columns(file: Path) -> Columns:
     refuse_unreadable(file)
-    return Table(file, _KNOWN, ("x", "y"), ReferenceFileError, _synonyms, _FORM)
+    return Columns(file, _KNOWN, ("x", "y"), ReferenceFileError, _synonyms, _FORM)
 
 
-def _notes(table: Table, file: Path) -> tuple[str, ...]:
+def _notes(data: Columns, file: Path) -> tuple[str, ...]:
     """Return what should be known of the columns; raise where places have units and displacements have none."""
-    without = [name for name in _LENGTHS if name in table.columns and not table.units[name]]
-    having = [name for name in _LENGTHS if name in table.columns and table.units[name]]
+    without = [name for name in _LENGTHS if name in data.columns and not data.units[name]]
+    having = [name for name in _LENGTHS if name in data.columns and data.units[name]]
     notes = []
-    if table.unknown:
-        notes.append(f"columns that are not read: {', '.join(head.strip() for head in table.unknown)}")
+    if data.unknown:
+        notes.append(f"columns that are not read: {', '.join(head.strip() for head in data.unknown)}")
     if without and having:
         if {name[0] for name in without}.isdisjoint(name[0] for name in having) and _are_halves(without, having):
             raise ReferenceFileError(
-                f"{file}:1: column {having[0]} is in {table.units[having[0]]}, {without[0]} has no unit: are these "
-                f"metres, too? Write {without[0]} [m], or {without[0]} [{table.units[having[0]]}]"
+                f"{file}:1: column {having[0]} is in {data.units[having[0]]}, {without[0]} has no unit: are these "
+                f"metres, too? Write {without[0]} [m], or {without[0]} [{data.units[having[0]]}]"
             )
         notes.append(f"columns without a unit were taken in metres: {', '.join(without)}")
     return tuple(notes)
@@ -123,48 +123,50 @@ def _are_halves(without: Sequence[str], having: Sequence[str]) -> bool:
     return len({name[0] == "u" for name in without}) == len({name[0] == "u" for name in having}) == 1
 
 
-def _in_space(table: Table, axes: list[str], quantity: str = "") -> Floats:
+def _in_space(data: Columns, axes: list[str], quantity: str = "") -> Floats:
     """Return a column for each axis, of zeros where there is none, shape (n_rows, 3)."""
-    values = np.zeros((table.n_rows, 3))
+    values = np.zeros((data.n_rows, 3))
     for axis in axes:
-        values[:, _AXES.index(axis)] = table.numbers(quantity + axis)
+        values[:, _AXES.index(axis)] = data.numbers(quantity + axis)
     return values
 
 
-def _levels(table: Table) -> list[tuple[float, Ints]]:
+def _levels(data: Columns) -> list[tuple[float, Ints]]:
     """Return each load factor and its rows, in the file's order."""
-    if "load_factor" not in table.columns:
-        return [(1.0, np.arange(table.n_rows))]
-    load_factor = table.numbers("load_factor")
+    if "load_factor" not in data.columns:
+        return [(1.0, np.arange(data.n_rows))]
+    load_factor = data.numbers("load_factor")
     return [(value, np.flatnonzero(load_factor == value)) for value in dict.fromkeys(load_factor.tolist())]
 
 
-def _names(table: Table, rows: Ints, file: Path) -> tuple[str, ...]:
-    """Return the names of the markers in some rows, none where the table has none."""
-    if "marker" not in table.columns:
+def _names(data: Columns, rows: Ints, file: Path) -> tuple[str, ...]:
+    """Return the names of the markers in some rows, none where the file has none."""
+    if "marker" not in data.columns:
         return ()
-    texts = table.texts("marker")
+    texts = data.texts("marker")
     first: dict[str, int] = {}
     for row in rows.tolist():
         if texts[row] in first:
             raise ReferenceFileError(
-                f"{file}:{table.line(row)}: marker '{texts[row]}' is there twice, first in line "
-                f"{table.line(first[texts[row]])}: several levels need a column load_factor"
+                f"{file}:{data.line(row)}: marker '{texts[row]}' is there twice, first in line "
+                f"{data.line(first[texts[row]])}: several levels need a column load_factor"
             )
         first[texts[row]] = row
     return tuple(first)
 
 
-def _in_order(table: Table, rows: Ints, names: tuple[str, ...], n_markers: int, load_factor: float, file: Path) -> Ints:
+def _in_order(
+    data: Columns, rows: Ints, names: tuple[str, ...], n_markers: int, load_factor: float, file: Path
+) -> Ints:
     """Return the rows of a level in the order of the markers at rest; raise where the markers are others."""
-    level = f"at load_factor {load_factor:g}" if "load_factor" in table.columns else "here"
-    if bool(names) != ("marker" in table.columns):
+    level = f"at load_factor {load_factor:g}" if "load_factor" in data.columns else "here"
+    if bool(names) != ("marker" in data.columns):
         raise ReferenceFileError(f"{file}:1: only one of both files has a column marker: add it to both, or to none")
     if not names and len(rows) != n_markers:
         raise ReferenceFileError(f"{file}: {len(rows)} markers are {level}, {n_markers} at rest: give them names")
     if not names:
         return rows
-    own = _names(table, rows, file)
+    own = _names(data, rows, file)
     other = set(names) ^ set(own)
     if other:
         which = next(name for name in (*own, *names) if name in other)
@@ -174,9 +176,9 @@ def _in_order(table: Table, rows: Ints, names: tuple[str, ...], n_markers: int, 
     return np.array([row[name] for name in names])
 
 
-def _refuse_other_rest(table: Table, places: Floats, points: Floats, rows: Ints, file: Path) -> None:
+def _refuse_other_rest(data: Columns, places: Floats, points: Floats, rows: Ints, file: Path) -> None:
     """Raise where a marker rests elsewhere than in the first level."""
     other = (places != points).any(axis=1) & np.isfinite(points).all(axis=1)
     if other.any():
-        where = table.line(int(rows[other.argmax()]))
+        where = data.line(int(rows[other.argmax()]))
         raise ReferenceFileError(f"{file}:{where}: this marker rests elsewhere than in the first level")

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.columns import Columns
 from truespring.errors import MeshError
 from truespring.models import GivenSprings, shared_springs
 from truespring.problem import Problem
-from truespring.table import Table
 from truespring.units import Dimension
 
 _COLUMNS: dict[str, Dimension | None] = {"a": None, "b": None, "stiffness": "stiffness"}
@@ -34,8 +34,8 @@ def read_given(
     place = Path(file)
     springs, _ = shared_springs(problem.mesh)
     n_nodes = problem.mesh.n_nodes
-    table = Table(place, _COLUMNS, ("a", "b", "stiffness"))
-    ends = np.sort(np.stack([_whole(table, place, "a", n_nodes), _whole(table, place, "b", n_nodes)], axis=1), axis=1)
+    data = Columns(place, _COLUMNS, ("a", "b", "stiffness"))
+    ends = np.sort(np.stack([_whole(data, place, "a", n_nodes), _whole(data, place, "b", n_nodes)], axis=1), axis=1)
     keys, known = ends[:, 0] * n_nodes + ends[:, 1], springs[:, 0].astype(np.int64) * n_nodes + springs[:, 1]
     order = np.argsort(known)
     found = order[np.minimum(np.searchsorted(known, keys, sorter=order), len(known) - 1)]
@@ -43,47 +43,47 @@ def read_given(
     if other.size:
         a, b = ends[other[0]]
         raise MeshError(
-            f"{place}:{table.line(int(other[0]))}: no element of the mesh joins nodes {a} and {b} by an edge or a "
+            f"{place}:{data.line(int(other[0]))}: no element of the mesh joins nodes {a} and {b} by an edge or a "
             "diagonal: the file belongs to another mesh"
         )
-    values = table.numbers("stiffness")
+    values = data.numbers("stiffness")
     negative = np.flatnonzero(values < 0)
     if negative.size and not allow_negative:
         raise MeshError(
-            f"{place}:{table.line(int(negative[0]))}: stiffness = {values[negative[0]]:g} N/m is negative: "
+            f"{place}:{data.line(int(negative[0]))}: stiffness = {values[negative[0]]:g} N/m is negative: "
             "allow_negative = true accepts that"
         )
-    stiffness = _by_number(place, table, found, values, [f"{a}-{b}" for a, b in springs.tolist()], "spring")
+    stiffness = _by_number(place, data, found, values, [f"{a}-{b}" for a, b in springs.tolist()], "spring")
     kappa = np.zeros(0) if volume is None else _read_kappa(problem, Path(volume))
     return GivenSprings(np.asarray(springs, dtype=np.int64), stiffness, kappa, f"springs ({place.name})")
 
 
 def _read_kappa(problem: Problem, file: Path) -> Floats:
     n_elements = len(problem.mesh.elements)
-    table = Table(file, _VOLUME_COLUMNS, ("element", "kappa"))
-    numbers = _whole(table, file, "element", n_elements)
-    return _by_number(file, table, numbers, table.numbers("kappa"), [str(n) for n in range(n_elements)], "element")
+    data = Columns(file, _VOLUME_COLUMNS, ("element", "kappa"))
+    numbers = _whole(data, file, "element", n_elements)
+    return _by_number(file, data, numbers, data.numbers("kappa"), [str(n) for n in range(n_elements)], "element")
 
 
-def _whole(table: Table, file: Path, column: str, count: int) -> Ints:
+def _whole(data: Columns, file: Path, column: str, count: int) -> Ints:
     """A column of numbers 0 ... count - 1."""
-    values = table.numbers(column)
+    values = data.numbers(column)
     wrong = np.flatnonzero((values != np.round(values)) | (values < 0) | (values >= count))
     if wrong.size:
         raise MeshError(
-            f"{file}:{table.line(int(wrong[0]))}: {column} = {values[wrong[0]]:g}: the mesh has the numbers 0 to "
+            f"{file}:{data.line(int(wrong[0]))}: {column} = {values[wrong[0]]:g}: the mesh has the numbers 0 to "
             f"{count - 1}"
         )
     return values.astype(np.int64)
 
 
-def _by_number(file: Path, table: Table, numbers: Ints, values: Floats, names: list[str], what: str) -> Floats:
+def _by_number(file: Path, data: Columns, numbers: Ints, values: Floats, names: list[str], what: str) -> Floats:
     """Values in the mesh's order; raise MeshError where one is there twice or left out."""
     count = np.bincount(numbers, minlength=len(names))
     twice = np.flatnonzero(count[numbers] > 1)
     if twice.size:
         row = int(twice[-1])
-        raise MeshError(f"{file}:{table.line(row)}: {what} {names[numbers[row]]} is there twice")
+        raise MeshError(f"{file}:{data.line(row)}: {what} {names[numbers[row]]} is there twice")
     missing = np.flatnonzero(count == 0)
     if missing.size:
         raise MeshError(

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from truespring.columns import Columns
 from truespring.errors import MeshError, TruespringError
 from truespring.models import SpringNetwork
-from truespring.table import Table
 from truespring.units import Dimension
 
 # Columns by name, and what they measure; others are refused.
@@ -30,15 +30,15 @@ def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
     Numbers are SI; a unit may stand behind a column's name: "x [mm]", "stiffness [N/mm]". Raises MeshError, with file
     and line, where a file is damaged or names what is not there.
     """
-    table = Table(Path(nodes), _NODE_COLUMNS, ("x", "y"))
-    axes = [axis for axis in "xyz" if axis in table.columns]
-    places = np.stack([table.numbers(axis) for axis in axes], axis=1)
-    names = table.texts("node") if "node" in table.columns else [str(number) for number in range(len(places))]
+    data = Columns(Path(nodes), _NODE_COLUMNS, ("x", "y"))
+    axes = [axis for axis in "xyz" if axis in data.columns]
+    places = np.stack([data.numbers(axis) for axis in axes], axis=1)
+    names = data.texts("node") if "node" in data.columns else [str(number) for number in range(len(places))]
     number = {name: place for place, name in enumerate(names)}
     if len(number) < len(names):
         twice = next(name for place, name in enumerate(names) if number[name] != place)
         raise MeshError(f"{nodes}: node {twice} is there twice")
-    joined = Table(Path(springs), _SPRING_COLUMNS, ("a", "b", "stiffness"))
+    joined = Columns(Path(springs), _SPRING_COLUMNS, ("a", "b", "stiffness"))
     ends = np.array([[joined.known(column, row, number) for column in "ab"] for row in range(joined.n_rows)])
     rest = joined.numbers("rest_length") if "rest_length" in joined.columns else np.zeros(0)
     try:

@@ -1,4 +1,4 @@
-"""Tables in CSV files, whose columns have names and units."""
+"""CSV files, whose columns have names and units."""
 
 import csv
 import difflib
@@ -15,7 +15,7 @@ from truespring.errors import MeshError, TruespringError, nearest
 from truespring.opening import read_file
 from truespring.units import Dimension, unit_size
 
-#: Tells which columns other names may mean: from the names that are not known to those that are.
+#: Returns which columns other names may mean: from the names that are not known to those that are.
 Synonyms = Callable[[Sequence[str]], Mapping[str, str]]
 
 # How a unit may stand behind a name: "x [mm]", "x (mm)"; or glued: "x_mm", "x mm".
@@ -23,21 +23,21 @@ _HEAD = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]+?)
 _GLUED = re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\W\d_]+)")
 # A number as Fortran writes it, 1.0D-03.
 _FORTRAN = re.compile(r"([\d.])[dD]([+-]?\d+)$")
-# Lengths in a picture, which no unit of length tells.
+# Lengths in a picture, which are no unit of length.
 _PIXELS = ("px", "pix", "pixel", "pixels")
 # By the mark that a file of another coding begins with.
 _CODINGS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
-class Table:
-    """A table of values that are separated by commas, semicolons or tabs, below a line of names.
+class Columns:
+    """Values of a CSV file, separated by commas, semicolons or tabs below a line of names.
 
     A unit may stand behind a name: "x [mm]", "x (mm)" or "x_mm"; numbers without one are SI. Names may be capital.
     Where commas do not separate values, numbers may have decimal commas.
 
     Args:
-        file: the table.
-        known: the columns that may be there, and what they measure; others are refused.
+        file: the CSV file.
+        known: the columns that may be there, and what they measure; others are an error.
         required: those that must be there.
         error: what is raised, with file and line, where the file is damaged or misses something.
         synonyms: what other names mean; where it is given, columns that still are unknown are left out.
@@ -63,7 +63,7 @@ class Table:
         self._form = f"; the first line may be: {form}" if form else ""
         rows, self._lines, self._separator = self._read()
         if len(rows) < 2:
-            raise error(f"{file}: a line of column names and a row at least are wanted{self._form}")
+            raise error(f"{file}: needs a line of column names and a row at least{self._form}")
         self.columns: dict[str, int] = {}
         self.units: dict[str, str] = {}
         self.unknown: list[str] = []
