@@ -20,7 +20,7 @@ from truespring.errors import MeshError, StudyError
 from truespring.loading import Fixed, Moment
 from truespring.material import Material
 from truespring.mesh import box, in_simplices, rectangle, refined
-from truespring.models import Fem, GivenSprings, Springs
+from truespring.models import Fem, PrescribedSprings, Springs
 from truespring.problem import Problem
 from truespring.report.result import head_note
 from truespring.report.series import write_mesh
@@ -58,7 +58,7 @@ def test_what_is_written(out: Path) -> None:
 def test_the_calibrated_study_runs_and_gives_the_errors_that_it_tells(out: Path) -> None:
     study = read_study(out / "calibrated.toml")
     values = json.loads((out / "calibrate.json").read_text(encoding="utf-8"))
-    assert isinstance(study.entries["calibrated"], GivenSprings) and study.model == "calibrated"
+    assert isinstance(study.entries["calibrated"], PrescribedSprings) and study.model == "calibrated"
     result = run(study)
     fitted = next(one for one in values["cases"] if not one["held_out"])
     assert result.converged
@@ -174,7 +174,7 @@ def test_a_volume_term_is_calibrated_and_read_again(tmp_path: Path) -> None:
     assert {"calibrated.csv", "calibrated_volume.csv"} < {file.name for file in files}
     assert "volume term" in found.calibration.unknowns.names
     again = read_study(files[0]).entries["calibrated"]
-    assert isinstance(again, GivenSprings)
+    assert isinstance(again, PrescribedSprings)
     assert again.stiffness.tolist() == found.calibration.model.stiffness.tolist()
     assert again.kappa.tolist() == found.calibration.model.kappa.tolist() and again.kappa.any()
 
@@ -195,7 +195,7 @@ def test_springs_in_a_file_are_checked(tmp_path: Path) -> None:
     problem = read_study(written(tmp_path)).problem
     potential = Springs("lloyd").potential(problem)
     file, volume = tmp_path / "k.csv", tmp_path / "kappa.csv"
-    write_given(GivenSprings(potential.springs, potential.stiffness), file, volume)
+    write_given(PrescribedSprings(potential.springs, potential.stiffness), file, volume)
     assert read_given(problem, file).stiffness == pytest.approx(potential.stiffness, rel=1e-15)
     names, *rows = file.read_text(encoding="utf-8").splitlines()
     a, b, k = rows[0].split(",")

@@ -1,7 +1,9 @@
-"""Models and solvers of a user's own in the place of ours: what they lack has the default of Model and Solver."""
+"""Models and solvers: a user's own in the place of ours, and what holds for every model of truespring."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
+from inspect import isclass, signature
 from typing import Any
 
 import numpy as np
@@ -9,12 +11,15 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 import truespring as ts
+import truespring.models
 from truespring.conditions import Loading
 from truespring.equilibrium import check_solver
-from truespring.models import as_model
+from truespring.models import Model, as_model
+from truespring.models.spring_data import HasSprings
 from truespring.potential import Potential
 from truespring.refining import reference_error
 from truespring.solvers import Equilibrium, as_solver
+from truespring.study.schema.models import MODEL_KINDS
 
 PROBLEM = ts.Problem(
     ts.rectangle((4.0, 1.0), (4, 1)),
@@ -140,3 +145,70 @@ def test_models_answer_for_themselves(model: Any, finite: bool, law: str | None,
     assert (path.finite, path.has_springs, path.kind, path.label) == (finite, springs, model.kind, model.label)
     assert path.lines == ("links" if model.kind == "heml" else "springs")
     assert (path.element is not None) == (model.kind == "fem") and (path.moduli is not None) == springs
+
+
+# --- What holds for every model of truespring ------------------------------------------------------------------------
+
+LINKS: Any = ts.Springs("isotropic").potential(PROBLEM)
+# Models that cannot be made without arguments, or from a law alone.
+EXAMPLES: dict[str, list[Any]] = {
+    "Springs": [ts.Springs("lloyd"), ts.Springs("biquadratic"), ts.Springs("isotropic", volume=True)],
+    "PrescribedSprings": [ts.PrescribedSprings(LINKS.springs, np.linspace(1e3, 2e3, len(LINKS.springs)))],
+    "SpringNetwork": [LINKS],
+    "BemSprings": [ts.BemSprings(ts.Box((0.0, 0.0), (2.0, 1.0)))],
+}
+BODIES = [PROBLEM, replace(PROBLEM, mesh=ts.rectangle((4.0, 1.0), (4, 1), "triangle"))]
+
+
+def made(kind: type[Model]) -> list[Model]:
+    """The examples of a class of models: by itself, or with each law that it takes."""
+    if kind.__name__ in EXAMPLES:
+        return EXAMPLES[kind.__name__]
+    if "law" not in signature(kind).parameters:
+        return [kind()]
+    found = []
+    for law in ts.LAWS:
+        with suppress(ts.TruespringError):
+            found.append(kind(law))  # type: ignore[call-arg]
+    return found
+
+
+KINDS = [kind for kind in vars(truespring.models).values() if isclass(kind) and issubclass(kind, Model)]
+ALL = [one for kind in KINDS if kind is not Model for one in made(kind)]
+
+
+def test_every_kind_of_study_has_examples() -> None:
+    own = {one.kind for one in ALL} | {"network", "calculix", "stl"}  # a plain network is springs; the others are read
+    assert own >= set(MODEL_KINDS) and len(ALL) > 15
+
+
+@pytest.mark.parametrize("model", ALL, ids=lambda model: model.label)
+def test_a_model_keeps_the_contract(model: Model) -> None:
+    for problem in BODIES:  # the first that the model takes
+        with suppress(ts.TruespringError):
+            model.check(problem)
+            break
+    else:
+        pytest.fail("no body for this model: add one to BODIES")
+    assert model.label and model.label_on(problem) and model.kind
+    assert all(isinstance(text, str) for text in model.warnings(problem))
+    assert model.law is None or ts.LAWS[model.law].finite == model.finite
+    assert (model.chosen_element(problem) is None) == (model.kind != "fem")
+    potential = model.potential(problem)
+    assert isinstance(potential, Potential)
+    nodes = potential.nodes
+    assert np.array_equal(nodes[: problem.mesh.n_nodes], problem.mesh.nodes)
+    random = np.random.default_rng(0)
+    here, along = nodes + 0.02 * random.normal(size=nodes.shape), random.normal(size=nodes.shape)
+    step, size = 1e-5, float(np.abs(potential.gradient(here)).max())
+    assert size > 0
+    ahead, behind = here + step * along, here - step * along
+    slope = (potential.energy(ahead) - potential.energy(behind)) / (2 * step)
+    assert (potential.gradient(here) * along).sum() == pytest.approx(slope, abs=1e-6 * size)
+    change = (potential.gradient(ahead) - potential.gradient(behind)).ravel() / (2 * step)
+    hessian = potential.hessian(here)
+    assert hessian @ along.ravel() == pytest.approx(change, abs=1e-6 * float(np.abs(change).max()))
+    assert abs(hessian - hessian.T).max() <= 1e-9 * abs(hessian).max()
+    moved = potential.energy(here + np.array([0.3, -0.2]))
+    assert moved == pytest.approx(potential.energy(here), rel=1e-9)
+    assert not model.has_springs or isinstance(potential, HasSprings)

@@ -12,7 +12,7 @@ import lazy_loader
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 # Names of earlier releases and their successors; removed in the next release.
-_RENAMED = {"Path": "Solution"}
+_RENAMED = {"GivenSprings": "PrescribedSprings", "Path": "Solution"}
 
 
 def __getattr__(name: str) -> Any:

@@ -38,10 +38,10 @@ from .models import RULES as RULES
 from .models import BemSprings as BemSprings
 from .models import Fem as Fem
 from .models import Fitness as Fitness
-from .models import GivenSprings as GivenSprings
 from .models import Heml as Heml
 from .models import MassTensor as MassTensor
 from .models import Moduli as Moduli
+from .models import PrescribedSprings as PrescribedSprings
 from .models import SpringNetwork as SpringNetwork
 from .models import Springs as Springs
 from .models import Terzopoulos as Terzopoulos

@@ -14,7 +14,7 @@ from truespring.calibration.objective import relative_errors
 from truespring.calibration.unknowns import Unknowns
 from truespring.comparison import Decisive, compare, largest
 from truespring.equilibrium import Solution, Status
-from truespring.models import GivenSprings, Springs
+from truespring.models import PrescribedSprings, Springs
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class Fitted:
     rule: Springs
     unknowns: Unknowns
     values: Floats
-    model: GivenSprings
+    model: PrescribedSprings
     cases: tuple[CaseResult, ...]
     identifiability: Identifiability
     regularisation: float

@@ -13,7 +13,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.mesh import Mesh
 from truespring.mesh.selections import AXES
-from truespring.models import GivenSprings, SpringNetwork, Springs, VolumeSprings, VolumeTerm, shared_springs
+from truespring.models import PrescribedSprings, SpringNetwork, Springs, VolumeSprings, VolumeTerm, shared_springs
 from truespring.models.elasticity import lattice_classes
 from truespring.models.links import in_a_row, link_vectors
 from truespring.problem import Problem
@@ -53,10 +53,10 @@ class Unknowns:
         """The rule: all ones, shape (n,)."""
         return np.ones(len(self))
 
-    def model(self, values: Floats, label: str = "springs (calibrated)") -> GivenSprings:
+    def model(self, values: Floats, label: str = "springs (calibrated)") -> PrescribedSprings:
         """Return the springs with these unknowns, which `solve` takes on any problem of the same mesh."""
         kappa = np.zeros(0) if self.kappa is None else self.kappa @ values
-        return GivenSprings(self.springs, self.stiffness @ values, kappa, label)
+        return PrescribedSprings(self.springs, self.stiffness @ values, kappa, label)
 
     def potential(self, values: Floats) -> SpringNetwork | VolumeSprings:
         """Return the potential with these unknowns; it is not asked whether it is a mechanism."""

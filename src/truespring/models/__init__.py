@@ -12,7 +12,6 @@ from truespring.models.findings import moduli_findings as moduli_findings
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
-from truespring.models.given import GivenSprings as GivenSprings
 from truespring.models.heml import Heml as Heml
 from truespring.models.interpolation import ELEMENTS as ELEMENTS
 from truespring.models.law import Constant as Constant
@@ -26,6 +25,7 @@ from truespring.models.model import as_model as as_model
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli
 from truespring.models.network import SpringNetwork as SpringNetwork
+from truespring.models.prescribed import PrescribedSprings as PrescribedSprings
 from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness
 from truespring.models.springs import Springs as Springs

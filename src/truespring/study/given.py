@@ -9,7 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.columns import Columns
 from truespring.errors import MeshError
-from truespring.models import GivenSprings, shared_springs
+from truespring.models import PrescribedSprings, shared_springs
 from truespring.problem import Problem
 from truespring.units import Dimension
 
@@ -19,7 +19,7 @@ _VOLUME_COLUMNS: dict[str, Dimension | None] = {"element": None, "kappa": "stres
 
 def read_given(
     problem: Problem, file: str | Path, volume: str | Path | None = None, allow_negative: bool = False
-) -> GivenSprings:
+) -> PrescribedSprings:
     """Read the stiffness of each spring of a problem's mesh from a CSV file with a line of column names.
 
     Args:
@@ -55,7 +55,7 @@ def read_given(
         )
     stiffness = _by_number(place, data, found, values, [f"{a}-{b}" for a, b in springs.tolist()], "spring")
     kappa = np.zeros(0) if volume is None else _read_kappa(problem, Path(volume))
-    return GivenSprings(np.asarray(springs, dtype=np.int64), stiffness, kappa, f"springs ({place.name})")
+    return PrescribedSprings(np.asarray(springs, dtype=np.int64), stiffness, kappa, f"springs ({place.name})")
 
 
 def _read_kappa(problem: Problem, file: Path) -> Floats:
@@ -95,7 +95,7 @@ def _by_number(file: Path, data: Columns, numbers: Ints, values: Floats, names: 
     return ordered
 
 
-def write_given(springs: GivenSprings, file: Path, volume: Path) -> tuple[Path, ...]:
+def write_given(springs: PrescribedSprings, file: Path, volume: Path) -> tuple[Path, ...]:
     """Write springs as `read_given` reads them; the second file only where there is a volume term."""
     rows = [(a, b, repr(k)) for (a, b), k in zip(springs.springs.tolist(), springs.stiffness.tolist(), strict=True)]
     _write(file, ("a", "b", "stiffness [N/m]"), rows)

@@ -17,10 +17,10 @@ from truespring.models import (
     RULES,
     BemSprings,
     Fem,
-    GivenSprings,
     Heml,
     MassTensor,
     Model,
+    PrescribedSprings,
     SpringNetwork,
     Springs,
     Terzopoulos,
@@ -137,7 +137,7 @@ class SpringsKeys(ModelKeys):
                 raise ValueError(f"stiffness is read from a file, spring by spring: leave {' and '.join(named)} out")
         return self
 
-    def build(self, scope: Scope) -> Springs | GivenSprings:
+    def build(self, scope: Scope) -> Springs | PrescribedSprings:
         """Return springs by a rule, by numbers, or as read spring by spring."""
         own = self.stiffness
         if own is not None and own.file is not None:

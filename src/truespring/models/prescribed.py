@@ -1,4 +1,4 @@
-"""Springs whose stiffness is known spring by spring: measured, or fitted to references."""
+"""Springs of prescribed stiffness, spring by spring: measured, or fitted to references."""
 
 from dataclasses import dataclass, field
 
@@ -15,16 +15,16 @@ from truespring.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class GivenSprings(Model):
-    """The springs of a mesh, each with a stiffness of its own, and a modulus of the volume term of each element.
+class PrescribedSprings(Model):
+    """The springs of a mesh, each of a prescribed stiffness, and a modulus of the volume term of each element.
 
-    No rule stands behind them and no lattice repeats itself: moduli are not told of them.
+    They follow no rule and form no lattice: they have no effective moduli.
 
     Attributes:
         springs: node numbers, shape (n_springs, 2).
         stiffness: [N/m], shape (n_springs,).
         kappa: modulus of the area or volume term of each element [Pa], shape (n_elements,); empty for none.
-        label: how curves and tables call them.
+        label: the name of the springs in figures and tables.
 
     Raises ModelError where shapes do not fit, or a spring names a node that the problem does not have.
     """
@@ -32,7 +32,7 @@ class GivenSprings(Model):
     springs: Ints
     stiffness: Floats
     kappa: Floats = field(default_factory=lambda: np.zeros(0))
-    label: str = "springs (given)"
+    label: str = "springs (prescribed)"
 
     kind = "springs"
     has_springs = True
@@ -47,7 +47,7 @@ class GivenSprings(Model):
 
     def __repr__(self) -> str:
         volume = ", with a volume term" if self.kappa.size else ""
-        return f"GivenSprings({self.label}, {len(self.springs)} springs{volume})"
+        return f"PrescribedSprings({self.label}, {len(self.springs)} springs{volume})"
 
     def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
         """Return the springs on the problem's mesh; raise ModelError where they leave nodes free to move."""
