@@ -20,7 +20,18 @@ from truespring.arrays import Floats
 from truespring.conditions import Refined
 from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, Model, VolumeSprings, fem, heml, linked, mass_tensor, volume
+from truespring.models import (
+    ELEMENTS,
+    LAWS,
+    RULES,
+    Model,
+    VolumeSprings,
+    fem_potential,
+    heml,
+    linked,
+    mass_tensor,
+    volume,
+)
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS, NonlinearTensors
 from truespring.models.terzopoulos import BOUNDARIES
@@ -605,9 +616,9 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
         ]
 
     at_once = answers()
-    for module in (fem, heml, linked, mass_tensor, volume):
+    for module in (fem_potential, heml, linked, mass_tensor, volume):
         monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
-    monkeypatch.setattr(fem, "_SLICE_POINTS", 1)
+    monkeypatch.setattr(fem_potential, "_SLICE_POINTS", 1)
     monkeypatch.setattr(potential_module, "_SLICE_BYTES", 1)
     monkeypatch.setattr(potential_module, "_SMALLEST_SLAB", 1)
     set_threads(3)
