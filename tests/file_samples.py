@@ -116,4 +116,6 @@ def result_sample(folder: Path, suffix: str) -> Path:
 
 def image_sample(folder: Path, suffix: str) -> Path:
     """Write a label image with a suffix into a folder."""
+    if (DATA / f"sample{suffix}").exists():
+        return _shipped(folder, suffix)
     return ball(folder, suffix, compressed=suffix == ".nii.gz")

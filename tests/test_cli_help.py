@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 
 import truespring
 from tests.test_examples import EXAMPLES
-from truespring.cli import main
+from truespring.cli import main, printing
 from truespring.cli.parser import VERBS, build_parser, parse
 
 KINDS = tuple(one.stem for one in (Path(truespring.__file__).parent / "examples").glob("*.toml"))
@@ -169,3 +170,19 @@ def test_every_key_of_the_schema_has_a_description(capsys: pytest.CaptureFixture
     schema = json.loads(capsys.readouterr().out)
     assert undescribed(schema) == []
     assert all("description" in table for table in schema["$defs"].values())
+
+
+def test_progress_off_a_terminal_is_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def printed(every: float, quiet: bool) -> tuple[str, str]:
+        monkeypatch.setattr(printing, "_EVERY", every)
+        options = Namespace(quiet=quiet)
+        with printing.progress(options) as advance, printing.counting(options, "points") as (count, note):
+            if advance and count and note:
+                advance("study", "springs", 0.5)
+                count(3, 1, 8)
+        return tuple(capsys.readouterr())  # type: ignore[return-value]
+
+    assert printed(0.0, False) == ("", "truespring: study: springs: 50%\ntruespring: 3 of 8 points, 1 failed\n")
+    assert printed(1000.0, False) == printed(0.0, True) == ("", "")

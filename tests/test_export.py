@@ -632,6 +632,14 @@ RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
 }
 
 
+def test_the_page_on_export_lists_every_target_with_its_files() -> None:
+    page = (Path(__file__).parents[1] / "docs/export/README.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| [")]
+    for name, target in TARGETS.items():
+        (row,) = [row for row in rows if f"`{name}`" in row.split("|")[1]]
+        assert set(target.names) <= set(re.findall(r"`([\w.]+)`", row.split("|")[2]))
+
+
 def test_every_target_is_run_or_says_why_not() -> None:
     assert RUNS.keys() == {name for name, target in TARGETS.items() if not target.unrun}
 

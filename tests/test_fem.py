@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm, logm
 from scipy.optimize import brentq
@@ -29,6 +29,16 @@ SOLID = [
     for kind, finer in (("tetrahedron", "quadratic"), ("hexahedron", "mean-dilatation"))
     for e in ("linear", finer)
 ] + [("tetrahedron", "quadratic-mean-dilatation")]
+
+
+def fits(law: str, element: str) -> bool:
+    """Whether an interpolation is for a law: lambda's part at the mean volume needs one of a known form."""
+    return element != "quadratic-mean-dilatation" or LAWS[law].trace is not None
+
+
+def of_laws(cases: list[tuple[str, str]]) -> list[tuple[str, str, str]]:
+    """Kind of the mesh, interpolation, law: all that go together."""
+    return [(kind, element, law) for kind, element in cases for law in LAWS if fits(law, element)]
 
 
 def distorted(kind: str = "quadrilateral", share: float = 0.25) -> ts.Mesh:
@@ -99,8 +109,7 @@ def test_patch(kind: str, element: str, law: str, section: str, gradient: str) -
 
 
 @pytest.mark.parametrize("gradient", ["large", "turned"])
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("kind", "element"), SOLID)
+@pytest.mark.parametrize(("kind", "element", "law"), of_laws(SOLID))
 def test_patch_in_space(kind: str, element: str, law: str, gradient: str) -> None:
     check_patch(distorted(kind), element, law, "solid", GRADIENTS[gradient])
 
@@ -187,6 +196,7 @@ def test_uniaxial_tension(
     law: str, case: tuple[str, str], section: str, stretch: float, young: float, poisson: float
 ) -> None:
     kind, element = case
+    assume(fits(law, element))
     solid = case in SOLID
     problem = uniaxial(None if solid else SECTIONS[section](0.2), stretch, young, poisson, kind, law)
     mesh = problem.mesh
@@ -230,8 +240,7 @@ def test_uniaxial_plane_stress_in_closed_form(stretch: float) -> None:
     assert path.applied_force(path.states[-1])[0] / 0.6 == pytest.approx(neo_hookean, abs=6e-7)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("kind", "element"), [*PLANE, *SOLID])
+@pytest.mark.parametrize(("kind", "element", "law"), of_laws([*PLANE, *SOLID]))
 def test_dead_load_gives_the_stretch_of_the_closed_form(kind: str, element: str, law: str) -> None:
     """The load is shared so that a uniform stress is in balance exactly, at every node of every element."""
     mesh = distorted(kind)
@@ -257,7 +266,7 @@ def test_dead_load_gives_the_stretch_of_the_closed_form(kind: str, element: str,
 
 @pytest.mark.parametrize("law", LAWS)
 def test_all_laws_are_one_at_small_strain(law: str) -> None:
-    for kind, element in (*PLANE, *SOLID):
+    for kind, element in (case for case in (*PLANE, *SOLID) if fits(law, case[1])):
         for section in SECTIONS:
             mesh = distorted(kind)
             gradient = GRADIENTS["small"][: mesh.dim, : mesh.dim]
@@ -556,7 +565,7 @@ def test_the_default_and_the_warning(
 
     plain, incompressible, mixed = problem(0.4), problem(0.41), problem(0.3, region=0.45)
     locks = not isinstance(section, ts.PlaneStress)
-    for law in LAWS:
+    for law in (law for law in LAWS if fits(law, tight)):
         assert ts.Fem(law).chosen_element(plain) == usual
         for stiff in (incompressible, mixed):
             assert ts.Fem(law).chosen_element(stiff) == (tight if locks else usual)

@@ -15,12 +15,23 @@ from hypothesis import strategies as st
 import truespring as ts
 from tests.closed_forms import difference_errors, material_of, observed_orders
 from tests.meshes import plane_of_two, solid_of_four
-from truespring import potential as potential_module
+from truespring import assembly
 from truespring.arrays import Floats
 from truespring.conditions import Refined
 from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
-from truespring.models import ELEMENTS, LAWS, RULES, Model, VolumeSprings, fem, heml, linked, mass_tensor, volume
+from truespring.models import (
+    ELEMENTS,
+    LAWS,
+    RULES,
+    Model,
+    VolumeSprings,
+    fem_potential,
+    heml,
+    linked,
+    mass_tensor,
+    volume,
+)
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS, NonlinearTensors
 from truespring.models.terzopoulos import BOUNDARIES
@@ -605,11 +616,11 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
         ]
 
     at_once = answers()
-    for module in (fem, heml, linked, mass_tensor, volume):
+    for module in (fem_potential, heml, linked, mass_tensor, volume):
         monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
-    monkeypatch.setattr(fem, "_SLICE_POINTS", 1)
-    monkeypatch.setattr(potential_module, "_SLICE_BYTES", 1)
-    monkeypatch.setattr(potential_module, "_SMALLEST_SLAB", 1)
+    monkeypatch.setattr(fem_potential, "_SLICE_POINTS", 1)
+    monkeypatch.setattr(assembly, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(assembly, "_SMALLEST_SLAB", 1)
     set_threads(3)
     try:
         one_by_one = answers()

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 import truespring as ts
 from tests.test_report import Page, called, words
 from truespring.mesh import Mesh
+from truespring.mesh.facets import triangles_of
 from truespring.report import render as rendering
 from truespring.report.bodies import path_lines
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
@@ -29,7 +30,7 @@ from truespring.report.render import Image, Layer, Shot, draw, read_job, render,
 from truespring.report.result import Result
 from truespring.report.series import write_series, write_stl
 from truespring.report.style import BLUE, INK, error_colors, figure_style
-from truespring.report.surfaces import VIEW, edges_of, facets_of, lines_on, normals, outline, seen, triangles_of
+from truespring.report.surfaces import VIEW, edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.tables import result_tables
 from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import drive

@@ -12,6 +12,7 @@ from truespring.carrying import carried, matching_points
 from truespring.equilibrium import Solution, State
 from truespring.errors import ProblemError
 from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point, nearest_node, surface_distance
+from truespring.mesh.facets import triangles_of
 from truespring.problem import Problem
 from truespring.reactions import SupportForce
 
@@ -425,19 +426,11 @@ def _facets(path: Solution, level: float) -> Floats | None:
     if state is None:
         return None
     if grid.fills:
-        return np.asarray(state.positions[_triangles(mesh.boundary)])
+        return np.asarray(state.positions[triangles_of(mesh.boundary)])
     if grid.cell_dim < 2:
         return None
-    corners = [_triangles(cells[:, : len(CELL_SHAPES[kind].corners)]) for kind, cells in grid.cells.items()]
+    corners = [triangles_of(cells[:, : len(CELL_SHAPES[kind].corners)]) for kind, cells in grid.cells.items()]
     return np.asarray(state.all_positions[np.concatenate(corners)])
-
-
-def _triangles(facets: Ints) -> Ints:
-    """Quadrilaterals as two triangles, all else as it is; of triangles among them the second half is none."""
-    if facets.shape[1] < 4:
-        return facets
-    second = facets[:, [0, 2, 3]]
-    return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])
 
 
 def _surface_distance(model: Solution, reference: Solution) -> SurfaceDistance | None:

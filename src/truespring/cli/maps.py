@@ -70,6 +70,7 @@ def _run(options: argparse.Namespace) -> int:
             adaptive=not options.whole,
             workers=None if options.scheduler else options.workers or 1,
             scheduler=options.scheduler,
+            threads=options.threads or 1,
             progress=None if advance is None else lambda what, done, total: advance(done, 0, total),
         )
     with writing(options.out):

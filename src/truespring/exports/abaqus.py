@@ -5,43 +5,20 @@ Source of the form: its keywords reference. Abaqus was not run on these; Calculi
 
 from collections.abc import Sequence
 
-from truespring.errors import ExportError
 from truespring.exports.decks import (
     LAST_ONLY,
     Dialect,
     Step,
-    check_fem,
     comments,
-    deck,
-    described,
-    fem_element,
-    fem_twin,
-    levels_of,
+    deck_files,
     real,
-    spring_twin,
-    usual_element,
 )
 from truespring.exports.exported import Exported
 
 
 def abaqus(exported: Exported) -> dict[str, str]:
     """Return `springs.inp`, and `fem.inp` where the problem has a continuum that Abaqus can express."""
-    network, levels, problem, files = exported.network, levels_of(exported), exported.problem, {}
-    notes = [
-        "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
-    ]
-    try:
-        check_fem(problem, "saint-venant-kirchhoff")
-        element = usual_element(problem)
-        twin = fem_twin(problem, "saint-venant-kirchhoff", _DIALECT.force_unit, element)
-        what = f"Abaqus {fem_element(problem, element)} elements, NLGEOM=YES"
-        header = [*described(exported, what, springs=False), *_explained("fem"), *_FEM]
-        files["fem.inp"] = deck(_DIALECT, twin, levels, nonlinear=True, continuum=True, header=header)
-    except ExportError as error:
-        notes.append(f"There is no fem.inp beside this file: {error}.")
-    header = [*described(exported, "Abaqus SPRINGA elements", springs=True), *_explained("springs"), *notes]
-    twin = spring_twin(problem, network, _DIALECT.force_unit)
-    return {"springs.inp": deck(_DIALECT, twin, levels, nonlinear=True, continuum=False, header=header), **files}
+    return deck_files(_DIALECT, exported)
 
 
 def _explained(name: str) -> tuple[str, ...]:
@@ -94,4 +71,4 @@ def _output(continuum: bool) -> list[str]:
     ]
 
 
-_DIALECT = Dialect(1.0, _opening, _start, _output)
+_DIALECT = Dialect("Abaqus", "NLGEOM=YES", 1.0, _opening, _start, _output, _explained, _FEM)

@@ -11,16 +11,12 @@ from truespring.exports.decks import (
     LAST_ONLY,
     Dialect,
     Step,
-    check_fem,
     comments,
     deck,
-    described,
-    fem_element,
+    deck_files,
     fem_twin,
-    levels_of,
     real,
     spring_twin,
-    usual_element,
 )
 from truespring.exports.exported import Exported
 from truespring.models.spring_data import PlainSprings
@@ -70,20 +66,7 @@ def spring_deck(problem: Problem, network: PlainSprings, levels: Sequence[float]
 
 def calculix(exported: Exported) -> dict[str, str]:
     """Return `springs.inp`, and `fem.inp` where the problem has a continuum that CalculiX can express."""
-    network, levels, files = exported.network, levels_of(exported), {}
-    notes = [
-        "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
-    ]
-    try:
-        check_fem(exported.problem, "saint-venant-kirchhoff")
-        element = usual_element(exported.problem)
-        what = f"CalculiX {fem_element(exported.problem, element)} elements, NLGEOM"
-        header = [*described(exported, what, springs=False), *_explained("fem"), *_FEM]
-        files["fem.inp"] = fem_deck(exported.problem, levels, "saint-venant-kirchhoff", element, header)
-    except ExportError as error:
-        notes.append(f"There is no fem.inp beside this file: {error}.")
-    header = [*described(exported, "CalculiX SPRINGA elements", springs=True), *_explained("springs"), *notes]
-    return {"springs.inp": spring_deck(exported.problem, network, levels, header), **files}
+    return deck_files(_DIALECT, exported)
 
 
 def _explained(name: str) -> tuple[str, ...]:
@@ -129,4 +112,4 @@ def _output(continuum: bool) -> list[str]:
     ]
 
 
-_DIALECT = Dialect(FORCE_UNIT, comments, _start, _output)
+_DIALECT = Dialect("CalculiX", "NLGEOM", FORCE_UNIT, comments, _start, _output, _explained, _FEM)

@@ -71,16 +71,24 @@ class Dialect:
     """What a program wants otherwise than the others.
 
     Attributes:
+        program: its name.
+        nonlinear: how it is asked for geometric nonlinearity, for headers.
         force_unit: of all forces and what is made of them [N].
         opening: lines before the nodes, made of those of the header.
         start: lines that start a step, for one with or without geometric nonlinearity.
         output: lines that ask for results, for a continuum or for springs.
+        explained: how to run a file of a name, its units and results, in sentences.
+        of_elements: what its finite elements are, in sentences.
     """
 
+    program: str
+    nonlinear: str
     force_unit: float
     opening: Callable[[Sequence[str]], list[str]]
     start: Callable[[Step, bool], list[str]]
     output: Callable[[bool], list[str]]
+    explained: Callable[[str], Sequence[str]]
+    of_elements: Sequence[str]
 
 
 class OwnLoad(NamedTuple):
@@ -391,6 +399,30 @@ def _aside(network: PlainSprings, loading: Loading) -> Floats:
     size = np.linalg.norm(pulled, axis=1)
     share = np.divide(_ASIDE * reach, size, out=np.zeros(n_nodes), where=size > 0)
     return np.asarray(share[:, None] * pulled)
+
+
+# --- the files of a target -------------------------------------------------------------------------
+
+
+def deck_files(dialect: Dialect, exported: Exported) -> dict[str, str]:
+    """Return `springs.inp`, and `fem.inp` where the problem has a continuum that the program can express."""
+    problem, levels, files = exported.problem, levels_of(exported), {}
+    notes = [
+        "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
+    ]
+    try:
+        check_fem(problem, "saint-venant-kirchhoff")
+        element = usual_element(problem)
+        twin = fem_twin(problem, "saint-venant-kirchhoff", dialect.force_unit, element)
+        what = f"{dialect.program} {fem_element(problem, element)} elements, {dialect.nonlinear}"
+        header = [*described(exported, what, springs=False), *dialect.explained("fem"), *dialect.of_elements]
+        files["fem.inp"] = deck(dialect, twin, levels, nonlinear=True, continuum=True, header=header)
+    except ExportError as error:
+        notes.append(f"There is no fem.inp beside this file: {error}.")
+    what = f"{dialect.program} SPRINGA elements"
+    header = [*described(exported, what, springs=True), *dialect.explained("springs"), *notes]
+    twin = spring_twin(problem, exported.network, dialect.force_unit)
+    return {"springs.inp": deck(dialect, twin, levels, nonlinear=True, continuum=False, header=header), **files}
 
 
 # --- headers -------------------------------------------------------------------------------------

@@ -181,3 +181,14 @@ def children_of_facet(
         )
         for facet in facets
     )
+
+
+def triangles_of(facets: Ints) -> Ints:
+    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3).
+
+    Triangles among quadrilaterals, whose last two corners are one, have no second half.
+    """
+    if facets.shape[1] < 4:
+        return facets
+    second = facets[:, [0, 2, 3]]
+    return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])

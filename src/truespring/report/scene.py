@@ -8,12 +8,13 @@ import numpy as np
 from truespring.arrays import Ints
 from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
+from truespring.mesh.facets import triangles_of
 from truespring.report.bodies import path_lines
 from truespring.report.packing import Packing
 from truespring.report.quantity import ROUNDING, quantity
 from truespring.report.result import Result
 from truespring.report.style import error_colors
-from truespring.report.surfaces import edges_of, facets_of, lines_on, outline, triangles_of
+from truespring.report.surfaces import edges_of, facets_of, lines_on, outline
 from truespring.report.undeformed import spring_lines
 
 #: More springs than this are drawn on the surface only.

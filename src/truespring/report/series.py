@@ -10,10 +10,11 @@ from truespring.arrays import Bools, in_space
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
+from truespring.mesh.facets import triangles_of
 from truespring.mesh.files.stl import stl_bytes
 from truespring.mesh.files.vtu_writing import write_vtu
 from truespring.potential import Visible
-from truespring.report.surfaces import facets_of, triangles_of
+from truespring.report.surfaces import facets_of
 
 
 def write_series(path: Solution, folder: Path, name: str) -> None:

@@ -33,17 +33,6 @@ def facets_of(mesh: Mesh) -> Ints:
     return mesh.boundary if mesh.boundary.shape[1] > 2 else np.zeros((0, 3), dtype=np.int64)
 
 
-def triangles_of(facets: Ints) -> Ints:
-    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3).
-
-    Triangles among quadrilaterals, whose last two corners are one, have no second half.
-    """
-    if facets.shape[1] == 3:
-        return facets
-    second = facets[:, [0, 2, 3]]
-    return np.concatenate([facets[:, [0, 1, 2]], second[second[:, 1] != second[:, 2]]])
-
-
 def normals(points: Floats, facets: Ints) -> Floats:
     """Return the unit normals of facets, shape (n, 3); zero where a facet is flat."""
     a, b, c, d = (points[facets[:, corner]] for corner in (0, 1, 2, -1))

@@ -45,6 +45,7 @@ def map_validity(
     adaptive: bool = True,
     workers: int | None = 1,
     scheduler: str | None = None,
+    threads: int = 1,
     progress: Progress | None = None,
 ) -> Validity:
     """Map how far the springs of a study are off FEM, by load level, mesh, material, rule or load type.
@@ -61,6 +62,7 @@ def map_validity(
         adaptive: solve only where a line passes; else the whole grid.
         workers: processes on this machine; 1 solves in this one. None takes as many as cores.
         scheduler: address of a Dask cluster whose workers are taken instead.
+        threads: threads of each worker.
         progress: told what goes on.
 
     Raises StudyError where something does not go together.
@@ -72,7 +74,7 @@ def map_validity(
     with ExitStack() as stack:
         pool = None
         if workers != 1 or scheduler is not None:
-            pool = stack.enter_context(Pool(None if scheduler else workers, scheduler))
+            pool = stack.enter_context(Pool(None if scheduler else workers, scheduler, threads=threads))
         run = _Run(read, law, loads, rules, x, y, ranges or {}, adaptive, pool, progress)
         maps = tuple(run.maps())
     return Validity(
