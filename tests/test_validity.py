@@ -338,6 +338,8 @@ def test_a_range_counts_values(study: Path) -> None:
     axis = axis_of("poisson", body, dict([read_range("poisson=0:0.4:5")]))
     assert axis.values == pytest.approx([0, 0.1, 0.2, 0.3, 0.4]) and axis.start == (0, 1, 2, 3, 4)
     assert axis_of("poisson", body, {}).values == pytest.approx(np.linspace(0, 0.45, 17))
+    depths = axis_of("depth", body, dict([read_range("depth=1:12")]))
+    assert depths.values.tolist() == list(range(1, 13)) and depths.values[[*depths.start]].tolist() == [1, 2, 4, 8, 12]
     with pytest.raises(StudyError, match="at least 2"):
         read_range("poisson=0:0.4:1")
 
