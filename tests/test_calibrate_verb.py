@@ -252,8 +252,8 @@ def test_loads_are_turned_and_those_that_follow_stay() -> None:
     assert aside.supports[1].displacement == pytest.approx(np.array([0.0, 0.007, -0.001]) / np.sqrt(2))
     for axis in range(3):  # of both vectors this is the least, beside the length of each
         small, large = np.roll([0.001, 0.03, 0.04], axis), np.roll([0.2, -4.0, 3.0], axis)
-        loads = [Force("right", tuple(large))]
-        supports = [Fixed("left"), Fixed("top", displacement=tuple(small))]
+        loads = [Force("top", tuple(large))]
+        supports = [Fixed("left"), Fixed("right", displacement=tuple(small))]
         found = turned(replace(solid, supports=supports, loads=loads), 0.3)
         assert found is not None
         about = Rotation.from_rotvec(0.3 * np.eye(3)[axis])
