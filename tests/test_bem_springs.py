@@ -82,6 +82,13 @@ def uniform(problem: ts.Problem) -> tuple[Floats, Floats]:
     return gradient, lam * np.trace(strain) * np.eye(dim) + 2 * mu * strain
 
 
+@pytest.mark.parametrize("unit", [1e-24, 1e24])
+def test_a_block_is_as_stiff_as_its_material_in_any_unit(unit: float) -> None:
+    problem = body(PLANE["squares"])
+    other = replace(problem, material=ts.Material(unit * YOUNG, POISSON))
+    assert whole(other).stiffness == pytest.approx(unit * whole(problem).stiffness, rel=1e-9, abs=1e-9 * unit)
+
+
 @pytest.mark.parametrize(("name", "section"), CASES)
 def test_uniform_strain_makes_uniform_traction(name: str, section: str) -> None:
     """The patch test of tractions: stress times normal on every panel, in the plane to rounding."""

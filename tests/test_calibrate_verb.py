@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.studies import STUDY, changed, written
 from tests.test_examples import EXAMPLES
@@ -17,7 +18,7 @@ from truespring.cli import main
 from truespring.comparison import compare
 from truespring.equilibrium import solve
 from truespring.errors import MeshError, StudyError
-from truespring.loading import Fixed, Moment
+from truespring.loading import Fixed, Force, Moment
 from truespring.material import Material
 from truespring.mesh import box, in_simplices, rectangle, refined
 from truespring.models import Fem, PrescribedSprings, Springs
@@ -249,6 +250,15 @@ def test_loads_are_turned_and_those_that_follow_stay() -> None:
     aside = turned(solid)  # about x, along which nothing moves
     assert aside is not None and aside.supports[0] == solid.supports[0]
     assert aside.supports[1].displacement == pytest.approx(np.array([0.0, 0.007, -0.001]) / np.sqrt(2))
+    for axis in range(3):  # of both vectors this is the least, beside the length of each
+        small, large = np.roll([0.001, 0.03, 0.04], axis), np.roll([0.2, -4.0, 3.0], axis)
+        loads = [Force("top", tuple(large))]
+        supports = [Fixed("left"), Fixed("right", displacement=tuple(small))]
+        found = turned(replace(solid, supports=supports, loads=loads), 0.3)
+        assert found is not None
+        about = Rotation.from_rotvec(0.3 * np.eye(3)[axis])
+        assert found.supports[1].displacement == pytest.approx(about.apply(small))
+        assert found.loads[0].vector == pytest.approx(about.apply(large))
     bent = Problem(problem.mesh, problem.material, problem.section, Fixed("left"), Moment("right", 1e-3))
     assert turned(bent) is None
 

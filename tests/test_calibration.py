@@ -412,3 +412,15 @@ def test_what_does_not_fit_is_refused() -> None:
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")
         with pytest.raises(ProblemError, match=f"other: its {what} is another"):
             ts.calibrate(case, ts.Springs("lloyd"), held_out=apart)
+
+
+def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:
+    problem = cantilever((4, 1))
+    found = ts.calibrate(case_of(problem, ts.Fem("linear"), 1), ts.Springs("lloyd"))
+    assert found.table().height == len(found.rows) == 1
+    assert {"calibration_errors", "calibration_unknowns"} <= found.figures().keys()
+    files = found.write(tmp_path)
+    assert set(files) == {"calibrated.csv", "calibrate.json", "report.html"}
+    assert all(file.is_file() for file in files.values())
+    with pytest.warns(DeprecationWarning, match="figures"):
+        assert set(ts.draw_calibration(found)) == {name.removeprefix("calibration_") for name in found.figures()}

@@ -1,15 +1,19 @@
 """Paths past limit points: trusses in closed form, the star dome, columns that buckle."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from docs.loads_and_paths import circle
+from scipy import sparse
 
 import truespring as ts
 from tests.closed_forms import shallow_truss_force, shallow_truss_limit
 from tests.test_network import CROWN, FORCE, LIMITS, dome, shallow_truss
 from truespring.errors import TruespringError
+from truespring.solvers.continuation import _bordered, _Constraint
 
 
 def truss(rise: float, force: float) -> tuple[ts.Problem, ts.SpringNetwork]:
@@ -168,6 +172,40 @@ def test_arc_length_carries_prescribed_motion() -> None:
     ends = [ts.solve(problem, network, solver).states[-1] for solver in (ts.Newton(load_steps=4), ts.ArcLength())]
     assert ends[1].load_factor == pytest.approx(1.0)
     assert ends[0].positions == pytest.approx(ends[1].positions, abs=1e-10)
+
+
+def test_a_linear_body_needs_one_iteration_and_no_more_is_spent() -> None:
+    problem = ts.Problem(
+        ts.rectangle((4.0, 1.0), (4, 1)),
+        ts.Material(1.0, 0.3),
+        ts.PlaneStress(1.0),
+        ts.Fixed("left"),
+        ts.Force("right", (0.0, 1.0)),
+    )
+    control = ts.DisplacementControl("right-top", "y", to=0.2, steps=2, max_iterations=1)
+    path = ts.solve(problem, ts.Fem("linear"), control)
+    assert path.status is ts.Status.CONVERGED
+    assert [state.iterations for state in path.states] == [0, 1, 1]
+    whole = ts.solve(problem, ts.Fem("linear")).states[-1]
+    factor = 0.2 / float(whole.displacement[ts.named_point(problem.mesh, "right-top"), 1])
+    assert path.states[-1].load_factor == pytest.approx(factor)
+    assert path.states[-1].displacement == pytest.approx(factor * whole.displacement, abs=1e-12)
+
+
+def test_the_bordered_equations_are_met_where_there_is_a_step_at_all() -> None:
+    """K u - a p = -r and w . u + s a = g, at a limit point too; nothing moves where no load grows."""
+    balance: Any = SimpleNamespace(free=np.ones((2, 2), dtype=bool))
+    rng = np.random.default_rng(7)
+    push, weights, force = rng.normal(size=(3, 2, 2))
+    regular = rng.normal(size=(4, 4))
+    for tangent in (regular, regular @ np.diag([1.0, 1.0, 1.0, 0.0])):
+        matrix = sparse.csr_array(tangent)
+        step, advance = _bordered(balance, matrix, push, _Constraint(weights, 0.3, 0.0), force, 0.7)
+        assert tangent @ step.ravel() - advance * push.ravel() == pytest.approx(-force.ravel())
+        assert (weights * step).sum() + 0.3 * advance == pytest.approx(0.7)
+    for push_of, matrix in ((0 * push, sparse.csr_array(regular)), (push, sparse.csr_array(regular * np.inf))):
+        step, advance = _bordered(balance, matrix, push_of, _Constraint(weights, 0.0, 0.0), force, 0.7)
+        assert np.isnan(step).all() and np.isnan(advance)
 
 
 def test_what_cannot_be_controlled_is_refused() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from tests.studies import written
 from truespring.cli import main
 from truespring.converging.converge import _watched
 from truespring.converging.settling import Attempt, refinement, settle
@@ -263,3 +264,11 @@ def test_a_model_whose_quantities_are_all_zero_is_told() -> None:
     }
     found = refinement(attempts, values, 0.01)
     assert not found.settled and "all watched quantities of b are zero" in found.sentence
+
+
+def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:
+    *_, found = ts.converge(written(tmp_path), most=2)
+    assert found.table().height == len(found.rows) == sum(len(one.values) for one in found.quantities) > 4
+    assert [sheet.svg()[:5] for sheet in found.figures().values()] == [b"<?xml"]
+    files = found.write(tmp_path / "out")
+    assert all(file.is_file() and file.parent == tmp_path / "out" / "study" for file in files.values())

@@ -13,6 +13,7 @@ from tests.closed_forms import pressed_pipe
 from truespring.arrays import Bools, Floats
 from truespring.conditions import Refined
 from truespring.errors import TruespringError
+from truespring.loading.moment import _way_to
 from truespring.potential import Potential
 
 SOFT = ts.Material(10e3, 0.3, density=1100.0)
@@ -253,6 +254,21 @@ def test_rotation_of_a_face_counts_whole_turns(angle: float) -> None:
     y = problem.mesh.nodes[:, 1] - 0.05
     rolled = np.stack([(radius - y) * np.sin(turn), radius - (radius - y) * np.cos(turn)], axis=1)
     assert -load.energy(rolled) == pytest.approx(angle, rel=1e-12)
+
+
+def test_whole_turns_are_counted_by_all_edges_along_a_way_from_what_is_held() -> None:
+    for name in ("triangles", "cubes"):
+        mesh = BODIES[name]
+        held = np.repeat(mesh.nodes[:, :1] == 0.0, mesh.dim, axis=1)
+        face = np.flatnonzero(mesh.nodes[:, 0] == mesh.upper[0])
+        way = _way_to(mesh, face, held)
+        nodes = [int(edges[0, 0]) for edges in way.pairs]
+        assert held[nodes[0]].all() and nodes[-1] in face and len(set(nodes)) == len(nodes) > 3
+        beside = {frozenset(edge) for edge in mesh.edges.tolist()}
+        assert all(frozenset(pair) in beside for pair in pairwise(nodes))
+        for node, edges in zip(nodes, way.pairs, strict=True):
+            assert {frozenset(edge) for edge in edges.tolist()} == {edge for edge in beside if node in edge}
+            assert (edges[:, 0] == node).all()
 
 
 # --- a pipe under pressure ---------------------------------------------------------------------------------

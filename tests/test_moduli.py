@@ -1,5 +1,6 @@
 """The moduli that spring lattices realise: solved on a periodic cell, beside closed forms and `truespring.moduli`."""
 
+import itertools
 import math
 
 import numpy as np
@@ -14,6 +15,7 @@ import truespring as ts
 from tests.closed_forms import periodic_elasticity, square_moduli, tensile_test, young_extremes
 from truespring.arrays import Floats
 from truespring.models import findings
+from truespring.models.moduli import _directions
 
 THIRD = 1 / 3
 LLOYD, BULK, FULL = (5 / 16, 7 / 16), (3 / 8, 3 / 8), (17 / 56, 23 / 56)
@@ -537,3 +539,16 @@ def test_a_large_irregular_body_relaxes_as_by_a_factorisation() -> None:
     expected = moved @ (K @ moved) / 14**3
     chosen = np.array([0, 0, 1, 0, 0, 1])
     assert chosen @ told.elasticity @ chosen == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize(("dim", "along"), [(2, 4), (3, 13)])
+def test_directions_that_are_tried_cover_the_axes_and_diagonals_once(dim: int, along: int) -> None:
+    found = _directions(dim)
+    assert np.linalg.norm(found, axis=1) == pytest.approx(np.ones(len(found)))
+    corners = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=dim)))
+    corners = corners[corners.any(axis=1)] / np.linalg.norm(corners[corners.any(axis=1)], axis=1, keepdims=True)
+    near = np.abs(corners @ found.T) > 1 - 1e-12
+    assert len(corners) == 2 * along and (near.sum(axis=1) == 1).all()  # each as one of its two signs
+    some = np.random.default_rng(2).normal(size=(200, dim))
+    some /= np.linalg.norm(some, axis=1, keepdims=True)
+    assert np.degrees(np.arccos(np.abs(some @ found.T).max(axis=1).clip(max=1))).max() < 5

@@ -2,14 +2,19 @@
 
 import math
 from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 
 import truespring as ts
 from tests.closed_forms import bending_factor, buckled_column_tip
+from truespring.solvers.line_search import _positive_neighbours
 
 SOFT = ts.Material(young=1.0, poisson=1 / 3)
 THIN = ts.PlaneStress(1.0)
@@ -452,3 +457,15 @@ def test_no_state_of_a_runaway_counts_as_balanced() -> None:
     assert path.status is not ts.Status.CONVERGED
     assert len(path.states) > 2
     assert max(state.residual for state in path.states) < 1e-8
+
+
+def test_an_indefinite_tangent_is_shifted_by_ever_more_of_its_diagonal() -> None:
+    """The smallest shift that helps is the best: it is tried first."""
+    tangent = sparse.csr_array(np.array([[2.0, 5.0], [5.0, -4.0]]))
+    balance: Any = SimpleNamespace(potential=None, in_blocks=lambda matrix: matrix)
+    first, *others = _positive_neighbours(balance, np.zeros((1, 2)), tangent)
+    assert first is tangent
+    shares = [(one - tangent).diagonal() / [2.0 + 3.0, 4.0 + 3.0] for one in others]
+    assert all(share == pytest.approx(share[0], rel=1e-6) for share in shares)
+    assert all(before[0] < 0.5 * share[0] for before, share in pairwise(shares))
+    assert shares[0][0] < 1e-4 < 1 < shares[-1][0]

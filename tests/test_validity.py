@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 
 import truespring as ts
 from tests.closed_forms import bending_factor, lattice_tension, principal_state
-from tests.studies import STUDY
+from tests.studies import STUDY, changed, written
 from truespring.cli import main
 from truespring.errors import StudyError, TruespringError
 from truespring.study import read_study
@@ -23,7 +24,7 @@ from truespring.validity import Validity, map_validity, reference
 from truespring.validity.axes import axis_of, read_range
 from truespring.validity.bodies import Body, Spot
 from truespring.validity.lines import polylines, spans
-from truespring.validity.loads import LOAD_TYPES
+from truespring.validity.loads import LOAD_TYPES, Bar
 from truespring.validity.refine import LINES, Cells, Rows, crossings
 from truespring.validity.sentences import headline, verdict
 from truespring.validity.solving import Task, run_task
@@ -333,11 +334,42 @@ def test_other_axes(study: Path) -> None:
     assert len(ratios.figures()) == 1 and len(ratios.references) == 2
 
 
+IN_SPACE = (
+    ('shape = "rectangle"', 'shape = "box"'),
+    ('["40 mm", "10 mm"]', '["40 mm", "10 mm", "20 mm"]'),
+    ("elements = [8, 2]", "elements = [4, 2, 2]"),
+    ('[section]\nkind = "plane-stress"\nthickness = "10 mm"\n', ""),
+    ('["0 N", "-0.01 N"]', '["0 N", "-0.01 N", "0 N"]'),
+    ('"lloyd"', '"projected"'),
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "width"),
+    [((("elements = [8, 2]", "elements = [4, 2]"), IN_SPACE[-1]), ()), (IN_SPACE, (2,))],
+    ids=["plane", "space"],
+)
+def test_elements_of_a_body_are_counted_by_depth_and_aspect(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...], width: tuple[int, ...]
+) -> None:
+    """Of 40 mm by 10 mm, and 20 mm in space, where 2 by 2 elements through the depth are 10 mm by 5 mm."""
+    body = Body.of(read_study(written(tmp_path, changed(*changes))))
+    assert (body.depth, body.aspect) == (2, pytest.approx(2.0))
+    assert body.probe == pytest.approx((0.04, 0.005, 0.01)[: body.dim])
+    assert body.counts(3, 2.0) == ((6, 3, *(3 * side for side in width)), True)
+    assert body.counts(1, 3.0) == ((1, 1, *width), False)
+    assert len(body.mesh(Spot(depth=4)).elements) == 8 * 4 * math.prod(4 * side for side in width)
+    assert len(body.mesh(Spot(aspect=1.0)).elements) == 8 * 2 * math.prod(2 * side for side in width)
+    assert body.mesh(Spot()) is body.problem.mesh
+
+
 def test_a_range_counts_values(study: Path) -> None:
     body = Body.of(read_study(study))
     axis = axis_of("poisson", body, dict([read_range("poisson=0:0.4:5")]))
     assert axis.values == pytest.approx([0, 0.1, 0.2, 0.3, 0.4]) and axis.start == (0, 1, 2, 3, 4)
     assert axis_of("poisson", body, {}).values == pytest.approx(np.linspace(0, 0.45, 17))
+    depths = axis_of("depth", body, dict([read_range("depth=1:12")]))
+    assert depths.values.tolist() == list(range(1, 13)) and depths.values[[*depths.start]].tolist() == [1, 2, 4, 8, 12]
     with pytest.raises(StudyError, match="at least 2"):
         read_range("poisson=0:0.4:1")
 
@@ -353,6 +385,20 @@ def test_a_valley_between_two_rows_is_not_filled(study: Path) -> None:
     assert (errors.argmin(axis=1) > 0).all() and len(set(errors.argmin(axis=1).tolist())) > 3
     for first in (0, 4):
         assert lowest[first + 1 : first + 4].max() < lowest[[first, first + 4]].max() + 1e-3
+
+
+@pytest.mark.parametrize("extent", [(4.0, 0.5), (0.5, 4.0), (2.0, 1.0, 0.3)])
+def test_the_standard_force_bends_a_bar_by_its_length(extent: tuple[float, ...]) -> None:
+    """By Timoshenko's beam, 5/6 E / (2 (1 + nu)) taken as 0.4 E."""
+    bar = Bar(extent, 0.7, 30.0)
+    length, height, width = (*extent, 0.7)[:3]
+    area, inertia = width * height, width * height**3 / 12
+    asked = LOAD_TYPES["bend"].standard(bar)
+    (load,) = asked.loads
+    total = np.array(load.vector)
+    assert total.tolist() == [0.0, total[1], 0.0][: len(extent)] and total[1] < 0
+    assert -total[1] * (length**3 / (3 * 30.0 * inertia) + length / (0.4 * 30.0 * area)) == pytest.approx(length)
+    assert asked.probe == pytest.approx((length, height / 2, width / 2)[: len(extent)])
 
 
 def test_loads_are_scaled_one_and_all() -> None:

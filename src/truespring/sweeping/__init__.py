@@ -3,7 +3,6 @@
 from truespring.sweeping.pool import Failure as Failure
 from truespring.sweeping.pool import Pool as Pool
 from truespring.sweeping.pool import require_dask as require_dask
-from truespring.sweeping.pool import run_points as run_points
 from truespring.sweeping.sweep import Sweep as Sweep
 from truespring.sweeping.sweep import plan_sweep as plan_sweep
 from truespring.sweeping.sweep import run_sweep as run_sweep

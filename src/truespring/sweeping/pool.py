@@ -42,22 +42,6 @@ class _LostError(Exception):
     """The scheduler is no more, or cannot be reached."""
 
 
-def run_points(
-    points: Mapping[Key, Any],
-    task: Callable[[Any], Any],
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    report: Report | None = None,
-) -> Iterator[tuple[Key, Any | Failure]]:
-    """Yield the key and the result, or the Failure, of task(value) for every point, as they end.
-
-    One round of a Pool; its arguments are told there. Who has several rounds keeps one Pool for all of them.
-    """
-    with Pool(workers, scheduler, report=report) as pool:
-        yield from pool.run(points, task)
-
-
 class Pool:
     """Workers that solve points, of this machine or of a cluster; closed at the end of a `with` block.
 

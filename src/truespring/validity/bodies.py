@@ -42,7 +42,8 @@ class Body:
     @staticmethod
     def of(study: Study) -> "Body":
         """Return the body of a study; raise StudyError where it is none of elements."""
-        shape = study.keys.mesh if isinstance(study.keys.mesh, schema.ShapeKeys) else None
+        keys = study.keys.mesh
+        shape = keys if isinstance(keys, schema.ShapeKeys) and keys.is_bar else None
         problem = study.problem
         if problem.material is None or problem.mesh.element == "line":
             raise StudyError(f"{study.file}: a plain network has no material: there is no FEM to map it against")

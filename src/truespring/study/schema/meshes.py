@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import or_
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag
 
@@ -41,8 +41,13 @@ class MeshKeys(Keys):
 
 
 class ShapeKeys(MeshKeys):
-    """A shape that truespring meshes itself; a subclass has the keys `shape`, `size`, `elements` and `element`."""
+    """A shape that truespring meshes itself; a subclass has the keys `shape`, `size`, `elements` and `element`.
 
+    Attributes:
+        is_bar: whether it is a rectangle or box with a corner at the origin, for which maps have standard loads.
+    """
+
+    is_bar: ClassVar[bool] = False
     if TYPE_CHECKING:  # each with limits and a description in the subclass
         shape: Any
         size: list[float]
@@ -65,6 +70,8 @@ class ShapeKeys(MeshKeys):
 class RectangleKeys(ShapeKeys):
     """A rectangle, and what it is divided into."""
 
+    is_bar: ClassVar[bool] = True
+
     shape: Literal["rectangle"] = Field(description="a rectangle with a corner in the origin")
     size: Annotated[list[Length], two] = Field(description="lengths along x and y")
     elements: Annotated[list[Count], two] = Field(description="numbers of elements along x and y")
@@ -78,6 +85,8 @@ class RectangleKeys(ShapeKeys):
 
 class BoxKeys(ShapeKeys):
     """A box, and what it is divided into."""
+
+    is_bar: ClassVar[bool] = True
 
     shape: Literal["box"] = Field(description="a box with a corner in the origin")
     size: Annotated[list[Length], three] = Field(description="lengths along x, y and z")
