@@ -9,6 +9,7 @@ import pytest
 
 import truespring as ts
 from truespring.calibration import Curve, LoadCase, Objective, identifiability, make_unknowns, read_curve
+from truespring.calibration.fitted import CaseResult
 from truespring.calibration.full_field import equations, fit_full_field
 from truespring.calibration.objective import relative_errors
 from truespring.errors import ModelError, ProblemError, ReferenceFileError
@@ -380,6 +381,23 @@ def test_the_errors_are_those_of_a_comparison() -> None:
     assert list(relative_errors(fitted, path).values()) == pytest.approx(told.rms_errors, rel=1e-12)
 
 
+def test_what_decides_is_what_decides_in_a_comparison() -> None:
+    problem = cantilever(loads=(), fix=["x"], displacement=(0.01, 0.0))
+    path = ts.solve(problem, ts.Springs("lloyd"), ts.Newton(load_steps=2))
+    case = case_of(problem, ts.Fem("neo-hookean"), 2)
+    found = CaseResult(case, False, path, path)
+    expected = dict(zip((0.5, 1.0), ts.compare(path, case.reference).decisive, strict=True))
+    assert found.deciding(path) == expected and expected[1.0].quantity == "force"
+    assert found.both == (expected[1.0],) * 2 and expected[1.0].support == "right"
+    # Markers and a curve have each their own error; the curve's counts too, which no comparison with markers knows.
+    forces = np.array([1.25 * path.applied_force(state)[:1] for state in path.states])
+    curve = Curve(np.array([0.0, 0.5, 1.0]), "force", np.array([0]), forces)
+    case = LoadCase("x", problem, markers(problem, path), curve, ts.Newton(load_steps=2))
+    found = CaseResult(case, False, path, path)
+    assert found.quantity == "force" and found.pair == pytest.approx((0.2, 0.2))
+    assert found.error(path) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_reference_on_another_mesh_is_carried() -> None:
     law, newton = ts.Fem("neo-hookean"), ts.Newton(load_steps=2)
     fine = ts.solve(cantilever((16, 4)), law, newton)
@@ -404,9 +422,11 @@ def test_what_does_not_fit_is_refused() -> None:
         (lambda: LoadCase("x", problem, case.reference, solver=ts.ArcLength()), ProblemError, "load control"),
         (lambda: ts.calibrate([], ts.Springs("lloyd")), ProblemError, "no load case"),
         (lambda: ts.calibrate(case, ts.Springs("lloyd"), regularisation=-1), ProblemError, "from 0 on"),
+        (lambda: ts.calibrate(case, ts.Springs("lloyd"), evaluations=0), ProblemError, "at least 1"),
     ):
         with pytest.raises(error, match=said):
             call()
+    assert ts.calibrate(case, ts.Springs("lloyd"), evaluations=1).objectives["rule"] > 0
     stiffer = replace(problem, material=ts.Material(20e3, 1 / 3))
     for other, what in ((cantilever((16, 4)), "mesh"), (stiffer, "material")):
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")

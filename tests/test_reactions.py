@@ -401,6 +401,8 @@ def test_nothing_was_made_worse_where_the_force_improved() -> None:
     unknowns = make_unknowns(problem, SPRINGS)
     for before, after, worse in (((0.3, 0.01), (0.15, 0.02), False), ((0.15, 0.02), (0.3, 0.01), True)):
         told = CaseResult(case, True, off(*before), off(*after))
-        assert told.pair == pytest.approx((before[0], after[0]))
+        assert told.pair == pytest.approx((before[0], after[0])) and told.quantity == "force"
         said = [text for text in _warnings(unknowns, np.ones(len(unknowns)), [told]) if "worse" in text]
         assert bool(said) == worse
+    mixed = CaseResult(case, True, off(0.3, 0.01), off(0.01, 0.1))
+    assert mixed.quantity == "displacement" and mixed.pair == pytest.approx((0.3, 0.1))

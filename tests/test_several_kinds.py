@@ -18,6 +18,7 @@ from truespring.cli import main
 from truespring.errors import MeshError, ModelError
 from truespring.mesh import CELL_SHAPES, corner_measures, element_corner_measures, refined
 from truespring.mesh.facets import facet_keys, find_facets
+from truespring.models.reference_element import FEM_KINDS, reference_element
 from truespring.models.strain import uniform_strain, voigt_pairs
 
 PLANE: Callable[[], ts.Mesh] = lambda: plane_of_two((6.0, 4.0), (6, 4))  # noqa: E731
@@ -47,6 +48,23 @@ def body(mesh: ts.Mesh, poisson: float = 0.3, **more: object) -> ts.Problem:
 # --- geometry -------------------------------------------------------------------------------------
 
 
+def into_cell(kind: str, at: Floats) -> tuple[Floats, float]:
+    """A point of the unit square or cube, squeezed into the cell, and by how much."""
+    match kind:
+        case "triangle":
+            return np.array([at[0] * (1 - at[1]), at[1]]), 1 - at[1]
+        case "wedge":
+            return np.array([at[0] * (1 - at[1]), at[1], at[2]]), 1 - at[1]
+        case "tetrahedron":
+            r, s, t = at
+            return np.array([r * (1 - s) * (1 - t), s * (1 - t), t]), (1 - s) * (1 - t) ** 2
+        case "pyramid":
+            r, s, t = at
+            return np.array([(2 * r - 1) * (1 - t), (2 * s - 1) * (1 - t), t]), 4 * (1 - t) ** 2
+        case _:
+            return at, 1.0
+
+
 def integrated(mesh: ts.Mesh) -> tuple[Floats, Floats]:
     """Volume of each element and the integral of each node's shape function, by shape functions and many points."""
     along, weights = np.polynomial.legendre.leggauss(4)
@@ -56,23 +74,27 @@ def integrated(mesh: ts.Mesh) -> tuple[Floats, Floats]:
         shape = CELL_SHAPES[part.kind.vtk]
         for place in np.ndindex(*(4,) * mesh.dim):
             at, weight = along[list(place)], float(np.prod(weights[list(place)]))
-            match part.element:  # a square or cube, squeezed into the cell
-                case "triangle":
-                    at, weight = np.array([at[0] * (1 - at[1]), at[1]]), weight * (1 - at[1])
-                case "wedge":
-                    at, weight = np.array([at[0] * (1 - at[1]), at[1], at[2]]), weight * (1 - at[1])
-                case "tetrahedron":
-                    r, s, t = at
-                    at, weight = np.array([r * (1 - s) * (1 - t), s * (1 - t), t]), weight * (1 - s) * (1 - t) ** 2
-                case "pyramid":
-                    r, s, t = at
-                    at = np.array([(2 * r - 1) * (1 - t), (2 * s - 1) * (1 - t), t])
-                    weight *= 4 * (1 - t) ** 2
+            at, squeezed = into_cell(part.element, at)
+            weight *= squeezed
             corners = mesh.nodes[part.elements]
             jacobian = np.linalg.det(np.einsum("nci,cj->nij", corners, shape.slopes(at[None])[0]))
             volumes[numbers] += weight * jacobian
             np.add.at(shares, part.elements, weight * jacobian[:, None] * shape.shapes(at[None]))
     return volumes, shares
+
+
+@pytest.mark.parametrize("kind", FEM_KINDS)
+def test_gauss_points_are_as_good_as_many_on_undistorted_elements(kind: str) -> None:
+    """Products of the derivatives of two shape functions, which the stiffness of an element is the integral of."""
+    shape, reference = CELL_SHAPES[ts.mesh.ELEMENT_KINDS[kind].vtk], reference_element(kind)
+    along, weights = np.polynomial.legendre.leggauss(4)
+    found = 0.0
+    for place in np.ndindex(*(4,) * shape.dim):
+        at, weight = into_cell(kind, (along[list(place)] + 1) / 2)
+        slopes = shape.slopes(at[None])[0]
+        found = found + np.prod(weights[list(place)] / 2) * weight * np.einsum("ai,bj->abij", slopes, slopes)
+    ours = np.einsum("p,pai,pbj->abij", reference.weights, reference.slopes, reference.slopes)
+    assert ours == pytest.approx(found, abs=1e-12)
 
 
 @every_body

@@ -23,6 +23,7 @@ from truespring.study import read_study
 from truespring.validity import Validity, map_validity, reference
 from truespring.validity.axes import axis_of, read_range
 from truespring.validity.bodies import Body, Spot
+from truespring.validity.deviation import _left_out
 from truespring.validity.lines import polylines, spans
 from truespring.validity.loads import LOAD_TYPES, Bar
 from truespring.validity.refine import LINES, Cells, Rows, crossings
@@ -116,6 +117,18 @@ def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
     assert deviation.probe_errors[1:] == pytest.approx(whole.probe_errors, rel=1e-9)
     between = np.interp(deviation.sizes, deviation.grid, lloyd.errors[2])
     assert deviation.rms_errors == pytest.approx(between, abs=2e-4)
+
+
+@pytest.mark.parametrize("n", [6, 7])
+def test_what_interpolation_misses_is_told_by_every_second_level(n: int) -> None:
+    """Nothing of a cubic, of which a spline through four levels misses nothing; a sixteenth of a half step's error."""
+    size = np.linspace(0.0, 1.0, n) ** 1.5
+    assert _left_out(size, np.stack([size**3, 1 - size**2], axis=1)) == pytest.approx(0.0, abs=1e-12)
+    assert _left_out(size[:4], size[:4, None] ** 4) == 0.0
+    kept = [0, 2, 4, n - 1]
+    cubic = np.poly1d(np.polyfit(size[kept], size[kept] ** 4, 3))
+    off = np.abs(cubic(size) - size**4).max()
+    assert _left_out(size, np.outer(size**4, [3.0, 4.0])) == pytest.approx(5 * off / 8)
 
 
 def test_the_reference_is_converged_and_says_to_what(bent: Validity, study: Path) -> None:
