@@ -1,4 +1,4 @@
-# Needs Python 3.11 or newer and make, nothing else. PYTHON=python3.12 make demo chooses another.
+# Needs only make and Python 3.11 or newer. PYTHON=python3.12 make demo uses another Python.
 PYTHON ?= python3
 BIN := .venv/bin
 
@@ -14,26 +14,26 @@ test: .venv/test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q -n 2 -m "not verification"
 
-# What takes long, and the page of measured figures that it rebuilds.
+# Runs the long tests, and rebuilds docs/verification.md and the picture of the README.
 verification: .venv/test
 	$(BIN)/python -m pytest -q -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
 
-# The paper's Table 1, measured anew: rebuilds docs/table1.md; let nothing else run meanwhile.
+# Measures Table 1 of the paper and rebuilds docs/table1.md. It measures times: run nothing else meanwhile.
 table1: .venv/test
 	$(BIN)/python docs/build_table1.py
 
-# The validity maps of all rules, solved anew: rebuilds docs/validity.md and its pictures, in a quarter of an hour.
+# Solves the validity maps of all rules and rebuilds docs/validity.md and its pictures; takes a quarter of an hour.
 validity: .venv/test
 	$(BIN)/python docs/build_validity.py
 
-# truespring beside CalculiX (ccx on the path), FElupe and scikit-fem: rebuilds docs/performance.md, in an hour or two.
-# What was run is kept in benchmarks/.cache, and goes on where it broke off; SIZES=small is for trying it out.
+# Times truespring, CalculiX (ccx on the path), FElupe and scikit-fem, and rebuilds docs/performance.md in 1 to 2 hours.
+# Results are kept in benchmarks/.cache, so an interrupted run resumes. SIZES=small makes a short trial run.
 bench: .venv/test .venv-peers/installed
 	$(BIN)/python -m benchmarks $(if $(filter small,$(SIZES)),--small)
 
-# The scene of the report that turns, bundled with three.js; needs node. The result is kept in the repository.
+# Bundles the interactive 3D view of reports with three.js; needs node. The result is kept in the repository.
 viewer:
 	cd viewer && npm ci --ignore-scripts && npm run build
 

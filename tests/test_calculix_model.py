@@ -400,7 +400,11 @@ REFUSED: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "unknown law": (CCX + 'law = "hencky"', (), ("models.calculix.law", "'linear' or 'saint-venant-kirchhoff'")),
     "both": (CCX + 'law = "linear"\nsprings = "springs"', (), ("models.calculix", "law and springs")),
     "no model": (CCX + 'springs = "sprigns"', (), ("models.calculix.springs", "did you mean 'springs'")),
-    "no springs": (CCX + 'springs = "linear"', (), ("models.calculix.springs", "'linear' is no model of springs")),
+    "no springs": (
+        CCX + 'springs = "linear"',
+        (),
+        ("models.calculix.springs", "'linear'", "springs model", "there are springs"),
+    ),
     "unknown kind": ('[models.calculix]\nkind = "calculx"', (), ("did you mean 'calculix'",)),
     "volume term": (
         CCX + 'springs = "springs"',

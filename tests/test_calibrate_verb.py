@@ -26,7 +26,7 @@ from truespring.problem import Problem
 from truespring.report.result import head_note
 from truespring.report.series import write_mesh
 from truespring.study import export_study, read_study, run
-from truespring.study.given import read_given, write_given
+from truespring.study.spring_files import read_spring_files, write_spring_files
 from truespring.study.toml import toml_text
 
 NEO = '[models.linear]\nkind = "fem"\nlaw = "linear"\n'
@@ -196,26 +196,26 @@ def test_springs_in_a_file_are_checked(tmp_path: Path) -> None:
     problem = read_study(written(tmp_path)).problem
     potential = Springs("lloyd").potential(problem)
     file, volume = tmp_path / "k.csv", tmp_path / "kappa.csv"
-    write_given(PrescribedSprings(potential.springs, potential.stiffness), file, volume)
-    assert read_given(problem, file).stiffness == pytest.approx(potential.stiffness, rel=1e-15)
+    write_spring_files(PrescribedSprings(potential.springs, potential.stiffness), file, volume)
+    assert read_spring_files(problem, file).stiffness == pytest.approx(potential.stiffness, rel=1e-15)
     names, *rows = file.read_text(encoding="utf-8").splitlines()
     a, b, k = rows[0].split(",")
     for changed_rows, said in (
-        ([*rows[1:]], "1 of 74 springs of the mesh are missing, the first is spring 0-1"),
-        ([f"{b},{a},{k}", *rows], "spring 0-1 is there twice"),
-        ([f"{a},7,{k}", *rows[1:]], ":2: no element of the mesh joins nodes 0 and 7"),
-        ([f"{a},99,{k}", *rows[1:]], ":2: b = 99: the mesh has the numbers 0 to 26"),
-        ([f"{a},{b},-1", *rows[1:]], ":2: stiffness = -1 N/m is negative"),
-        ([f"{a},{b},x", *rows[1:]], ":2: stiffness = 'x' is no number"),
+        ([*rows[1:]], "k.csv: 1 of 74 springs .*missing.* 0-1"),
+        ([f"{b},{a},{k}", *rows], ":3: spring 0-1 .*twice"),
+        ([f"{a},7,{k}", *rows[1:]], ":2: .* nodes 0 and 7 "),
+        ([f"{a},99,{k}", *rows[1:]], ":2: b = 99: .* 0 to 26"),
+        ([f"{a},{b},-1", *rows[1:]], ":2: stiffness = -1 N/m .*allow_negative"),
+        ([f"{a},{b},x", *rows[1:]], ":2: stiffness = 'x' .*number"),
     ):
         file.write_text("\n".join([names, *changed_rows]), encoding="utf-8")
-        with pytest.raises(MeshError, match=said.replace("(", r"\(")):
-            read_given(problem, file)
+        with pytest.raises(MeshError, match=said):
+            read_spring_files(problem, file)
     file.write_text("\n".join([names, *rows]), encoding="utf-8")
     for table, said in (
-        ("", "edge is required and missing; or file"),
+        ("", "edge .*missing.* file"),
         ('file = "k.csv", edge = 0.3', "leave edge, diagonal and body out"),
-        ('edge = 0.3, volume = "kappa.csv"', "file is missing"),
+        ('edge = 0.3, volume = "kappa.csv"', "volume.* needs file"),
     ):
         text = STUDY.replace('rule = "lloyd"', f"stiffness = {{ {table} }}")
         with pytest.raises(StudyError, match=said):

@@ -714,7 +714,7 @@ def test_the_verb_takes_the_springs_that_are_asked_for(tmp_path: Path, capsys: p
         assert main(["export", study, "--to", "json", "--model", name, "--out", str(tmp_path)]) == 0
         stiffness[name] = max(json.loads((tmp_path / "study" / "springs.json").read_text())["stiffness"])
     assert stiffness["springs"] != stiffness["bulk"]
-    for name, why in (("linear", "no model of springs"), ("bulc", "did you mean 'bulk'")):
+    for name, why in (("linear", "not a springs model"), ("bulc", "did you mean 'bulk'")):
         assert main(["export", study, "--to", "json", "--model", name, "--out", str(tmp_path)]) == 2
         assert why in capsys.readouterr().err
 

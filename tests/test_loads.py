@@ -13,7 +13,7 @@ from tests.closed_forms import pressed_pipe
 from truespring.arrays import Bools, Floats
 from truespring.conditions import Refined
 from truespring.errors import TruespringError
-from truespring.loading.moment import _way_to
+from truespring.loading.moment import _route_to
 from truespring.potential import Potential
 
 SOFT = ts.Material(10e3, 0.3, density=1100.0)
@@ -261,12 +261,12 @@ def test_whole_turns_are_counted_by_all_edges_along_a_way_from_what_is_held() ->
         mesh = BODIES[name]
         held = np.repeat(mesh.nodes[:, :1] == 0.0, mesh.dim, axis=1)
         face = np.flatnonzero(mesh.nodes[:, 0] == mesh.upper[0])
-        way = _way_to(mesh, face, held)
-        nodes = [int(edges[0, 0]) for edges in way.pairs]
+        route = _route_to(mesh, face, held)
+        nodes = [int(edges[0, 0]) for edges in route.pairs]
         assert held[nodes[0]].all() and nodes[-1] in face and len(set(nodes)) == len(nodes) > 3
         beside = {frozenset(edge) for edge in mesh.edges.tolist()}
         assert all(frozenset(pair) in beside for pair in pairwise(nodes))
-        for node, edges in zip(nodes, way.pairs, strict=True):
+        for node, edges in zip(nodes, route.pairs, strict=True):
             assert {frozenset(edge) for edge in edges.tolist()} == {edge for edge in beside if node in edge}
             assert (edges[:, 0] == node).all()
 
@@ -385,32 +385,35 @@ def test_a_region_that_turns_starts_from_its_motion() -> None:
 # --- what is refused ------------------------------------------------------------------------------------------
 
 WRONG: dict[str, tuple[Callable[[], ts.Problem], str]] = {
-    "open edge": (lambda: strip(loads=ts.Pressure("right", 10.0)), r"loads\[0\]: this pressure has no potential"),
-    "open edge in space": (lambda: cube(loads=ts.Pressure("top", 10.0)), "no potential.*edge of its surface is free"),
-    "moment in space": (lambda: cube(loads=ts.Moment("right", 1.0)), "prescribe the rotation"),
-    "moment on a node": (lambda: strip(loads=ts.Moment("right-middle", 1.0)), "at least two nodes"),
+    "open edge": (lambda: strip(loads=ts.Pressure("right", 10.0)), r"loads\[0\]: .*pressure has no potential"),
+    "open edge in space": (lambda: cube(loads=ts.Pressure("top", 10.0)), "no potential.*edge.* free"),
+    "moment in space": (lambda: cube(loads=ts.Moment("right", 1.0)), "moment in 3D .*rotation and axis"),
+    "moment on a node": (lambda: strip(loads=ts.Moment("right-middle", 1.0)), "moment .*two nodes"),
     "pressure on a point": (lambda: strip(loads=ts.Pressure("right-middle", 1.0)), "no part of the boundary"),
     "no density": (
         lambda: ts.Problem(
             ts.rectangle((1, 1), (1, 1)), ts.Material(1, 0.3), ts.PlaneStress(1), ts.Fixed("left"), ts.Gravity((0, -1))
         ),
-        "gravity needs the material's density",
+        "gravity needs .*density",
     ),
-    "gravity in another dimension": (lambda: strip(loads=ts.Gravity((0, 0, -9.81))), "3 values, the body has 2"),
+    "gravity in another dimension": (
+        lambda: strip(loads=ts.Gravity((0, 0, -9.81))),
+        "gravity .*3 values.* 2 directions",
+    ),
     "pressure of no number": (
         lambda: strip(loads=ts.Pressure("top", math.nan)),
-        "pressure = nan: must be a finite number",
+        "pressure = nan: .*finite",
     ),
     "turn of a roller": (
         lambda: strip(supports=[ts.Fixed("left"), ts.Fixed("right", fix=["x"], rotation=1.0)]),
-        "turns all directions",
+        "rotation = 1 rad .*fix = .'x'",
     ),
-    "turn without an axis": (lambda: cube(supports=ts.Fixed("left", rotation=1.0)), "needs an axis"),
-    "axis in the plane": (lambda: strip(supports=ts.Fixed("left", rotation=1.0, axis=(0, 0, 1))), "no axis to choose"),
-    "centre without a turn": (lambda: strip(supports=ts.Fixed("left", about=(0.0, 0.0))), "without a rotation"),
+    "turn without an axis": (lambda: cube(supports=ts.Fixed("left", rotation=1.0)), "rotation .*axis in 3D"),
+    "axis in the plane": (lambda: strip(supports=ts.Fixed("left", rotation=1.0, axis=(0, 0, 1))), "plane.*axis"),
+    "centre without a turn": (lambda: strip(supports=ts.Fixed("left", about=(0.0, 0.0))), "about .*without a rotation"),
     "two motions": (
         lambda: strip(supports=[ts.Fixed("left", rotation=1.0), ts.Fixed("left-top")]),
-        "two supports move node",
+        "two supports move node .* along",
     ),
 }
 

@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from truespring import memory
+from truespring.remembering import remembered
 
 GIB = 2**30
 
@@ -61,7 +62,7 @@ def test_answers_are_kept_as_long_as_what_was_asked_lives() -> None:
 
     asked = []
 
-    @memory.remembered
+    @remembered
     def answer(thing: Thing, factor: int = 1) -> list[int]:
         asked.append(factor)
         return [factor]

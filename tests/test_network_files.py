@@ -32,16 +32,16 @@ def test_numbers_in_si_are_enough(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "missing column": ({"nodes": "node,x\na,0\n"}, r"nodes.csv:1: column y is missing"),
+    "missing column": ({"nodes": "node,x\na,0\n"}, r"nodes.csv:1: column y "),
     "misspelt column": (
         {"springs": "a,b,stifness\na,b,1\n"},
         r"springs.csv:1: column 'stifness' is unknown.*stiffness",
     ),
-    "no number": ({"nodes": "x,y\n0,zero\n"}, r"nodes.csv:2: y = 'zero' is no number"),
-    "unknown node": ({"springs": "a,b,stiffness\na,d,1\n"}, r"springs.csv:2: b = 'd' names no node"),
-    "node twice": ({"nodes": NODES + "a,1,1\n"}, "node a is there twice"),
-    "row too short": ({"springs": "a,b,stiffness\na,b\n"}, "springs.csv:2: 2 values, there are 3 columns"),
-    "empty": ({"nodes": ""}, "a line of column names and a row"),
+    "no number": ({"nodes": "x,y\n0,zero\n"}, r"nodes.csv:2: y = 'zero' "),
+    "unknown node": ({"springs": "a,b,stiffness\na,d,1\n"}, r"springs.csv:2: b = 'd' "),
+    "node twice": ({"nodes": NODES + "a,1,1\n"}, "nodes.csv: node a .*twice"),
+    "row too short": ({"springs": "a,b,stiffness\na,b\n"}, "springs.csv:2: 2 values.* 3 columns"),
+    "empty": ({"nodes": ""}, "nodes.csv: .*at least one row"),
     "unit of another kind": ({"nodes": "x [N],y\n0,0\n"}, "nodes.csv:1: x: "),
     "spring of no length": ({"springs": "a,b,stiffness\na,a,1\n"}, "springs.csv: "),
 }
@@ -67,7 +67,7 @@ def frame(*more: tuple[int, int]) -> ts.SpringNetwork:
 def test_a_mechanism_is_refused_by_its_nodes() -> None:
     loose, braced = frame(), frame((0, 2))
     problem = ts.Problem(loose.mesh, supports=ts.Fixed([0, 1]), loads=ts.Force([2], (0.1, 0.0)))
-    with pytest.raises(TruespringError, match="the network is a mechanism: nodes 2, 3 can move"):
+    with pytest.raises(TruespringError, match="mechanism: nodes 2, 3 "):
         ts.solve(problem, loose)
     assert ts.solve(problem, braced).complete
 
@@ -84,5 +84,5 @@ def test_a_chain_that_its_tension_holds_is_none() -> None:
 def test_a_chain_that_hangs_from_one_end_is_one() -> None:
     chain = ts.SpringNetwork([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], [[0, 1], [1, 2]], [5.0, 5.0])
     problem = ts.Problem(chain.mesh, supports=[ts.Fixed([0]), ts.Fixed([2], ["y"])], loads=ts.Force([1], (0.0, 0.1)))
-    with pytest.raises(TruespringError, match="mechanism: node 1 can move"):
+    with pytest.raises(TruespringError, match="mechanism: node 1 "):
         ts.solve(problem, chain)

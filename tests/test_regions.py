@@ -239,7 +239,7 @@ def test_regions_without_elements_are_refused(on: object, said: str) -> None:
 
 
 def test_regions_need_a_material_for_the_rest() -> None:
-    with pytest.raises(ts.TruespringError, match="regions of another material need a material for the rest"):
+    with pytest.raises(ts.TruespringError, match="regions need a material"):
         with_regions(ts.Region([0], SECOND), material=None)
     with pytest.raises(ts.TruespringError, match="a list of Region"):
         with_regions([0])

@@ -30,11 +30,11 @@ def test_quantities_become_si(given: object, dimension: Dimension, wanted: float
 @pytest.mark.parametrize(
     ("given", "dimension", "question"),
     [
-        ("10 mPa", "stress", "'10 mPa' is 0.01 Pa: is 10 MPa meant?.* write \"0.01 Pa\""),
-        ("-2.5mPa", "stress", "is -2.5 MPa meant"),
-        ("160 Mm", "length", 'is 160 mm meant?.* write "160000 km"'),
-        ("10 mpa", "stress", "upper and lower case matter, is 'MPa' meant?"),
-        ("3 KPa", "stress", "is 'kPa' meant?"),
+        ("10 mPa", "stress", '10 mPa.* 0.01 Pa.* 10 MPa meant?.* "0.01 Pa"'),
+        ("-2.5mPa", "stress", " -2.5 MPa meant?"),
+        ("160 Mm", "length", ' 160 mm meant?.* "160000 km"'),
+        ("10 mpa", "stress", "'MPa' meant?"),
+        ("3 KPa", "stress", "'kPa' meant?"),
     ],
 )
 def test_a_unit_in_the_wrong_case_is_asked_for(given: str, dimension: Dimension, question: str) -> None:
@@ -62,5 +62,5 @@ def test_a_unit_in_the_wrong_case_is_asked_for(given: str, dimension: Dimension,
     ],
 )
 def test_what_is_no_force_is_refused(given: str) -> None:
-    with pytest.raises(TruespringError, match="force is wanted"):
+    with pytest.raises(TruespringError, match="a unit of force"):
         to_si(given, "force")

@@ -1,4 +1,4 @@
-"""truespring: mass-spring bodies true to their material, beside FEM.
+"""truespring: mass-spring models that match their material, compared with FEM.
 
 problem  x  model  x  solver  ->  path of equilibria (a Solution)  ->  comparison  ->  report
 """

@@ -1,4 +1,4 @@
-"""CSV files, whose columns have names and units."""
+"""Read CSV files whose header line has names and units."""
 
 import csv
 import difflib
@@ -15,39 +15,39 @@ from truespring.errors import MeshError, TruespringError, nearest
 from truespring.opening import read_file
 from truespring.units import Dimension, unit_size
 
-#: Returns which columns other names may mean: from the names that are not known to those that are.
+#: Function from unknown column names to the known names that they stand for.
 Synonyms = Callable[[Sequence[str]], Mapping[str, str]]
 
-# How a unit may stand behind a name: "x [mm]", "x (mm)"; or glued: "x_mm", "x mm".
+# A name with a unit: "x [mm]", "x (mm)"; or without brackets: "x_mm", "x mm".
 _HEAD = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])])?\s*")
 _GLUED = re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\W\d_]+)")
-# A number as Fortran writes it, 1.0D-03.
+# A number in Fortran's format, 1.0D-03.
 _FORTRAN = re.compile(r"([\d.])[dD]([+-]?\d+)$")
-# Lengths in a picture, which are no unit of length.
+# Units of lengths in images, which have no size in SI units.
 _PIXELS = ("px", "pix", "pixel", "pixels")
-# By the mark that a file of another coding begins with.
+# Encodings by byte order mark.
 _CODINGS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
 class Columns:
-    """Values of a CSV file, separated by commas, semicolons or tabs below a line of names.
+    """A CSV file with a header line; values are separated by commas, semicolons or tabs.
 
-    A unit may stand behind a name: "x [mm]", "x (mm)" or "x_mm"; numbers without one are SI. Names may be capital.
-    Where commas do not separate values, numbers may have decimal commas.
+    A name may have a unit: "x [mm]", "x (mm)" or "x_mm"; numbers without a unit are in SI units. Names are not case
+    sensitive. If values are not separated by commas, numbers may have decimal commas.
 
     Args:
-        file: the CSV file.
-        known: the columns that may be there, and what they measure; others are an error.
-        required: those that must be there.
-        error: what is raised, with file and line, where the file is damaged or misses something.
-        synonyms: what other names mean; where it is given, columns that still are unknown are left out.
-        form: how the first line may look, for messages.
+        file: path of the file.
+        known: dimension of each allowed column, None for columns without a unit; other columns are an error.
+        required: columns that must be present.
+        error: class of the exception, which is raised with file and line if the file is wrong.
+        synonyms: function from unknown names to known ones; with it, columns that remain unknown are ignored.
+        form: example of a header line, for error messages.
 
     Attributes:
-        columns: place of each column that is there, by name.
-        units: the unit of each of them as it is written, empty where there is none.
-        unknown: what was left out, as it is written.
-        n_rows: number of rows below the names.
+        columns: index of each known column in the file, by name.
+        units: unit of each known column as written in the header, by name; empty without a unit.
+        unknown: headers of the columns that were ignored.
+        n_rows: number of rows below the header line.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Columns:
         self._form = f"; the first line may be: {form}" if form else ""
         rows, self._lines, self._separator = self._read()
         if len(rows) < 2:
-            raise error(f"{file}: needs a line of column names and a row at least{self._form}")
+            raise error(f"{file}: needs a header line and at least one row{self._form}")
         self.columns: dict[str, int] = {}
         self.units: dict[str, str] = {}
         self.unknown: list[str] = []
@@ -72,37 +72,37 @@ class Columns:
         missing = [name for name in required if name not in self.columns]
         if missing:
             if self.unknown:
-                self.refuse_unknown()
-            there = ", ".join(self.columns) or "none that is known"
-            raise error(f"{file}:1: column {missing[0]} is missing; there are {there}{self._form}")
+                self.raise_unknown()
+            there = ", ".join(self.columns) or "none"
+            raise error(f"{file}:1: column {missing[0]} is missing; known columns found: {there}{self._form}")
         self._rows = rows[1:]
         self.n_rows = len(self._rows)
         for row, line in zip(rows, self._lines, strict=True):
             if len(row) != len(rows[0]):
-                raise error(f"{file}:{line}: {len(row)} values, there are {len(rows[0])} columns")
+                raise error(f"{file}:{line}: {len(row)} values for {len(rows[0])} columns")
         self._comma = self._has_decimal_commas()
 
     def _read(self) -> tuple[list[list[str]], list[int], str]:
-        """Return the rows that are not blank, their lines, and what separates values."""
+        """Return the rows that are not blank, their line numbers, and the separator."""
         data = read_file(self._file, self._error)
         rows: list[list[str]] = []
         lines: list[int] = []
         try:
             text = data.decode(_CODINGS.get(data[:2], "utf-8-sig"))
             first = next((line for line in text.splitlines() if line.strip()), "")
-            told = re.fullmatch(r"sep=([,;\t])", first.strip("\r\n "))  # as spreadsheets may begin
-            separator = told[1] if told else "\t" if "\t" in first else ";" if ";" in first else ","
+            named = re.fullmatch(r"sep=([,;\t])", first.strip("\r\n "))  # a first line of some spreadsheet programs
+            separator = named[1] if named else "\t" if "\t" in first else ";" if ";" in first else ","
             reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
             for row in reader:
-                if any(cell.strip() for cell in row) and not (told and not rows and reader.line_num == 1):
+                if any(cell.strip() for cell in row) and not (named and not rows and reader.line_num == 1):
                     rows.append(row)
                     lines.append(reader.line_num)
         except (UnicodeDecodeError, csv.Error) as error:
-            raise self._error(f"{self._file} is no CSV file: {error}") from None
+            raise self._error(f"{self._file} is not a CSV file: {error}") from None
         return rows, lines, separator
 
     def _name(self, heads: Sequence[str], synonyms: Synonyms | None) -> None:
-        """Find what each column holds, and its unit."""
+        """Set `columns`, `units`, `unknown` and `_scales` from the header line."""
         read = [(place, head, *self._split(head)) for place, head in enumerate(heads)]
         if synonyms is not None:
             self.unknown += [head for _, head, _, unit in read if unit.lower() in _PIXELS]
@@ -118,10 +118,10 @@ class Columns:
             self.unknown.append(head)
             if synonyms is None or near:
                 self.unknown = [head]
-                self.refuse_unknown()
+                self.raise_unknown()
 
     def _split(self, head: str) -> tuple[str, str]:
-        """Return the name, in the spelling that is known where one is, and the unit in a column's head."""
+        """Return name and unit of a column from its header, a known name in its known spelling."""
         read = _HEAD.fullmatch(head)
         if read is None:
             return head.strip(), ""
@@ -136,13 +136,15 @@ class Columns:
         return name, unit
 
     def _spelt(self, name: str) -> str:
+        """Return a name in lower case if only that is known."""
         return name if name in self._known or name.lower() not in self._known else name.lower()
 
     def _dimension(self, name: str) -> bool:
-        """Whether a column of this name, or of one that may mean another, has a unit."""
+        """Return whether a column of this name may have a unit; an unknown name may."""
         return self._known.get(name, "length") is not None
 
     def _is_unit(self, text: str) -> bool:
+        """Return whether a text is a unit of any known column."""
         for dimension in {one for one in self._known.values() if one is not None}:
             try:
                 unit_size(text, dimension)
@@ -151,8 +153,8 @@ class Columns:
             return True
         return False
 
-    def refuse_unknown(self) -> NoReturn:
-        """Raise for the first column that is not known."""
+    def raise_unknown(self) -> NoReturn:
+        """Raise an error that names the first unknown column."""
         name = self.unknown[0].strip()
         allowed = ", ".join(self._known)
         raise self._error(
@@ -160,11 +162,12 @@ class Columns:
         )
 
     def _column(self, name: str, place: int, unit: str, head: str) -> None:
+        """Add a known column with its index in the file and its unit; raise an error for a duplicate or wrong unit."""
         if name in self.columns:
-            raise self._error(f"{self._file}:1: column {name} is there twice, the second is '{head.strip()}'")
+            raise self._error(f"{self._file}:1: column {name} is there twice, the second time as '{head.strip()}'")
         dimension = self._known[name]
         if unit and dimension is None:
-            raise self._error(f"{self._file}:1: column {name} has no unit")
+            raise self._error(f"{self._file}:1: column {name} cannot have a unit")
         try:
             self._scales[name] = unit_size(unit, dimension) if unit and dimension else 1.0
         except TruespringError as error:
@@ -172,7 +175,7 @@ class Columns:
         self.columns[name], self.units[name] = place, unit
 
     def _has_decimal_commas(self) -> bool:
-        """Whether numbers have decimal commas; raise where some have commas, others points."""
+        """Return whether numbers have decimal commas; raise an error if some have commas and others points."""
         if self._separator == ",":
             return False
         numbers = [place for name, place in self.columns.items() if self._known[name] is not None]
@@ -185,36 +188,37 @@ class Columns:
         if len(found) > 1:
             (comma, line), (point, _) = found[","], found["."]
             raise self._error(
-                f"{self._file}:{line}: '{comma}' has a comma, '{point}' a point: write one decimal sign, and none "
-                "between thousands"
+                f"{self._file}:{line}: '{comma}' has a comma, '{point}' a point: use one decimal sign, and no "
+                "thousands separator"
             )
         return "," in found
 
     def texts(self, name: str) -> list[str]:
-        """Return a column as it stands."""
+        """Return the texts of a column without surrounding blanks."""
         return [row[self.columns[name]].strip() for row in self._rows]
 
     def numbers(self, name: str) -> Floats:
-        """Return a column in SI units, shape (n_rows,)."""
+        """Return a column as numbers in SI units, shape (n_rows,)."""
 
         def convert(text: str) -> float:
             text = text.replace(",", ".") if self._comma else text
             return float(_FORTRAN.sub(r"\1e\2", text))
 
         return self._scales[name] * np.array(
-            [self._value(name, row, convert, "is no number") for row in range(self.n_rows)]
+            [self._value(name, row, convert, "is not a number") for row in range(self.n_rows)]
         )
 
     def line(self, row: int) -> int:
-        """Return the line of the file that a row stands in."""
+        """Return the line number of a row in the file."""
         return self._lines[1 + row]
 
     def known(self, name: str, row: int, number: dict[str, int]) -> int:
-        """Return the number of the node that a row names in a column."""
-        place: int = self._value(name, row, lambda text: number[text], "names no node")
+        """Return the number of the node whose name is in a column of a row, where `number` has the numbers by name."""
+        place: int = self._value(name, row, lambda text: number[text], "is not the name of a node")
         return place
 
     def _value(self, name: str, row: int, convert: Callable[[str], Any], wrong: str) -> Any:
+        """Return the converted text of a cell; an error message ends with `wrong`."""
         text = self._rows[row][self.columns[name]].strip()
         try:
             return convert(text)

@@ -1,22 +1,22 @@
-"""Objects of the user's own in the place of ours: what they do not answer has the default of our base class."""
+"""Complete objects of users, such as models and solvers, by the defaults of a base class."""
 
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 
 
-def completed(given: Any, base: type[T]) -> T:
-    """Return `given` as an instance of `base`: attributes that it lacks are those of `base`.
+def completed(custom: Any, base: type[T]) -> T:
+    """Return `custom` as an instance of `base`: attributes that it lacks are those of `base`.
 
-    `base` takes no arguments to be made. `label`, where it is lacking, is the name of the class of `given`.
+    `base` must take no arguments. The default of `label` is the class name of `custom`.
     """
-    if isinstance(given, base):
-        return given
+    if isinstance(custom, base):
+        return custom
 
     class Completed(base):  # type: ignore[valid-type, misc]
         def __getattribute__(self, name: str) -> Any:
-            own = not name.startswith("__") and hasattr(given, name)
-            return getattr(given, name) if own else super().__getattribute__(name)
+            has = not name.startswith("__") and hasattr(custom, name)
+            return getattr(custom, name) if has else super().__getattribute__(name)
 
-    Completed.__name__ = type(given).__name__
+    Completed.__name__ = type(custom).__name__
     return Completed()

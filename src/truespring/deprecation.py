@@ -1,4 +1,4 @@
-"""Former names of arguments, accepted with a warning for one release."""
+"""Accept former names of arguments for one release, with a warning."""
 
 import warnings
 from collections.abc import Callable

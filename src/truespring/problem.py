@@ -1,4 +1,4 @@
-"""The problem: what is asked, stated once and frozen. Mesh, material, section, supports, loads."""
+"""The problem to solve: mesh, material, section, regions, supports and loads."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,9 +23,9 @@ _Found = TypeVar("_Found")
 
 @dataclass(frozen=True)
 class Region:
-    """A part of the body of another `material`.
+    """Elements of another `material`.
 
-    `on` is an element group of the mesh, a Box that holds the centres of its elements, or element numbers.
+    `on` is an element group of the mesh, a Box that contains the centres of the elements, or element numbers.
     """
 
     on: Selection
@@ -34,14 +34,19 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A body, how it is held and what pulls at it.
+    """A body with its supports and loads.
 
-    `material` and `section` may be absent where the model brings its own stiffness (a SpringNetwork);
-    a body in three dimensions has the section Solid by itself. Where `regions` overlap the last one counts.
-    `stated` is false of a body that another program's file tells of, without what held and loaded it: it has a mesh
-    only, and cannot be solved.
-    Raises ProblemError or MeshError where the parts do not fit, nothing loads the body, or the
-    supports leave it, or a part of it that nothing joins to the rest, free to move as a rigid body.
+    Attributes:
+        mesh: the mesh.
+        material: the material; None if the model has its own stiffness (a SpringNetwork).
+        section: PlaneStress or PlaneStrain for a plane body; in 3D Solid, the default.
+        supports: supports, one or several.
+        loads: loads, one or several.
+        regions: elements of other materials; where regions overlap, the last one applies.
+        stated: False for a result of another program, of which only the mesh is known; it cannot be solved.
+
+    Raises ProblemError or MeshError if the parts do not fit together, if there is no load, or if the body or a
+    disconnected part of it can move as a rigid body.
     """
 
     mesh: Mesh
@@ -63,31 +68,30 @@ class Problem:
         if self.section is not None and (self.section.dim == 3) != (self.mesh.element_dim == 3):
             raise ProblemError(f"section = {self.section!r} does not fit a mesh of {self.mesh.kinds} elements")
         if self.regions and self.material is None:
-            raise ProblemError("regions of another material need a material for the rest")
-        _ = self.material_numbers  # a region that selects nothing is refused here
+            raise ProblemError("regions need a material for the rest of the body")
+        _ = self.material_numbers  # raises MeshError for a region without elements
         if not self.stated:
             return
         loading = self.loading
         acting = loading.external_force[~loading.held].any() or loading.following
         if not acting and not loading.motion().any():
             held = " in a direction that is free" if loading.external_force.any() else ""
-            raise NoLoadError(
-                f"nothing loads the body{held}: give a load, or a support with a displacement that is not zero"
-            )
-        self._refuse_rigid_motion()
+            raise NoLoadError(f"nothing loads the body{held}: add a load, or a support with a nonzero displacement")
+        self._check_rigid_motion()
 
     @cached_property
     def materials(self) -> tuple[Material, ...]:
-        """Each material that an element has, once: that of the body, then those of the regions; empty without one."""
+        """The distinct materials of the elements: that of the body first, then those of the regions."""
         return tuple(self._materials[0])
 
     @cached_property
     def material_numbers(self) -> Ints:
-        """The place in `materials` of each element's own, shape (n_elements,)."""
+        """Index in `materials` of the material of each element, shape (n_elements,)."""
         return self._materials[1]
 
     @cached_property
     def _materials(self) -> tuple[list[Material], Ints]:
+        """Distinct materials, and the index of the material of each element."""
         if self.material is None:
             return [], np.zeros(len(self.mesh.elements), dtype=np.int64)
         named = list(dict.fromkeys([self.material, *(region.material for region in self.regions)]))
@@ -99,14 +103,14 @@ class Problem:
 
     @cached_property
     def homogeneous(self) -> "tuple[Problem, ...]":
-        """The problem once for each of `materials`, its body all of that one; itself where there is but one."""
+        """For each of `materials` the problem with the whole body of that material."""
         if not self.regions:
             return (self,)
         return tuple(replace(self, material=material, regions=()) for material in self.materials)
 
     @cached_property
     def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":
-        """The body kind by kind of its elements: their numbers, and a problem of them alone without what acts on it."""
+        """For each kind of elements their numbers, and a problem of these elements alone without supports and loads."""
         if self.mesh.element != MIXED:
             return ((np.arange(len(self.mesh.elements)), self),)
         return tuple(
@@ -125,12 +129,12 @@ class Problem:
         )
 
     def of_elements(self, value: Callable[[Material], float]) -> Floats:
-        """Return a value of each element's own material, shape (n_elements,)."""
+        """Return `value` of the material of each element, shape (n_elements,)."""
         return np.array([value(material) for material in self.materials])[self.material_numbers]
 
     @cached_property
     def loading(self) -> Loading:
-        """Forces and prescribed displacements at load factor 1."""
+        """Forces, held directions and prescribed displacements at load factor 1."""
         held, displacement = np.zeros(self.mesh.nodes.shape, dtype=bool), np.zeros(self.mesh.nodes.shape)
         moved = np.zeros(self.mesh.nodes.shape)
         for support in self.held:
@@ -138,7 +142,7 @@ class Problem:
             if support.turn is not None:
                 motion = motion + support.turn.motion(1.0)
             for axis in support.directions:
-                self._refuse_two_motions(support.nodes, axis, held, moved, motion[:, axis])
+                self._check_one_motion(support.nodes, axis, held, moved, motion[:, axis])
                 held[support.nodes, axis] = True
                 displacement[support.nodes, axis] = support.motion[axis]
                 moved[support.nodes, axis] = motion[:, axis]
@@ -148,26 +152,29 @@ class Problem:
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
-        """What each support holds."""
+        """The nodes and directions that each support holds."""
         return tuple(held_by(self.mesh, support) for support in self.supports)
 
     @cached_property
     def body(self) -> Body:
-        """What loads act on."""
+        """The body that loads act on."""
         dense = bool(self.materials) and all(material.density is not None for material in self.materials)
         density = self.of_elements(lambda material: material.density or 0.0) if dense else None
         return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density)
 
     def spreads(self, body: Body) -> tuple[Spread, ...]:
-        """Return the dead loads over the cells of `body` that carry them; it may have more nodes than the mesh."""
+        """Return the dead loads over the cells of `body`, which may have mid-edge nodes."""
         return tuple(self._of_each_load(lambda load: load.spread(body)))
 
     def following(self, body: Body, held: Bools) -> tuple[Potential, ...]:
-        """Return the loads that follow `body`, whose nodes are held where `held` is true, shape (n_nodes, dim)."""
+        """Return the potentials of the loads that follow `body`.
+
+        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim).
+        """
         return tuple(self._of_each_load(lambda load: load.following(body, held)))
 
     def _of_each_load(self, ask: Callable[[Load], _Found | None]) -> Iterator[_Found]:
-        """Yield what each load answers, if anything; an error names the load."""
+        """Yield `ask(load)` for each load, except None; raise LoadError with the number of a load that raises."""
         for number, load in enumerate(self.loads):
             try:
                 found = ask(load)
@@ -178,15 +185,16 @@ class Problem:
 
     @property
     def rims(self) -> Ints:
-        """The edges that loads in space need held around their surfaces, by their ends, shape (n, 2)."""
+        """Edges of loaded surfaces that loads in 3D need held, as node numbers, shape (n, 2)."""
         return np.concatenate([np.zeros((0, 2), dtype=np.int64), *(load.rim(self.mesh) for load in self.loads)])
 
     def scaled(self, factor: float) -> "Problem":
-        """Return the problem with every load and every prescribed motion times a factor."""
+        """Return the problem with all loads and prescribed motions multiplied by a factor."""
         loads = [load.scaled(factor) for load in self.loads]
         return replace(self, loads=loads, supports=[support.scaled(factor) for support in self.supports])
 
-    def _refuse_two_motions(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
+    def _check_one_motion(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
+        """Raise ProblemError if an earlier support prescribes another motion [m] of the nodes along an axis."""
         clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))
         if clash.size:
             first = int(clash[0])
@@ -195,8 +203,8 @@ class Problem:
                 f"{motion[first]:g} m: a node has one prescribed motion"
             )
 
-    def _refuse_rigid_motion(self) -> None:
-        """Name a rigid motion that no support hinders: equilibrium would not be unique, or not exist."""
+    def _check_rigid_motion(self) -> None:
+        """Raise ProblemError if supports do not prevent a rigid-body motion: no unique equilibrium would exist."""
         parts = self.mesh.parts
         by_part = np.argsort(parts, kind="stable")
         several = np.split(by_part, np.flatnonzero(np.diff(parts[by_part])) + 1)
@@ -207,17 +215,14 @@ class Problem:
             body = "the body"
             if len(several) > 1:
                 place = ", ".join(f"{coordinate:.6g}" for coordinate in self.mesh.nodes[nodes].mean(axis=0))
-                body = (
-                    f"one of {len(several)} parts that nothing joins, disconnected without support enough "
-                    f"({len(nodes)} nodes about ({place}) m),"
-                )
+                body = f"one of {len(several)} disconnected parts ({len(nodes)} nodes about ({place}) m),"
             raise ProblemError(
                 f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
             )
 
 
 def sample(problem: Problem, elements: Ints) -> Problem:
-    """Return the elements of these numbers alone, each apart from the others, as a problem: held, moved somehow."""
+    """Return a problem of some elements that share no nodes; arbitrary supports make it valid."""
     mesh, numbers = problem.mesh, problem.material_numbers[elements]
     nodes = np.arange(mesh.kind.n_nodes * len(elements))
     corners = mesh.elements[elements]
@@ -231,7 +236,7 @@ def sample(problem: Problem, elements: Ints) -> Problem:
 
 
 def _regions_of(problem: Problem, numbers: Ints) -> list[Region]:
-    """The regions of elements with the material of these numbers."""
+    """Return a region for each material, where `numbers` has the material of each element, shape (n_elements,)."""
     return [
         Region(np.flatnonzero(numbers == number), material)  # type: ignore[arg-type]
         for number, material in enumerate(problem.materials)
@@ -240,33 +245,36 @@ def _regions_of(problem: Problem, numbers: Ints) -> list[Region]:
 
 
 def _rigid_freedom(nodes: Floats, held: Bools) -> str | None:
-    """How `nodes` [m] may move as a rigid body though some of their directions are `held`, None where they can't."""
+    """Return a rigid-body motion of `nodes` [m] that the `held` directions do not prevent, None if there is none.
+
+    Both arrays have shape (n, dim). The result ends "free to move ...": "along y" or "by turning".
+    """
     if held.all():
         return None
-    tolerance = 1e-9 * np.sqrt(nodes.size)  # nodes on a line have a turn that moves nothing
-    hindered = _rigid_rank(nodes, held, tolerance)
-    if hindered == n_modes(nodes.shape[1]) or 0 < hindered == _rigid_rank(nodes, np.ones_like(held), tolerance):
+    tolerance = 1e-9 * np.sqrt(nodes.size)  # a rotation about a line does not move its nodes
+    rank = _rigid_rank(nodes, held, tolerance)
+    if rank == n_modes(nodes.shape[1]) or 0 < rank == _rigid_rank(nodes, np.ones_like(held), tolerance):
         return None
     free = [axis for axis, there in zip(AXES, held.T, strict=False) if not there.any()]
     return f"along {', '.join(free)}" if free else "by turning"
 
 
-def _rigid_rank(nodes: Floats, chosen: Bools, tolerance: float) -> int:
-    """The rank of the rigid-body modes of `nodes` [m] in the directions chosen: singular values above a tolerance."""
+def _rigid_rank(nodes: Floats, held: Bools, tolerance: float) -> int:
+    """Return the rank of the rigid-body modes of `nodes` [m] in the `held` directions: singular values > tolerance."""
     places = centred(nodes)
     upper = np.zeros((0, n_modes(nodes.shape[1])))
     for part in slices(len(nodes), 8 * nodes.shape[1] * upper.shape[1]):
-        if chosen[part].any():
-            modes = modes_at(places[part])[chosen[part].ravel()]
+        if held[part].any():
+            modes = modes_at(places[part])[held[part].ravel()]
             upper = np.asarray(np.linalg.qr(np.concatenate([upper, modes]), mode="r"))
     return int((np.linalg.svd(upper, compute_uv=False) > tolerance).sum())
 
 
-def _several(given: object, kind: type, name: str, allowed: str) -> tuple[Any, ...]:
-    """Return one or several of a kind as a tuple; raise ProblemError for anything else."""
-    several = (given,) if isinstance(given, kind) else given
+def _several(value: object, kind: type, name: str, allowed: str) -> tuple[Any, ...]:
+    """Return one instance of a class or a sequence of them as a tuple; raise ProblemError for anything else."""
+    several = (value,) if isinstance(value, kind) else value
     if not isinstance(several, Sequence) or not all(isinstance(one, kind) for one in several):
-        raise ProblemError(f"{name} = {given!r}: must be a list of {allowed}")
+        raise ProblemError(f"{name} = {value!r}: must be a list of {allowed}")
     return tuple(several)
 
 

@@ -1,4 +1,4 @@
-"""Models whose solution comes from elsewhere: from another program, or from a file."""
+"""Models that another program solves, and solutions that are read from a file."""
 
 from dataclasses import dataclass
 
@@ -9,26 +9,26 @@ from truespring.solvers import Reporter, Solver
 
 
 class Program(Model):
-    """A model that another program solves: a subclass gives `kind`, `label_on` and `run`, and has no potential."""
+    """A model without a potential that another program solves; a subclass defines `kind`, `label_on` and `run`."""
 
     any_mesh = False
 
     def check_run(self, problem: Problem, solver: Solver) -> None:
-        """Raise TruespringError where the program cannot be run on the problem; solve nothing."""
+        """Raise TruespringError if the program cannot solve the problem; solve nothing."""
 
     def run(
         self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
     ) -> Solution:
-        """Return the equilibria at the load levels of the solver; the program has `timeout` seconds at most."""
+        """Run the program for at most `timeout` seconds; return the equilibria at the load levels of the solver."""
         raise NotImplementedError(f"{type(self).__name__} has no method run(problem, solver, report, timeout)")
 
 
 @dataclass(frozen=True, eq=False)
 class ReadSolution(Program):
-    """A solution that was read from a file, in the place of a model.
+    """A solution from a file, used as a model of a study.
 
     Attributes:
-        solution: what the file holds.
+        solution: the solution.
     """
 
     solution: Solution
@@ -37,7 +37,7 @@ class ReadSolution(Program):
 
     @property
     def kind(self) -> str:  # type: ignore[override]
-        """The kind of the solution, its file's format."""
+        """The kind of the solution, the format of its file."""
         return self.solution.kind
 
     @property

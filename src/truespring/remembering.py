@@ -1,4 +1,4 @@
-"""Answers that are computed once for each object and kept as long as it lives."""
+"""Cache results of functions per object, for the lifetime of the object."""
 
 from collections.abc import Callable
 from functools import update_wrapper
@@ -7,23 +7,23 @@ from weakref import WeakKeyDictionary
 
 Owner = TypeVar("Owner")
 Arguments = ParamSpec("Arguments")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 
 def remembered(
-    function: Callable[Concatenate[Owner, Arguments], Answer],
-) -> Callable[Concatenate[Owner, Arguments], Answer]:
-    """Return a function that keeps its answers, by object and hashable arguments, as long as the object lives.
+    function: Callable[Concatenate[Owner, Arguments], Result],
+) -> Callable[Concatenate[Owner, Arguments], Result]:
+    """Cache a function by its first argument, held weakly, and its other arguments, which must be hashable.
 
-    The answers must not hold the object themselves.
+    Results must not refer to the first argument, which would otherwise never be freed.
     """
-    kept: WeakKeyDictionary[Owner, dict[object, Answer]] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[Owner, dict[object, Result]] = WeakKeyDictionary()
 
-    def remembering(owner: Owner, /, *arguments: Arguments.args, **named: Arguments.kwargs) -> Answer:
-        answers = kept.setdefault(owner, {})
+    def remembering(owner: Owner, /, *arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
+        results = cache.setdefault(owner, {})
         key = arguments, tuple(sorted(named.items()))
-        if key not in answers:
-            answers[key] = function(owner, *arguments, **named)
-        return answers[key]
+        if key not in results:
+            results[key] = function(owner, *arguments, **named)
+        return results[key]
 
     return update_wrapper(remembering, function)

@@ -1,3 +1,3 @@
-"""The command line: parses, calls, prints; nothing else."""
+"""The command line: parse arguments, call the library, print results."""
 
 from truespring.cli.command import main as main

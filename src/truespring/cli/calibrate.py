@@ -10,25 +10,36 @@ from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, one_of
 def _add(parser: argparse.ArgumentParser) -> None:
     from truespring.calibration import UNKNOWNS
 
-    parser.add_argument("study", help="study whose springs are fitted, under its load")
-    parser.add_argument("case", nargs="*", help="studies of the same body whose loads are fitted too")
+    parser.add_argument("study", help="study with the springs to fit, under its load")
+    parser.add_argument("case", nargs="*", help="studies of the same body with further loads to fit")
     parser.add_argument(
-        "--held-out", nargs="+", default=[], metavar="CASE", help="studies whose loads are used for testing only"
+        "--held-out",
+        nargs="+",
+        default=[],
+        metavar="CASE",
+        help="studies of the same body with loads that only test the fit",
     )
     parser.add_argument(
         "--unknowns",
         default="class",
         metavar="KIND",
         **one_of(UNKNOWNS),
-        help=f"what one unknown stiffness is for: {', '.join(UNKNOWNS)}; default: class",
-    )
-    parser.add_argument("--to", metavar="NAME", help="reference in the studies, default: neo-Hookean FEM, if there")
-    parser.add_argument("--markers", type=Path, metavar="FILE", help="markers (.csv) measured under the study's load")
-    parser.add_argument(
-        "--curve", type=Path, metavar="FILE", help="force-displacement curve (.csv) measured under the study's load"
+        help=f"springs that share one unknown stiffness: {', '.join(UNKNOWNS)}; default: class",
     )
     parser.add_argument(
-        "--regularisation", type=float, metavar="R", help="weight of the pull toward the rule, default: 0.01"
+        "--to", metavar="NAME", help="reference model of the studies, default: neo-Hookean FEM if they have it"
+    )
+    parser.add_argument(
+        "--markers", type=Path, metavar="FILE", help="markers (.csv) that were measured under the load of the study"
+    )
+    parser.add_argument(
+        "--curve",
+        type=Path,
+        metavar="FILE",
+        help="force-displacement curve (.csv) that was measured under the load of the study",
+    )
+    parser.add_argument(
+        "--regularisation", type=float, metavar="R", help="weight of the deviation from the rule, default: 0.01"
     )
     add_out(parser)
 
@@ -80,7 +91,7 @@ CALIBRATE = Verb(
     _add,
     _run,
     (
-        "truespring calibrate examples/bending.toml --held-out examples/loads/bending_slanted.toml",
-        "truespring calibrate strip.toml --to nonlinear --unknowns direction-row",
+        "truespring calibrate strip.toml",
+        "truespring calibrate strip.toml --to linear --unknowns direction-row",
     ),
 )

@@ -1,4 +1,4 @@
-"""The verb `check`: read a study and print what would be solved."""
+"""The verb `check`: check a study and print its mesh, loads, supports and moduli."""
 
 import argparse
 from pathlib import Path
@@ -18,7 +18,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="folder for the picture of supports and loads, default: out; with --quiet or --json none unless given",
+        help="folder for the picture of supports and loads, default: out; none with --quiet or --json",
     )
 
 
@@ -58,7 +58,7 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
         screen.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
     screen.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
     for note in plan["mesh_notes"]:
-        screen.print(f"the mesh: {note}")
+        screen.print(f"note on the mesh: {note}")
     screen.print(f"held nodes: {held}")
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
     motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
@@ -78,7 +78,7 @@ CHECK = Verb(
     _run,
     (
         "truespring check strip.toml",
-        "truespring check examples/bending.toml examples/tissue.toml --verbose",
+        "truespring check strip.toml mesh.toml --verbose",
     ),
     ("verbose", "json", "quiet", "threads"),
 )

@@ -1,4 +1,4 @@
-"""The command: runs one verb and turns whatever happens into an exit code and a line on standard error."""
+"""Run one verb; convert exceptions to exit codes and messages on standard error."""
 
 import argparse
 import gc
@@ -21,16 +21,16 @@ _ONLY_PRINTING = ("--json", "--quiet", "-q", "--verbose", "-v")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code: 0 converged, 1 not, 2 the input is wrong."""
+    """Run the command line and return its exit code, one of those in `truespring.cli.verb`."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed before the command began: the next file opened would take its place
+        if stream is None:  # closed by the caller: the next opened file would get its descriptor
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
-        elif isinstance(stream, io.TextIOWrapper):  # a character that a terminal cannot show is no reason to stop
+        elif isinstance(stream, io.TextIOWrapper):  # no error for characters that the terminal cannot show
             stream.reconfigure(errors="backslashreplace")
     try:
         code = _run_verb(sys.argv[1:] if arguments is None else list(arguments))
-    except SystemExit as end:  # from the parser, which has printed help or what is wrong
+    except SystemExit as end:  # from the parser, after it has printed the help or an error
         code = end.code if isinstance(end.code, int) else CONVERGED
     try:
         sys.stdout.flush()
@@ -41,9 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _output_failed(error: OSError) -> int:
-    """Return the exit code for standard output that cannot be written; drop what Python would still write to it.
+    """Return the exit code for an error of standard output, and redirect further output to the null device.
 
-    A reader that has closed its end, such as `head`, has read enough: nothing is printed then.
+    Print the error, except for a closed pipe: its reader, such as `head`, needs no more.
     """
     closed = isinstance(error, BrokenPipeError)
     if not closed:
@@ -54,6 +54,7 @@ def _output_failed(error: OSError) -> int:
 
 
 def _run_verb(arguments: list[str]) -> int:
+    """Parse and run a command line; return its exit code, and print an error as one line."""
     try:
         options = parse(arguments)
         if options is None:
@@ -73,23 +74,23 @@ def _run_verb(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except OSError as error:
-        if error.filename is None:  # a stream: errors of files name the file
+        if error.filename is None:  # an error of a stream; errors of files have a file name
             return _output_failed(error)
         say(f"{error.filename}: {error.strerror}")
         return NOT_CONVERGED
     except Exception as error:
-        if sys.flags.dev_mode:  # python -X dev shows where
+        if sys.flags.dev_mode:  # with python -X dev show the traceback
             raise
         say(f"internal error, please report it with the study: {type(error).__name__}: {one_line(str(error))}")
         return NOT_CONVERGED
 
 
 def _load(options: argparse.Namespace) -> None:
-    """Import what every verb but `new` needs with the garbage collector off, and exempt it from later collections.
+    """Import the library without garbage collection, and exclude its objects from later collections.
 
-    Modules stay in memory; scanning them again and again took a tenth of the time of a small study.
+    Modules stay in memory anyway; scanning them took a tenth of the time of a small study. `new` does not need them.
     """
-    if options.verb == "new" or "truespring.study" in sys.modules:  # a process that runs several commands
+    if options.verb == "new" or "truespring.study" in sys.modules:  # loaded by an earlier command of this process
         return
     gc.disable()
     try:
@@ -101,7 +102,7 @@ def _load(options: argparse.Namespace) -> None:
 
 @contextmanager
 def _threads(limit: int | None) -> Iterator[None]:
-    """Limit the threads of the linear algebra and of compiled loops, if there is a limit."""
+    """Limit the threads of linear algebra and compiled kernels; None sets no limit."""
     with ExitStack() as stack:
         if limit is not None:
             from threadpoolctl import threadpool_limits

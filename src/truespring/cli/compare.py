@@ -81,7 +81,7 @@ COMPARE = Verb(
     _add,
     _run,
     (
-        "truespring compare examples/bending.toml:neo-hookean examples/bending.toml",
+        "truespring compare strip.toml:neo-hookean strip.toml:springs",
         "truespring compare job.frd strip.toml --unit job.frd=mm --probe right-middle",
     ),
 )

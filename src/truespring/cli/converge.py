@@ -51,7 +51,7 @@ CONVERGE = Verb(
     _add,
     _run,
     (
-        "truespring converge examples/bending.toml",
+        "truespring converge strip.toml",
         "truespring converge strip.toml --tolerance 0.02 --meshes 3",
     ),
 )

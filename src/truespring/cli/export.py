@@ -20,7 +20,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
         help=f"{', '.join(TARGETS)}; repeat for several targets",
     )
     parser.add_argument(
-        "--model", metavar="NAME", help="model to write, default: the compared one, or the first springs"
+        "--model",
+        metavar="NAME",
+        help="springs model to export, default: the compared model if it is one, else the first",
     )
     add_out(parser)
 
@@ -29,7 +31,7 @@ def _run(options: argparse.Namespace) -> int:
     from truespring.study import export_study, read_studies, springs_of
 
     studies = read_studies(options.study)
-    for study in studies:  # errors first, before any study is solved
+    for study in studies:  # raise errors before any study is solved
         springs_of(study, options.to, options.model)
     reserve(options, studies)
     screen = console(options)
@@ -37,17 +39,17 @@ def _run(options: argparse.Namespace) -> int:
     converged = True
     for study in studies:
         with progress(options) as advance, writing(options.out):
-            carried = export_study(study, options.to, options.out, options.model, advance)
-        for one in carried:
+            written = export_study(study, options.to, options.out, options.model, advance)
+        for one in written:
             if options.quiet and not options.json:
                 print(*one.files, sep="\n")
             screen.print(f"{study.stem}: {one.target}: {', '.join(map(str, one.files))}", soft_wrap=True)
-        screen.print("\n".join(carried[0].told), soft_wrap=True)
-        if not carried[0].converged:
+        screen.print("\n".join(written[0].sentences), soft_wrap=True)
+        if not written[0].converged:
             converged = False
-            say(f"{study.stem}: {carried[0].fault}")
-        found = {one.target: one.values for one in carried}
-        values[study.stem] = found if len(found) > 1 else carried[0].values
+            say(f"{study.stem}: {written[0].fault}")
+        found = {one.target: one.values for one in written}
+        values[study.stem] = found if len(found) > 1 else written[0].values
     if options.json:
         print_each(values)
     return CONVERGED if converged else NOT_CONVERGED
@@ -59,7 +61,7 @@ EXPORT = Verb(
     _add,
     _run,
     (
-        "truespring export examples/bending.toml --to mujoco",
+        "truespring export strip.toml --to mujoco",
         "truespring export strip.toml --to calculix --to npz --model springs",
     ),
 )

@@ -1,4 +1,4 @@
-"""The verb `map`: up to which load, and on which meshes, springs are near FEM."""
+"""The verb `map`: map the errors of springs against FEM over load and mesh."""
 
 import argparse
 
@@ -25,18 +25,18 @@ def _add(parser: argparse.ArgumentParser) -> None:
         metavar="TYPE",
         **one_of((*LOAD_TYPES, "all")),
         help=f"{', '.join(LOAD_TYPES)} or all ({', '.join(in_space)}: in 3D only; own: the load of the study); "
-        "may be repeated; default: own",
+        "repeat for several; default: own",
     )
     parser.add_argument(
         "--rule",
         action="append",
         metavar="R",
-        help=f"springs model of the study, a rule ({', '.join(RULES)}), RULE+volume, or all rules for its mesh; may be "
-        "repeated; default: the springs of the study, all rules where it has none",
+        help=f"springs model of the study, a rule ({', '.join(RULES)}), RULE+volume, or all, the rules for its mesh; "
+        "repeat for several; default: the springs of the study, or all",
     )
     parser.add_argument("--x", default="load", metavar="A", help="load, depth, aspect or poisson; default: load")
     parser.add_argument(
-        "--y", metavar="B", help="another of them, rule, load-type or none; default: depth, if x is the load"
+        "--y", metavar="B", help="another axis, rule, load-type or none; default: depth if x is load, else none"
     )
     parser.add_argument(
         "--range",
@@ -44,9 +44,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="A=FIRST:LAST[:COUNT]",
         help="range of an axis: depth=1:8, load=0:0.4 (a strain, a share of the length, an angle), "
-        "poisson=0:0.45:17 (with 17 values on the finest grid); may be repeated",
+        "poisson=0:0.45:17 (with 17 values on the finest grid); repeat for several",
     )
-    parser.add_argument("--whole", action="store_true", help="solve the whole grid, not only where lines pass")
+    parser.add_argument("--whole", action="store_true", help="solve the whole grid, not only near contour lines")
     add_workers(parser, "this one")
     add_out(parser)
 
@@ -86,11 +86,11 @@ def _run(options: argparse.Namespace) -> int:
 
 MAP = Verb(
     "map",
-    "map up to which load, and on which meshes, springs are near FEM",
+    "map up to which load, and on which meshes, springs agree with FEM",
     _add,
     _run,
     (
-        "truespring map examples/bending.toml",
+        "truespring map strip.toml",
         "truespring map strip.toml --load bend --rule isotropic --range depth=1:4",
     ),
 )

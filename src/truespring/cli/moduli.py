@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def print_moduli(screen: "Console", stem: str, several: "Iterable[Realised]", whole: bool) -> None:
-    """Print the effective moduli of springs beside each material: a line for each, or the `whole` table.
+    """Print the effective moduli of springs for each material: one line, or with `whole` a table.
 
-    The table ends with whether the springs fit all materials, and which would be better.
+    Below the table, print whether the springs fit all materials and which rule fits better.
     """
     from truespring.report.tables import moduli_line, moduli_table
 
@@ -29,14 +29,15 @@ def print_moduli(screen: "Console", stem: str, several: "Iterable[Realised]", wh
         if whole:
             screen.print(f"{one.fitness.sentence}\n")
         elif not one.fitness.fit:
-            screen.print(f"'{one.name}' does not fit the material{_better(one.fitness)}; use -v for the reasons")
+            screen.print(f"'{one.name}' does not fit the material{_better(one.fitness)}; -v prints the reasons")
 
 
 def _better(fitness: "Fitness") -> str:
+    """Return the end of a sentence that names the rule that fits better, empty without one."""
     better = fitness.better
     if better is None:
         return ""
-    return f', rule = "{better.rule}"{" with volume = true" if better.volume else ""} does better'
+    return f', rule = "{better.rule}"{" with volume = true" if better.volume else ""} fits better'
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
         if picture:
             print_file(options, "picture", picture)
         else:
-            screen.print(f"{study.stem}: no model of springs")
+            screen.print(f"{study.stem}: no springs model")
     if options.json:
         print_each(values)
     return CONVERGED
@@ -72,7 +73,7 @@ MODULI = Verb(
     _add,
     _run,
     (
-        "truespring moduli examples/tissue.toml",
+        "truespring moduli mesh.toml",
         "truespring moduli strip.toml block.toml --json",
     ),
 )

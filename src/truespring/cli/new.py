@@ -1,4 +1,4 @@
-"""The verb `new`: write a commented study to start from."""
+"""The verb `new`: write a commented study as a template."""
 
 import argparse
 import json
@@ -12,12 +12,13 @@ from truespring.errors import TruespringError
 
 
 def _kinds() -> dict[str, Traversable]:
-    """Return the studies that can be written, by their kind: those in the package's folder `examples`."""
+    """Return the studies in the folder `examples` of the package, by kind."""
     studies = (one for one in _examples().iterdir() if one.name.endswith(".toml"))
     return {study.name.removesuffix(".toml"): study for study in sorted(studies, key=lambda one: one.name)}
 
 
 def _examples() -> Traversable:
+    """Return the folder of the studies, with their meshes and images."""
     return files("truespring").joinpath("examples")
 
 
@@ -28,7 +29,11 @@ def _add(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{parser.description}\n\nkinds:\n{what}"
     parser.add_argument("kind", **one_of(kinds), metavar="KIND", help=f"{', '.join(kinds)}")
     parser.add_argument(
-        "file", nargs="?", type=Path, metavar="FILE", help="file to write, default: KIND.toml; no file is overwritten"
+        "file",
+        nargs="?",
+        type=Path,
+        metavar="FILE",
+        help="file to write, default: KIND.toml; existing files are not overwritten",
     )
 
 
@@ -36,10 +41,10 @@ def _run(options: argparse.Namespace) -> int:
     kind = options.kind
     study = Path(f"{kind}.toml") if options.file is None else options.file
     if study.suffix != ".toml":
-        raise TruespringError(f"{study}: a study file ends in .toml")
+        raise TruespringError(f"{study}: the name of a study file ends in .toml")
     text = _kinds()[kind].read_text(encoding="utf-8")
     written: dict[Path, bytes] = {study: b""}
-    for beside in _examples().iterdir():  # a mesh or an image, which takes the name of the study
+    for beside in _examples().iterdir():  # a mesh or an image is written beside the study, with the same stem
         if beside.name.startswith(f"{kind}.") and not beside.name.endswith(".toml"):
             file = study.with_suffix(Path(beside.name).suffix)
             text = text.replace(json.dumps(beside.name), json.dumps(file.name, ensure_ascii=False))
@@ -66,7 +71,7 @@ def _run(options: argparse.Namespace) -> int:
 
 NEW = Verb(
     "new",
-    "write a commented study to start from, with its mesh or image",
+    "write a commented study as a template, with its mesh or image",
     _add,
     _run,
     ("truespring new strip", "truespring new organ liver.toml"),

@@ -1,4 +1,4 @@
-"""The parser: verbs and their options, help that ends with examples, and the nearest word where one is wrong."""
+"""The parser of the command line: verbs, options, help with examples, and suggestions for misspelt words."""
 
 import argparse
 from collections.abc import Collection, Sequence
@@ -10,7 +10,7 @@ from truespring.cli import calibrate, check, compare, converge, export, maps, mo
 from truespring.cli.verb import COMMON, Verb
 from truespring.errors import nearest
 
-#: The verbs, in the order of the help: from the first study to what few need.
+#: The verbs in the order of the help, most used first.
 VERBS: dict[str, Verb] = {
     verb.name: verb
     for verb in (
@@ -33,8 +33,8 @@ VERBS: dict[str, Verb] = {
 
 EXAMPLES = (
     "truespring new strip                  # write strip.toml, a commented study",
-    "truespring check strip.toml           # what it holds; solves nothing",
-    "truespring verify strip.toml          # springs beside FEM: figures, curves, out/report.html",
+    "truespring check strip.toml           # show mesh, loads, supports and moduli; solve nothing",
+    "truespring verify strip.toml          # solve, compare springs with FEM, write out/report.html",
     "truespring verify --help              # options and examples of a verb",
 )
 
@@ -44,7 +44,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 
 
 class Parser(argparse.ArgumentParser):
-    """An argparse parser that knows its own options, to name the nearest one."""
+    """An argparse parser with a list of its options, for suggestions."""
 
     def __init__(self, **more: Any) -> None:
         self.option_names: list[str] = []
@@ -56,7 +56,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class _PrintCompletion(argparse.Action):
-    """Print what a shell needs to complete verbs, options and files, and exit."""
+    """Print a script by which a shell completes verbs, options and files, and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, _: Any, shell: Any, option: str | None = None) -> NoReturn:
         import shtab
@@ -71,7 +71,10 @@ class _PrintCompletion(argparse.Action):
 
 
 def build_parser(filled: Collection[str]) -> tuple[Parser, dict[str, Parser]]:
-    """Return the parser and those of its verbs; only verbs in `filled` get their arguments, which may import tables."""
+    """Return the parser and the parsers of the verbs.
+
+    Only the verbs in `filled` get their arguments, since adding these may import tables of the library.
+    """
     parser = Parser(
         prog="truespring",
         description="Mass-spring models that match their material: solved at large deformation and compared with FEM.",
@@ -101,9 +104,9 @@ def build_parser(filled: Collection[str]) -> tuple[Parser, dict[str, Parser]]:
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace | None:
-    """Return the options of a command line; None where it is empty, after the help was printed.
+    """Return the options of a command line; print the help and return None if it is empty.
 
-    Exits with code 2 where it is wrong, and names the verb or option that is nearest to what was typed.
+    Exit with code 2 and a suggestion if a verb or option is wrong.
     """
     parser, verbs = build_parser(arguments)
     if not arguments:

@@ -1,4 +1,4 @@
-"""What verbs print: tables on standard output, JSON, errors, and progress on standard error."""
+"""Print tables and JSON on standard output, errors and progress on standard error."""
 
 import argparse
 import json
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from truespring.study import Study
 
-# Where standard error is no terminal, a line of progress is printed after this time [s].
+# Interval between lines of progress [s] if standard error is not a terminal.
 _EVERY = 10.0
 
 
 def say(text: str) -> None:
-    """Print a line on standard error, if that can be written."""
+    """Print a line on standard error; ignore errors of writing."""
     with suppress(OSError):
         print(f"truespring: {text}", file=sys.stderr, flush=True)
 
@@ -32,7 +32,7 @@ def print_json(value: Any) -> None:
 
 
 def print_each(values: dict[str, Any]) -> None:
-    """Print values by a study's stem as JSON: the value alone where there is one study, as the contract has it."""
+    """Print a value per study as JSON: the value alone for one study, an object by stem for several."""
     print_json(values if len(values) > 1 else next(iter(values.values())))
 
 
@@ -41,7 +41,7 @@ def console(options: argparse.Namespace) -> "Console":
     from rich.console import Console
 
     class Plain(Console):
-        """A console that leaves a closed pipe to `main`."""
+        """A console that raises BrokenPipeError for `main` to handle."""
 
         def on_broken_pipe(self) -> None:
             raise  # the exception being handled
@@ -50,14 +50,14 @@ def console(options: argparse.Namespace) -> "Console":
 
 
 def print_file(options: argparse.Namespace, what: str, file: object) -> None:
-    """Print where a report or another file was written; with --quiet the path alone, with --json nothing."""
+    """Print the path of a report or another file; with --quiet only the path, with --json nothing."""
     if not options.json:
         print(file if options.quiet else f"{what}: {file}")
 
 
 @contextmanager
 def writing(out: Path) -> Iterator[None]:
-    """Turn an error of writing into one that names --out."""
+    """Convert an OSError to a TruespringError that names --out."""
     try:
         yield
     except OSError as error:
@@ -66,9 +66,9 @@ def writing(out: Path) -> Iterator[None]:
 
 
 def reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> None:
-    """Lock the folders of studies, or --out itself, against other runs until the command ends.
+    """Lock the output folders of studies, or --out without studies, until the command ends.
 
-    Raises TruespringError, before anything is solved, where nothing can be written or another run writes.
+    Raises TruespringError if a folder cannot be written or another run has locked it.
     """
     from truespring.outputs import Lock
 
@@ -78,13 +78,13 @@ def reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> Non
 
 
 class _Lines:
-    """Progress as a line now and then, for a standard error that is no terminal."""
+    """Progress as lines at intervals, if standard error is not a terminal."""
 
     def __init__(self) -> None:
         self._next = time.monotonic() + _EVERY
 
     def show(self, text: Callable[[], str]) -> None:
-        """Print a line, if the last one is long enough ago."""
+        """Print a line if the interval has passed since the last one."""
         if time.monotonic() >= self._next:
             say(text())
             self._next = time.monotonic() + _EVERY
@@ -92,7 +92,7 @@ class _Lines:
 
 @contextmanager
 def progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float], None] | None]:
-    """Yield what shows the share done of each model: a bar on a terminal, else a line now and then."""
+    """Yield a callback that shows the progress of each model by a bar or by lines; None with --quiet."""
     if options.quiet:
         yield None
         return
@@ -118,9 +118,9 @@ def progress(options: argparse.Namespace) -> Iterator[Callable[[str, str, float]
 def counting(
     options: argparse.Namespace, what: str
 ) -> Iterator[tuple[Callable[[int, int, int], None] | None, Callable[[str], None] | None]]:
-    """Yield what shows how many are done, failed and asked for, and what prints a line beside it.
+    """Yield callbacks that show how many of `what` are done, failed and planned, and that print a note.
 
-    A bar with the time left on a terminal, else a line now and then.
+    Progress is a bar or, off a terminal, lines at intervals. Both callbacks are None with --quiet.
     """
     if options.quiet:
         yield None, None

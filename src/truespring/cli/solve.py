@@ -40,7 +40,7 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
                 result = run(study, advance, comparing, options.timeout, known)
             results.append(result)
             with writing(options.out):
-                (options.out / "report.html").unlink(missing_ok=True)  # it covers the studies of an earlier command
+                (options.out / "report.html").unlink(missing_ok=True)  # a report of an earlier command
                 write_rest(result, output, verify_command([result], options.out) if comparing else None)
         if not screen.quiet:
             screen.print(f"{study.stem}: {verdict(result)}")
@@ -60,7 +60,7 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
 
 @contextmanager
 def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
-    """Yield the output of a study, and what writes the results of a model to it."""
+    """Yield the output of a study, and a callback that writes the results of a model to it."""
     from truespring.study import output, write_model
 
     with writing(out):
@@ -75,7 +75,7 @@ def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
 
 
 def print_failures(result: "Result", out: Path, shown: bool) -> None:
-    """Print on standard error which models did not converge and, unless `shown` already, why and what to try."""
+    """Print on standard error which models did not converge and, unless `shown` before, their warnings."""
     for name, path in result.paths.items():
         if str(path.status) not in ("converged", "read"):
             print(
@@ -93,8 +93,8 @@ VERIFY = Verb(
     _add,
     lambda options: _run(options, comparing=True),
     (
-        "truespring verify examples/bending.toml",
-        "truespring verify strip.toml block.toml --out results",
+        "truespring verify strip.toml",
+        "truespring verify block.toml mesh.toml --out results",
     ),
     ("verbose", "json", "quiet", "threads"),
 )
@@ -105,7 +105,7 @@ SOLVE = Verb(
     _add,
     lambda options: _run(options, comparing=False),
     (
-        "truespring solve examples/truss.toml",
+        "truespring solve strip.toml",
         "truespring solve mesh.toml --timeout 600 --threads 4",
     ),
     ("verbose", "json", "quiet", "threads"),

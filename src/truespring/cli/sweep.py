@@ -20,12 +20,17 @@ def _add(parser: argparse.ArgumentParser) -> None:
         help='"material.young=4 kPa,8 kPa", "mesh.elements=[8,2],[16,4]", "material.poisson=0:0.45:10"; lists count '
         "from 1, as in load.1.force; repeat for all combinations",
     )
-    parser.add_argument("--lhs", type=positive, metavar="N", help="instead N points of a Latin hypercube over them")
+    parser.add_argument(
+        "--lhs", type=positive, metavar="N", help="sample N points of a Latin hypercube instead of all combinations"
+    )
     parser.add_argument("--seed", type=int, metavar="S", help="seed of the Latin hypercube, default: 0")
     parser.add_argument(
-        "--points", type=Path, metavar="FILE", help="instead a CSV file: keys first, then a row a point"
+        "--points",
+        type=Path,
+        metavar="FILE",
+        help="CSV file of points instead of --vary: a header line of keys, then one row per point",
     )
-    parser.add_argument("--retry-failed", action="store_true", help="solve points again that failed before")
+    parser.add_argument("--retry-failed", action="store_true", help="solve points again that failed in an earlier run")
     add_workers(parser, "all cores")
     add_timeout(parser)
     add_out(parser, "out/sweep")
@@ -38,10 +43,10 @@ def _run(options: argparse.Namespace) -> int:
     vary = dict[str, Any]()
     for key, values in map(read_vary, options.vary):
         if key in vary:
-            raise TruespringError(f"--vary {key} is given twice: give all of its values at once")
+            raise TruespringError(f"--vary {key} is given twice: give all its values in one option")
         vary[key] = values
     if options.seed is not None and options.lhs is None:
-        raise TruespringError(f"--seed {options.seed} is for a Latin hypercube: give --lhs N too, or leave it out")
+        raise TruespringError(f"--seed {options.seed} is for a Latin hypercube: add --lhs N, or leave --seed out")
     plan = plan_sweep(options.study, vary, options.lhs, options.seed or 0, options.points)
     reserve(options)
     screen = console(options)
@@ -75,12 +80,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _print_failed(rows: Sequence[dict[str, Any]], keys: Sequence[str], most: int = 10) -> None:
-    """Print on standard error the first points that failed, and why."""
+    """Print on standard error the first `most` failed points with their reasons."""
     failed = [row for row in rows if row["status"] == "failed"]
     for row in failed[:most]:
         say(f"{', '.join(f'{key} = {row[key]}' for key in keys)}: {row['reason']}")
     if len(failed) > most:
-        say(f"and {len(failed) - most} more points failed: the table has all reasons")
+        say(f"and {len(failed) - most} more points failed: the table lists all reasons")
 
 
 SWEEP = Verb(
@@ -89,7 +94,7 @@ SWEEP = Verb(
     _add,
     _run,
     (
-        'truespring sweep examples/bending.toml --vary "material.poisson=0:0.45:10"',
+        'truespring sweep strip.toml --vary "material.poisson=0:0.45:10"',
         'truespring sweep strip.toml --vary "material.young=4 kPa,8 kPa" --vary "mesh.elements=[8,2],[16,4]"',
     ),
 )

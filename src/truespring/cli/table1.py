@@ -8,7 +8,7 @@ from truespring.cli.verb import CONVERGED, Verb, add_out
 
 def _add(parser: argparse.ArgumentParser) -> None:
     add_out(parser)
-    parser.add_argument("--dim", type=int, choices=(2, 3), help="in 2D or in 3D only, default: both")
+    parser.add_argument("--dim", type=int, choices=(2, 3), help="dimension of the bodies, default: both")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -29,7 +29,7 @@ def _run(options: argparse.Namespace) -> int:
 
 TABLE1 = Verb(
     "table1",
-    "for readers of the paper: measure its Table 1, six methods on one body, beside its signs",
+    "for readers of the paper: measure its Table 1, the plus and minus signs of six methods",
     _add,
     _run,
     ("truespring table1", "truespring table1 --dim 2 --out table1"),

@@ -1,4 +1,4 @@
-"""The verbs `rules` and `schema`: what a study may contain."""
+"""The verbs `rules` and `schema`: list the stiffness rules and the keys of a study."""
 
 import argparse
 
@@ -7,7 +7,7 @@ from truespring.cli.verb import CONVERGED, Verb
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
-    """Take no arguments."""
+    """Add no arguments."""
 
 
 def _rules(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""A verb of the command line, its exit codes, and the options that verbs share."""
+"""The class of verbs, exit codes, and options that several verbs share."""
 
 import argparse
 import math
@@ -14,15 +14,15 @@ CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb: how it is parsed, described and run.
+    """A verb of the command line.
 
     Attributes:
-        name: what the user types.
-        summary: one line for the list of verbs, which also heads the verb's own help.
-        add: adds the verb's arguments to its parser; called only where the verb is parsed, so it may import tables.
+        name: name of the verb.
+        summary: one line for the list of verbs and the top of the verb's help.
+        add: adds the arguments to a parser; called only for the verb of a command line, so it may import tables.
         run: runs the verb and returns its exit code.
-        examples: command lines that end the verb's help; they run in the project's folder, or on what `new` writes.
-        common: which of COMMON the verb takes: those that have an effect on it.
+        examples: command lines at the end of the verb's help, on the studies that `truespring new KIND` writes.
+        common: the options in COMMON that have an effect on the verb.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Verb:
 
 
 def positive(text: str) -> int:
-    """Return a whole number of at least 1."""
+    """Return the text as an integer of at least 1."""
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError(f"{number} is not a positive number")
@@ -42,7 +42,7 @@ def positive(text: str) -> int:
 
 
 def seconds(text: str) -> float:
-    """Return a positive, finite number of seconds."""
+    """Return the text as a positive, finite number of seconds."""
     number = float(text)
     if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not a positive number of seconds")
@@ -50,7 +50,7 @@ def seconds(text: str) -> float:
 
 
 def relative_error(text: str) -> float:
-    """Return a relative error between 0 and 1."""
+    """Return the text as a relative error between 0 and 1."""
     number = float(text)
     if not 0 < number < 1:
         raise argparse.ArgumentTypeError(f"{text} is not a relative error between 0 and 1")
@@ -58,7 +58,7 @@ def relative_error(text: str) -> float:
 
 
 def one_of(names: Iterable[str]) -> dict[str, Any]:
-    """Return the arguments of add_argument for an option whose values are `names`; an error names the nearest."""
+    """Return keyword arguments of add_argument for an option with values `names`; an error suggests the nearest."""
     allowed = tuple(names)
 
     def known(text: str) -> str:
@@ -71,16 +71,16 @@ def one_of(names: Iterable[str]) -> dict[str, Any]:
     return {"type": known, "choices": allowed}
 
 
-#: Options that several verbs share, by the name of their value.
+#: Options that several verbs share, by attribute of the parsed options.
 COMMON: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
-    "json": (("--json",), {"action": "store_true", "help": "print one JSON object on standard output, nothing else"}),
+    "json": (("--json",), {"action": "store_true", "help": "print only one JSON object on standard output"}),
     "quiet": (
         ("-q", "--quiet"),
-        {"action": "store_true", "help": "print nothing but errors and the path of the report or file written"},
+        {"action": "store_true", "help": "print only errors and the path of the report or file written"},
     ),
     "verbose": (
         ("-v", "--verbose"),
-        {"action": "store_true", "help": "print all effective moduli of springs as a table, not in one line"},
+        {"action": "store_true", "help": "print the effective moduli of springs as a table, not in one line"},
     ),
     "threads": (
         ("--threads",),
@@ -90,12 +90,12 @@ COMMON: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 
 
 def add_studies(parser: argparse.ArgumentParser) -> None:
-    """Add the study files that a verb reads, one or more."""
+    """Add the argument for one or more study files."""
     parser.add_argument("study", nargs="+", help="study file (TOML)")
 
 
 def add_out(parser: argparse.ArgumentParser, folder: str = "out") -> None:
-    """Add --out, the folder for results."""
+    """Add --out, the folder for results, with its default."""
     parser.add_argument(
         "--out", type=Path, default=Path(folder), metavar="DIR", help=f"folder for results, default: {folder}"
     )
@@ -112,9 +112,9 @@ def add_timeout(parser: argparse.ArgumentParser) -> None:
 
 
 def add_workers(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add --workers and --scheduler, which processes solve; one or the other."""
+    """Add --workers and --scheduler, which exclude each other."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--workers", type=positive, metavar="N", help=f"processes on this machine, default: {default}")
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="Dask cluster to use instead, such as tcp://10.0.0.1:8786"
+        "--scheduler", metavar="ADDRESS", help="address of a Dask cluster to use instead, such as tcp://10.0.0.1:8786"
     )

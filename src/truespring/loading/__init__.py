@@ -1,4 +1,4 @@
-"""How a body is loaded and held: dead loads, loads that follow the body, supports and prescribed motions."""
+"""Loads and supports: dead loads, loads that follow the body, fixed nodes and prescribed motions."""
 
 from truespring.loading.body import Body as Body
 from truespring.loading.body import Spread as Spread

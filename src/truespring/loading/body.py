@@ -1,4 +1,4 @@
-"""The body that loads act on, and dead loads as they are integrated over its cells."""
+"""The body that loads act on, and the integration of dead loads over its cells."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -10,9 +10,13 @@ from truespring.mesh import Mesh, SecondOrder, Selection, covering, shares
 
 
 class Body(NamedTuple):
-    """What loads act on: `thickness` [m] is 1 in space, `density` [kg/m^3] of each element None where not known.
+    """The body that loads act on.
 
-    `second_order` is None where elements have no nodes but those of the mesh.
+    Attributes:
+        mesh: the mesh.
+        thickness: thickness [m]; 1 in 3D.
+        density: density of each element [kg/m^3], shape (n_elements,); None if not known.
+        second_order: mid-edge nodes of second-order elements; None for first-order elements.
     """
 
     mesh: Mesh
@@ -22,22 +26,25 @@ class Body(NamedTuple):
 
     @property
     def nodes(self) -> Floats:
-        """Positions of all nodes at rest [m], shape (n_nodes, dim)."""
+        """Undeformed positions of all nodes, mid-edge nodes included [m], shape (n_nodes, dim)."""
         return self.mesh.nodes if self.second_order is None else self.second_order.nodes
 
     def whole(self, cells: Ints) -> Ints:
-        """Return all nodes of cells that are given by their corners."""
+        """Return all nodes of cells from their corners: shape (n, k) from shape (n, corners)."""
         return cells if self.second_order is None else self.second_order.of(cells)
 
     def carrying(self, cells: Ints, measures: Floats) -> tuple[Ints, Floats]:
-        """Return cells and each corner's part of their measures [m^k], both as all nodes of the cells have them."""
+        """Return all nodes of cells and the share of each node in the measure of its cell [m^k], both of shape (n, k).
+
+        `cells` has the corners of each cell, `measures` the share of each corner, both of shape (n, corners).
+        """
         if self.second_order is None:
             return cells, measures
         whole = self.second_order.of(cells)
         return whole, self.second_order.shares(whole)
 
     def shares(self, on: Selection) -> tuple[Ints, Floats]:
-        """Return the nodes that a load acts on, ascending, and the share of a uniform total that each takes."""
+        """Return the loaded nodes, ascending, and the share of each in a uniform load, both of shape (n,)."""
         covered = covering(self.mesh, on)
         if self.second_order is None or covered is None:
             return shares(self.mesh, on)
@@ -49,12 +56,12 @@ class Body(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """A dead load over cells of the mesh.
+    """A dead load that is uniform over each of several cells.
 
     Attributes:
-        cells: elements, facets, edges or nodes, by all their nodes, shape (n, k).
-        measures: what each node's shape function integrates to [m^k], shape (n, k); 1 for nodes alone.
-        density: force per measure of each cell [N/m^k], shape (n, dim).
+        cells: node numbers of elements, facets, edges or single nodes, shape (n, k).
+        measures: integral of the shape function of each node over its cell [m^k], shape (n, k); 1 for single nodes.
+        density: force per length, area or volume of each cell [N/m^k], shape (n, dim).
     """
 
     cells: Ints
@@ -63,7 +70,7 @@ class Spread(NamedTuple):
 
 
 def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
-    """Return the sum of loads on the nodes [N], of shape (n_nodes, dim)."""
+    """Return the sum of the nodal forces of all spreads [N], of shape `shape`: (n_nodes, dim)."""
     force = np.zeros(shape)
     for cells, measures, density in spreads:
         np.add.at(force, cells, measures[:, :, None] * density[:, None, :])

@@ -1,4 +1,4 @@
-"""Dead loads: forces that keep their direction, integrated with the shape functions of the elements that carry them."""
+"""Dead loads: forces of constant direction, integrated with the shape functions of the loaded cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -26,9 +26,9 @@ from truespring.mesh import (
 
 @dataclass(frozen=True)
 class Force(DeadLoad):
-    """A dead load: the `total` force [N], one value a direction, shared consistently over what is `on`.
+    """A dead load of `total` force [N], one value per direction, distributed consistently over the selection `on`.
 
-    `on` is a group of the mesh (its facets where it has some), a side ("left", "right", "bottom", "top", "back",
+    `on` is a group of the mesh (its facets, if it has any), a side ("left", "right", "bottom", "top", "back",
     "front"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
     """
 
@@ -36,18 +36,18 @@ class Force(DeadLoad):
     total: Sequence[float]
 
     def spread(self, body: Body) -> Spread:
-        """Return the load over the cells that carry it: those that cover the nodes, else the nodes alone."""
+        """Return the load over the cells that cover the selected nodes, or over single nodes if none do."""
         total = components(self.total, body.mesh.dim, "force", "N")
         nodes = select(body.mesh, self.on)
         cells, measures = body.carrying(*(covering(body.mesh, self.on) or (nodes[:, None], np.ones((len(nodes), 1)))))
         return Spread(cells, measures, np.tile(total / measures.sum(), (len(cells), 1)))
 
     def scaled(self, factor: float) -> Self:
-        """Return the load times a factor."""
+        """Return the load multiplied by a factor."""
         return replace(self, total=times(self.total, factor))
 
     def turned(self, rotation: Floats) -> Self:
-        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        """Return the load with its vector rotated by a matrix of shape (dim, dim)."""
         return replace(self, total=rotated(self.total, rotation))
 
     @property
@@ -66,10 +66,10 @@ class Force(DeadLoad):
 
 @dataclass(frozen=True)
 class Traction(DeadLoad):
-    """A dead load: force per area at rest [Pa], one value a direction, on the facets `on`.
+    """A dead load: force per undeformed area [Pa], one value per direction, on the facets `on`.
 
-    `on` is a group of facets, which may lie inside the body, or a side, another group of the mesh, a Plane, a Box or
-    node numbers: all facets of the boundary whose nodes are among them.
+    `on` is a group of facets, which may lie inside the body; or a side, another group of the mesh, a Plane, a Box or
+    node numbers, which select the boundary facets that have all their nodes in the selection.
     """
 
     on: Selection
@@ -83,11 +83,11 @@ class Traction(DeadLoad):
         return Spread(*body.carrying(facets, corner_measures(body.mesh.nodes[facets])), density)
 
     def scaled(self, factor: float) -> Self:
-        """Return the load times a factor."""
+        """Return the load multiplied by a factor."""
         return replace(self, traction=times(self.traction, factor))
 
     def turned(self, rotation: Floats) -> Self:
-        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        """Return the load with its vector rotated by a matrix of shape (dim, dim)."""
         return replace(self, traction=rotated(self.traction, rotation))
 
     @property
@@ -106,7 +106,7 @@ class Traction(DeadLoad):
 
 @dataclass(frozen=True)
 class Gravity(DeadLoad):
-    """The weight of the whole body under an `acceleration` [m/s^2], one value a direction; needs a density."""
+    """The weight of the whole body under an `acceleration` [m/s^2], one value per direction; needs a density."""
 
     acceleration: Sequence[float]
     on: None = field(default=None, init=False, repr=False)
@@ -115,16 +115,16 @@ class Gravity(DeadLoad):
         """Return the load over all elements."""
         acceleration = components(self.acceleration, body.mesh.dim, "gravity", "m/s^2")
         if body.density is None:
-            raise ProblemError("gravity needs the material's density [kg/m^3], and that of each region")
+            raise ProblemError("gravity needs a density [kg/m^3] of the material and of each region")
         elements, measures = body.carrying(body.mesh.elements, element_corner_measures(body.mesh))
         return Spread(elements, body.thickness * measures, body.density[:, None] * acceleration)
 
     def scaled(self, factor: float) -> Self:
-        """Return the load times a factor."""
+        """Return the load multiplied by a factor."""
         return replace(self, acceleration=times(self.acceleration, factor))
 
     def turned(self, rotation: Floats) -> Self:
-        """Return the load turned by a rotation matrix, shape (dim, dim)."""
+        """Return the load with its vector rotated by a matrix of shape (dim, dim)."""
         return replace(self, acceleration=rotated(self.acceleration, rotation))
 
     @property
@@ -133,7 +133,7 @@ class Gravity(DeadLoad):
         return np.array(self.acceleration, dtype=float)
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        """Return an arrow along the acceleration, at the middle of the body."""
+        """Return an arrow along the acceleration, at the centre of the nodes."""
         size = float(np.linalg.norm(self.acceleration))
         return Mark(np.arange(body.mesh.n_nodes), self.vector, "g", size, "m/s^2")
 
@@ -142,5 +142,5 @@ class Gravity(DeadLoad):
         return f"gravity {vector_words(self.acceleration)} m/s^2"
 
     def cards(self, mesh: Mesh) -> tuple[BodyForce]:
-        """Return the acceleration of all elements."""
+        """Return the acceleration as a body force of all elements."""
         return (BodyForce(self.vector),)

@@ -1,4 +1,4 @@
-"""What a load is: the questions that every load answers, whoever asks them."""
+"""Base classes of loads: the methods by which loads are applied, scaled, rotated, drawn, described and exported."""
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
@@ -13,13 +13,13 @@ from truespring.potential import Potential
 
 
 class Mark(NamedTuple):
-    """A load or a prescribed motion as an arrow with a text shows it.
+    """An arrow with a label that shows a load or a prescribed motion.
 
     Attributes:
-        nodes: node numbers that it acts on; the arrow stands at their centre.
-        vector: the direction in which it acts, of any length, shape (dim,); zero where nothing is to be drawn.
-        symbol: what the text calls it, "F".
-        size: what the text gives as its size, in `unit`.
+        nodes: numbers of the loaded nodes; the arrow is drawn at their centre.
+        vector: direction of the arrow, of any length, shape (dim,); zero draws nothing.
+        symbol: symbol in the label, such as "F".
+        size: value in the label, in `unit`.
         unit: an SI unit as `report.quantity` writes it ("N", "Pa", "m"), or "°".
     """
 
@@ -31,36 +31,36 @@ class Mark(NamedTuple):
 
 
 class BodyForce(NamedTuple):
-    """A uniform `acceleration` [m/s^2] of all elements, shape (dim,), which a finite element program integrates."""
+    """An `acceleration` [m/s^2] of all elements, shape (dim,), for finite element programs."""
 
     acceleration: Floats
 
 
 class FacePressure(NamedTuple):
-    """A pressure on facets of the boundary, which a finite element program integrates and lets follow them.
+    """A pressure that follows facets of the boundary, for finite element programs.
 
     Attributes:
-        facets: node numbers, anticlockwise seen from outside, shape (n, k).
-        pressure: of each facet, positive towards the body [Pa], shape (n,).
+        facets: node numbers of each facet, anticlockwise seen from outside, shape (n, k).
+        pressure: pressure on each facet, positive towards the body [Pa], shape (n,).
     """
 
     facets: Ints
     pressure: Floats
 
 
-#: A load as other finite element programs know it.
+#: A load in the input of another finite element program.
 Card = BodyForce | FacePressure
 
 
 class Load(ABC):
-    """What acts on a body: a frozen dataclass that says how it acts, scales, turns, is drawn and is worded.
+    """A load on a body, a frozen dataclass.
 
-    Subclass DeadLoad or FollowingLoad, and add a line to LOADS to make it a key of `[[load]]`.
+    Subclass DeadLoad or FollowingLoad, and add an entry to LOADS to make it a key of `[[load]]`.
 
     Attributes:
-        on: the selection that it acts on, None where it acts on the whole body.
-        follows: whether its forces change with the positions of the nodes.
-        instead: what to use where a program has no load that follows the body, for error messages.
+        on: the loaded selection; None for the whole body.
+        follows: whether the forces depend on the positions of the nodes.
+        instead: alternative for programs without loads that follow the body, for error messages.
     """
 
     on: Selection | None
@@ -68,70 +68,73 @@ class Load(ABC):
     instead: ClassVar[str] = ""
 
     def spread(self, body: Body) -> Spread | None:
-        """Return a dead load over the cells of `body` that carry it, None for a load that follows the body."""
+        """Return a dead load over the cells of `body`; None for a load that follows the body."""
         return None
 
     def following(self, body: Body, held: Bools) -> Potential | None:
-        """Return a load that follows the body as a potential, minus its work; None for a dead load.
+        """Return the potential, minus the work, of a load that follows the body; None for a dead load.
 
-        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim). Raises ProblemError where the
+        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim). Raises ProblemError if the
         work of the load depends on the path.
         """
         return None
 
     def rim(self, mesh: Mesh) -> Ints:
-        """Return the edges around the surface that a load in space needs held, by their ends, shape (n, 2)."""
+        """Return the edges of the loaded surface that a load in 3D needs held, as node numbers, shape (n, 2)."""
         return np.zeros((0, 2), dtype=np.int64)
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:
-        """Return the load times a factor."""
+        """Return the load multiplied by a factor."""
 
     @abstractmethod
     def turned(self, rotation: Floats) -> Self:
-        """Return the load as it acts on a body turned by a rotation matrix, shape (dim, dim), on the same selection."""
+        """Return the load on the same selection of a body rotated by a matrix of shape (dim, dim)."""
 
     @property
     def vector(self) -> Floats | None:
-        """The vector that `turned` turns, shape (dim,); None for a load without one, which turns with the body."""
+        """The vector that `turned` rotates, shape (dim,); None for a load that rotates with the body."""
         return None
 
     def moved_to(self, on: Selection) -> Self:
-        """Return the load on another selection, such as a group that another mesh has too."""
+        """Return the load on another selection, such as a group of another mesh."""
         changed: Any = replace(self, on=on)  # type: ignore[type-var]  # subclasses are dataclasses
         return changed  # type: ignore[no-any-return]
 
     @abstractmethod
     def mark(self, body: Body, held: Bools) -> Mark:
-        """Return the arrow that shows the load on the undeformed `body`, held where `held` is true."""
+        """Return the arrow that shows the load on the undeformed `body`.
+
+        `held` is true where a displacement is prescribed, shape (n_nodes, dim).
+        """
 
     @abstractmethod
     def words(self) -> str:
-        """Return the load in words without a full stop: "force (0, -0.043) N in total on 'right'"."""
+        """Return a description without a full stop: "force (0, -0.043) N in total on 'right'"."""
 
     def cards(self, mesh: Mesh) -> tuple[Card, ...]:
-        """Return the load as other finite element programs know it; none where it comes as forces on nodes."""
+        """Return the load in the input of other finite element programs; empty if they take its nodal forces."""
         return ()
 
 
 class DeadLoad(Load):
-    """A load that keeps its size and direction as the body deforms."""
+    """A load of constant size and direction."""
 
     follows = False
 
     @abstractmethod
     def spread(self, body: Body) -> Spread:
-        """Return the load over the cells of `body` that carry it."""
+        """Return the load over the cells of `body`."""
 
 
 class FollowingLoad(Load):
-    """A load whose forces change as the body deforms, and that has a potential; it defines `instead`."""
+    """A load with a potential, whose forces change as the body deforms; subclasses define `instead`."""
 
     follows = True
 
     @abstractmethod
     def following(self, body: Body, held: Bools) -> Potential:
-        """Return the potential on `body`; raise ProblemError where the work of the load depends on the path."""
+        """Return the potential on `body`; raise ProblemError if the work of the load depends on the path."""
 
     def turned(self, rotation: Floats) -> Self:
         """Return the load itself: it turns with the body."""

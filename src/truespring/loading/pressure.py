@@ -1,7 +1,7 @@
-"""A pressure that follows the body, as a potential: pressure times the volume that its surface sweeps.
+"""A pressure that follows the body; its potential is pressure times the volume that the surface sweeps.
 
-It has one where the edge of the surface is held or slides within planes, or where the surface has no edge; elsewhere
-its work depends on the path, and it is an error.
+A potential exists if the edge of the surface is held or slides in a plane, or if the surface is closed. Any other
+pressure does work that depends on the path and is an error.
 """
 
 from dataclasses import dataclass, replace
@@ -21,22 +21,21 @@ from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, 
 from truespring.mesh.rows import ascending, distinct_rows
 from truespring.potential import SparseMatrix
 
-# Forces of a pressure are polynomials of second order along a straight line: two Gauss points integrate its work
-# exactly.
+# Forces of a pressure are quadratic polynomials along a straight motion: two Gauss points integrate the work exactly.
 _GAUSS = ((0.5 - 0.5 / np.sqrt(3), 0.5), (0.5 + 0.5 / np.sqrt(3), 0.5))
-# The tangent of a load that has a potential is symmetric to this share of its size, at a state deformed by this share
-# of the body's size.
+# A load has a potential if its tangent is symmetric up to the first share of its size, at positions that are displaced
+# by up to the second share of the surface's size.
 _SYMMETRIC, _DEFORMED = 1e-9, 0.05
-# A resultant below this share of the forces is zero: the pressure acts all around.
+# A resultant below this share of the sum of forces is zero: the pressure acts on a closed surface.
 _BALANCED = 1e-6
 
 
 @dataclass(frozen=True)
 class Pressure(FollowingLoad):
-    """A `pressure` [Pa] that presses on the facets of the boundary `on` and stays normal to them as they move.
+    """A `pressure` [Pa] on the boundary facets `on`, positive towards the body, which stays normal to them.
 
-    `on` is a group of facets, or a side, another group of the mesh, a Plane, a Box or node numbers: all facets of the
-    boundary whose nodes are among them.
+    `on` is a group of facets; or a side, another group of the mesh, a Plane, a Box or node numbers, which select the
+    boundary facets that have all their nodes in the selection.
     """
 
     on: Selection
@@ -44,16 +43,16 @@ class Pressure(FollowingLoad):
     instead = "a traction, which is dead"
 
     def following(self, body: Body, held: Bools) -> "SurfacePressure":
-        """Return the potential; raise ProblemError where the load has none."""
+        """Return the potential; raise ProblemError if the work of the pressure depends on the path."""
         pressure = number(self.pressure, "pressure", "Pa")
         facets = body.whole(outer_facets(body.mesh, self.on))
         load = SurfacePressure(body.nodes, facets, body.thickness * pressure, held)
         if pressure:
-            load.refuse_open_edges()
+            load.check_edges()
         return load
 
     def rim(self, mesh: Mesh) -> Ints:
-        """Return the edges around the surface in space, by their ends, shape (n, 2)."""
+        """Return the edges of the loaded surface in 3D as node numbers, shape (n, 2)."""
         facets = outer_facets(mesh, self.on)
         if mesh.dim == 2:
             return np.zeros((0, 2), dtype=np.int64)
@@ -62,15 +61,15 @@ class Pressure(FollowingLoad):
         return np.asarray(edges[found.first[found.count == 1]])
 
     def scaled(self, factor: float) -> Self:
-        """Return the load times a factor."""
+        """Return the load multiplied by a factor."""
         return replace(self, pressure=factor * self.pressure)
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        """Return an arrow along the total force on the undeformed body, or at one node where that is zero."""
+        """Return an arrow along the total force on the undeformed body, or on one node if that is zero."""
         force = -self.following(body, held).gradient(body.nodes)
         nodes = loaded(body.mesh, self.on)
         total = force.sum(axis=0)
-        if np.linalg.norm(total) < _BALANCED * np.abs(force).sum():  # all around: one place stands for all
+        if np.linalg.norm(total) < _BALANCED * np.abs(force).sum():  # a closed surface
             nodes = nodes[[body.mesh.nodes[nodes, 0].argmax()]]
             total = force[nodes[0]]
         return Mark(nodes, total, "p", self.pressure, "Pa")
@@ -85,8 +84,8 @@ class Pressure(FollowingLoad):
         return (FacePressure(facets, np.full(len(facets), float(self.pressure))),)
 
 
-# The cell that a facet of so many nodes is, by dimensions of the body, and Gauss points along its axes: forces of a
-# pressure are the integral of shape functions times products of slopes, which they give exactly.
+# Cell and number of Gauss points along each axis for a facet, by dimension of the body and number of nodes. They
+# integrate the forces, shape functions times products of their derivatives, exactly.
 _FACETS = {
     (2, 2): ("line", 1),
     (2, 3): ("line3", 2),
@@ -98,7 +97,13 @@ _FACETS = {
 
 @dataclass(frozen=True)
 class _Points:
-    """Gauss points on a facet: shape functions, their slopes and weights, shapes (points, k), (points, k, axes)."""
+    """Gauss points on a facet.
+
+    Attributes:
+        shape: shape functions at the points, shape (points, k).
+        slopes: their derivatives by the local coordinates, shape (points, k, axes).
+        weights: weights of the points, shape (points,).
+    """
 
     shape: Floats
     slopes: Floats
@@ -113,26 +118,35 @@ def _points(k: int, dim: int) -> _Points:
 
 
 class SurfacePressure:
-    """A pressure times the volume that the free nodes of a surface sweep: energy, and the forces -p n on the surface.
+    """Potential of a pressure: pressure times the volume that the free nodes of the surface sweep.
 
-    Forces are those of the whole surface, held nodes included; the tangent is that of the free nodes, where it is
-    symmetric.
+    The gradient includes the forces on held nodes. The hessian is symmetrised, which changes nothing for free nodes.
     """
 
     def __init__(self, nodes: Floats, facets: Ints, pressure: float, held: Bools) -> None:
-        """Take reference positions [m], facets anticlockwise from outside, and the pressure, in 2D times thickness."""
+        """Store the pressure on a surface.
+
+        Args:
+            nodes: undeformed positions of all nodes [m], shape (n_nodes, dim).
+            facets: node numbers of each facet, anticlockwise from outside, shape (n, k).
+            pressure: the pressure [Pa]; in 2D times the thickness [N/m].
+            held: whether each displacement is prescribed, shape (n_nodes, dim).
+        """
         self.nodes, self._facets, self._pressure, self._free = nodes, facets, pressure, ~held
         self._points = _points(facets.shape[1], nodes.shape[1])
         self._pattern = Pattern(facets, *nodes.shape)
 
     def energy(self, positions: Floats) -> float:
-        """Minus the work of the pressure as the free nodes move straight to their places, the others there [J]."""
+        """Return minus the work [J] of the pressure on a straight motion of the free nodes to `positions`.
+
+        Held nodes are at their final positions throughout.
+        """
         moved = np.where(self._free, positions - self.nodes, 0.0)
         start = positions - moved
         return float(sum(weight * (self.gradient(start + at * moved) * moved).sum() for at, weight in _GAUSS))
 
     def gradient(self, positions: Floats) -> Floats:
-        """Minus the force on the nodes [N], shape (n_nodes, dim): p times the integral of N n over the surface."""
+        """Return minus the nodal forces [N], shape (n_nodes, dim): p times the integral of N n over the surface."""
         points, dim = self._points, positions.shape[1]
         along = np.einsum("qka,fki->aqfi", points.slopes, positions[self._facets])
         normal = np.cross(along[0], along[1]) if dim == 3 else along[0][..., ::-1] * np.array([1.0, -1.0])
@@ -140,7 +154,7 @@ class SurfacePressure:
         return self._pattern.vector(forces.reshape(len(self._facets), -1))
 
     def hessian(self, positions: Floats) -> SparseMatrix:
-        """The derivative of the gradient, its symmetric part [N/m]."""
+        """Return the symmetric part of the derivative of the gradient [N/m], shape (n_nodes dim, n_nodes dim)."""
 
         def symmetric(first: int, last: int) -> Floats:
             blocks = self._slopes(positions, first, last)
@@ -149,7 +163,7 @@ class SurfacePressure:
         return self._pattern.summed(symmetric)
 
     def _slopes(self, positions: Floats, first: int, last: int) -> Floats:
-        """The derivative of each facet's forces by its nodes, shape (n, k * dim, k * dim)."""
+        """Return the derivative of the gradient of a range of facets by their nodes [N/m], shape (n, k dim, k dim)."""
         points, dim = self._points, positions.shape[1]
         facets = self._facets[first:last]
         if dim == 2:
@@ -162,8 +176,8 @@ class SurfacePressure:
         n = facets.shape[1] * dim
         return np.asarray(found.reshape(len(facets), n, n))
 
-    def refuse_open_edges(self) -> None:
-        """Raise ProblemError where the derivative is not symmetric: the work of such a load depends on the way."""
+    def check_edges(self) -> None:
+        """Raise ProblemError if the tangent of the free nodes is not symmetric: the work then depends on the path."""
         random = np.random.default_rng(1).uniform(-1.0, 1.0, self.nodes.shape)
         size = float(np.ptp(self.nodes[np.unique(self._facets)], axis=0).max())
         there = self.nodes + np.where(self._free, _DEFORMED * size * random, 0.0)
@@ -178,13 +192,13 @@ class SurfacePressure:
             some = ", ".join(map(str, nodes[:4])) + (", ..." if len(nodes) > 4 else "")
             raise ProblemError(
                 f"this pressure has no potential: the edge of its surface is free to move at {len(nodes)} "
-                f"node{'s' * (len(nodes) != 1)} ({some}). Hold the edge, or the direction across a plane that it lies "
-                "in, or press on a closed surface; a dead traction has a potential everywhere"
+                f"node{'s' * (len(nodes) != 1)} ({some}). Hold the edge, hold the direction normal to a plane in "
+                "which the edge lies, select a closed surface, or use a traction, which is a dead load"
             )
 
 
 def _cross_matrix(v: Floats) -> Floats:
-    """The matrix of v x, shape (..., 3, 3)."""
+    """Return the matrix M with M w = v x w, shape (..., 3, 3)."""
     matrix = np.zeros((*v.shape, 3))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3

@@ -1,4 +1,4 @@
-"""The loads of a study file: each key of `[[load]]`, the class that it makes and the values that it takes."""
+"""The keys of `[[load]]` in study files, with the class of each load and its values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -16,11 +16,11 @@ class Quantity:
     """A value of a load in a study file.
 
     Attributes:
-        argument: the argument of the class that takes it, in SI.
-        dimension: what it measures, of `units.SI_UNITS`.
-        about: what it is, for the schema and the documentation.
-        vector: whether it has one component a direction instead of one number.
-        default: its value where the key is left out; None where it must be given.
+        argument: the argument of the class that receives the value in SI units.
+        dimension: dimension of the value, a key of `units.SI_UNITS`.
+        about: description for the schema and for messages.
+        vector: whether the value has one component per direction instead of being one number.
+        default: value if the key is left out; None for a required key.
     """
 
     argument: str
@@ -32,13 +32,13 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class LoadKind:
-    """A load of study files.
+    """A kind of load in study files.
 
     Attributes:
-        load: its class; one with an argument `on` needs a selection, another acts on the whole body.
-        value: what its own key takes.
-        further: other keys beside it, by name.
-        dims: the dimensions of the bodies that it loads.
+        load: the class of the load; with an argument `on` the load needs a selection, else it acts on the whole body.
+        value: the value of the key that names the load.
+        further: values of further keys, by key.
+        dims: dimensions of the bodies that the load can act on.
     """
 
     load: type[Load]
@@ -47,16 +47,16 @@ class LoadKind:
     dims: tuple[int, ...] = (2, 3)
 
     def quantities(self, key: str) -> dict[str, Quantity]:
-        """Return what its keys take, `key` being its own."""
+        """Return the values of all keys of the load, where `key` names the load."""
         return {key: self.value, **self.further}
 
     @property
     def on_selection(self) -> bool:
-        """Whether it acts on a selection, not on the whole body."""
+        """Whether the load acts on a selection, not on the whole body."""
         return any(one.name == "on" and one.init for one in fields(self.load))  # type: ignore[arg-type]  # a dataclass
 
 
-#: The loads by their key of `[[load]]`.
+#: The kinds of loads by the key of `[[load]]` that names them.
 LOADS: Mapping[str, LoadKind] = MappingProxyType(
     {
         "force": LoadKind(
@@ -70,7 +70,7 @@ LOADS: Mapping[str, LoadKind] = MappingProxyType(
         ),
         "moment": LoadKind(
             Moment,
-            Quantity("moment", "moment", "the moment, anticlockwise, which turns with the nodes of a plane body"),
+            Quantity("moment", "moment", "the moment on nodes of a plane body, anticlockwise, which rotates with them"),
             dims=(2,),
         ),
         "gravity": LoadKind(

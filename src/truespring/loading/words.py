@@ -1,4 +1,4 @@
-"""Words for loads and supports, as a file's header, a table row and an error message use them."""
+"""Descriptions of vectors and selections for file headers, tables and error messages."""
 
 from collections.abc import Sequence
 
@@ -7,12 +7,12 @@ from truespring.mesh import Box, Near, Plane, Selection, counted
 
 
 def vector_words(values: Sequence[float] | Floats, digits: int = 6) -> str:
-    """Return components in brackets: "(0, -0.043)"."""
+    """Return the components of a vector as text: "(0, -0.043)"."""
     return f"({', '.join(f'{value:.{digits}g}' for value in values)})"
 
 
 def selection_words(on: Selection) -> str:
-    """Return what a selection names: "'right'", "the nodes at x = 0.16 m", "3 chosen nodes"."""
+    """Return a description of a selection: "'right'", "the nodes at x = 0.16 m", "3 nodes"."""
     match on:
         case str():
             return f"'{on}'"
@@ -23,4 +23,4 @@ def selection_words(on: Selection) -> str:
         case Near(point):
             return f"the node nearest to {vector_words(point)} m"
         case _:
-            return counted(len(on), "chosen node")
+            return counted(len(on), "node")

@@ -62,7 +62,7 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
     moved = [axis for axis in _AXES if f"u{axis}" in data.columns]
     if undeformed is None and not moved:
         if data.unknown:
-            data.refuse_unknown()
+            data.raise_unknown()
         raise ReferenceFileError(
             f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or give a second "
             f"file with the markers at rest (--undeformed); the first line may be: {_FORM}"
@@ -71,7 +71,7 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
         raise ReferenceFileError(f"{file} has the displacement in column u{moved[0]}: leave undeformed out")
     if moved and moved != axes:
         if data.unknown:
-            data.refuse_unknown()
+            data.raise_unknown()
         raise ReferenceFileError(f"{file}:1: places have {', '.join(axes)}, displacements u{', u'.join(moved)}")
     groups = _levels(data)
     rest = data if undeformed is None else _columns(undeformed)

@@ -1,4 +1,4 @@
-"""Study files: read, checked, run."""
+"""Study files: read, check and run them, and write their results."""
 
 from truespring.study.changes import value_at as value_at
 from truespring.study.export import export_study as export_study

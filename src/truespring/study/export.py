@@ -1,4 +1,4 @@
-"""The springs of a study, carried to other simulators."""
+"""Export the springs of a study to other simulators."""
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -17,13 +17,13 @@ from truespring.study.run import Progress
 
 @dataclass(frozen=True, eq=False)
 class Exports:
-    """What `export_study` wrote for one target.
+    """Files written for one target.
 
     Attributes:
         target: a key of TARGETS.
-        model: the name of the springs in the study.
-        exported: what was written.
-        files: where.
+        model: the name of the exported model in the study.
+        exported: the model with its problem and equilibrium.
+        files: paths of the files.
     """
 
     target: str
@@ -33,12 +33,12 @@ class Exports:
 
     @property
     def converged(self) -> bool:
-        """Whether the equilibrium that the files tell of was reached as it should."""
+        """Whether the solve converged, so that the files state an equilibrium at full load."""
         return self.exported.path.status is Status.CONVERGED and self.exported.state is not None
 
     @property
     def values(self) -> dict[str, Any]:
-        """The same as values that JSON can hold; the displacement is None where full load was not reached."""
+        """The result as JSON values; the probe's displacement is None if full load was not reached."""
         exported, state = self.exported, self.exported.state
         return {
             "target": self.target,
@@ -56,34 +56,34 @@ class Exports:
         }
 
     @property
-    def told(self) -> tuple[str, ...]:
-        """What a user should know of the files, in sentences: those of their heads but for what the study says."""
+    def sentences(self) -> tuple[str, ...]:
+        """The expected results and notes from the heads of the files, as sentences."""
         return (*self.exported.expected, *self.exported.notes)
 
     @property
     def fault(self) -> str:
-        """What went wrong where it did not converge."""
+        """Message for a solve that did not converge."""
         path = self.exported.path
         return (
             f"model '{self.model}' is {path.status}; reached load factor {path.load_factor:.6g}; "
-            "the files are written, what they do elsewhere is open"
+            "the files are written without an equilibrium to compare with"
         )
 
 
 def springs_of(study: Study, targets: Collection[str], name: str | None = None) -> str:
-    """Return the name of the springs to export: the compared model where it is springs, else the first that is.
+    """Return the name of the springs model to export: `name`, or the compared model, or the first springs model.
 
-    Raises ExportError for an unknown target, for springs that a target cannot take, and where there are none or
-    `name` is not among them; nothing is solved.
+    Solves nothing. Raises ExportError if a target is unknown or cannot represent the model, if the study has no springs
+    model, or if `name` is not one.
     """
     known = known_targets(targets)
     springs = {one: entry for one, entry in study.entries.items() if entry.has_springs}
     if not springs:
-        raise ExportError(f"{study.file}: no model of springs among {', '.join(study.entries)}: add one to [models]")
+        raise ExportError(f"{study.file}: no springs model among {', '.join(study.entries)}: add one to [models]")
     if name is None:
         name = study.model if study.model in springs else next(iter(springs))
     if name not in springs:
-        what = "is no model of springs" if name in study.entries else f"is not among the models{nearest(name, springs)}"
+        what = "is not a springs model" if name in study.entries else f"is not among the models{nearest(name, springs)}"
         raise ExportError(f"{study.file}: model '{name}' {what}; springs: {', '.join(springs)}")
     with _named(study, name):
         check_targets(known, study.problem, springs[name])
@@ -93,9 +93,9 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
 def export_study(
     study: Study, targets: Collection[str], out: Path, name: str | None = None, progress: Progress | None = None
 ) -> list[Exports]:
-    """Solve the springs of a study and write them for each target into out/STEM; return what was written.
+    """Solve the springs of a study, write them for each target to out/STEM, and return the files of each target.
 
-    Raises ExportError for what a target cannot express, and where two targets would write the same file.
+    Raises ExportError if a target cannot represent the model or its loads, or if two targets write the same file.
     """
     name = springs_of(study, targets, name)
     model = study.entries[name]
@@ -115,7 +115,7 @@ def export_study(
 
 @contextmanager
 def _named(study: Study, name: str) -> Iterator[None]:
-    """Name the study and the model in front of what a target cannot express."""
+    """Put study and model before the message of an ExportError."""
     try:
         yield
     except ExportError as error:

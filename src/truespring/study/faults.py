@@ -1,4 +1,4 @@
-"""Faults that pydantic finds in a study file, as one readable line each."""
+"""Convert the errors that pydantic finds in a study file to messages of one line each."""
 
 import re
 from typing import Any, get_args
@@ -13,7 +13,7 @@ _OTHER_MESHES = "file = a mesh file, voxels = a label image, nodes and springs =
 
 
 def fault_lines(places: Places, error: ValidationError) -> list[str]:
-    """Return one line a fault; a missing key is left out where an unknown one beside it is its misspelling."""
+    """Return one line per error; leave out a missing key if an unknown key beside it is a likely misspelling."""
     faults = error.errors()
     meant: set[Key] = set()
     for fault in faults:
@@ -24,7 +24,7 @@ def fault_lines(places: Places, error: ValidationError) -> list[str]:
 
 
 def _line(places: Places, fault: Any) -> str:
-    """Return file, line, key, value and what is allowed."""
+    """Return the message of one error: file, line, key, value and what is allowed."""
     key = _without_tag(fault["loc"])
     place = places.of(key)
     value, text = fault["input"], str(fault["msg"])
@@ -42,33 +42,31 @@ def _line(places: Places, fault: Any) -> str:
             words = re.findall(r"'([^']*)'", expected)
             return f"{place} = {shown(value)}: allowed: {expected}{nearest(shown(value), words)}"
         case "union_tag_invalid" | "union_tag_not_found" if key == ("mesh",):
-            given = value.get("shape") if isinstance(value, dict) else value
-            if given is None:
+            tag = value.get("shape") if isinstance(value, dict) else value
+            if tag is None:
                 return f"{place}: shape is required and missing; allowed: {', '.join(SHAPES)}; or {_OTHER_MESHES}"
             allowed_shapes = " or ".join(f"'{shape}'" for shape in SHAPES)
-            close = nearest(shown(given), SHAPES)
-            return f"{place}.shape = {shown(given)}{close}; allowed: {allowed_shapes}; or {_OTHER_MESHES}"
+            close = nearest(shown(tag), SHAPES)
+            return f"{place}.shape = {shown(tag)}{close}; allowed: {allowed_shapes}; or {_OTHER_MESHES}"
         case "union_tag_invalid" | "union_tag_not_found":
-            given = value.get("kind") if isinstance(value, dict) else value
-            return (
-                f"{place}: kind = {shown(given)}{nearest(shown(given), MODEL_KINDS)}; allowed: {', '.join(MODEL_KINDS)}"
-            )
+            tag = value.get("kind") if isinstance(value, dict) else value
+            return f"{place}: kind = {shown(tag)}{nearest(shown(tag), MODEL_KINDS)}; allowed: {', '.join(MODEL_KINDS)}"
         case "string_pattern_mismatch" if fault["loc"][-1] == "[key]":
-            return f"{place}: a model's name is made of letters, digits, '_' and '-', it names files"
+            return f"{place}: a model's name may have letters, digits, '_' and '-' only, since files are named by it"
         case _:
             found = "" if isinstance(value, dict | list) and len(str(value)) > 60 else f" = {shown(value)}"
             return f"{place}{found}: {text[0].lower()}{text[1:]}"
 
 
 def _without_tag(loc: Key) -> Key:
-    """Return the key without the kind that pydantic puts behind a model's name, and its mark of a faulty key."""
+    """Return the key without the tags that pydantic inserts: the kind of a model, the form of a mesh, and '[key]'."""
     key = loc[:2] + loc[3:] if loc[0] == "models" and len(loc) > 2 else loc
     key = key[:1] + key[2:] if key[0] == "mesh" and len(key) > 2 else key
     return tuple(part for part in key if part != "[key]")
 
 
 def _allowed_keys(loc: Key) -> list[str]:
-    """Return the keys that the study takes at a place, as pydantic names it."""
+    """Return the allowed keys of the table at `loc`, a location as pydantic reports it."""
     match loc:
         case ():
             return list(StudyKeys.model_fields)
@@ -84,7 +82,7 @@ def _allowed_keys(loc: Key) -> list[str]:
 
 
 def _keys_in(annotation: Any) -> type[Keys]:
-    """Return the class of keys in a type such as `list[RegionKeys] | None`."""
+    """Return the subclass of Keys in a type such as `list[RegionKeys] | None`."""
     held = [annotation]
     while not (isinstance(held[0], type) and issubclass(held[0], Keys)):
         held = [*held[1:], *get_args(held[0])]

@@ -1,4 +1,4 @@
-"""The effective moduli of the springs of a study, known without solving."""
+"""Effective moduli of the springs models of a study, computed without solving."""
 
 import json
 import math
@@ -26,14 +26,14 @@ from truespring.study.read import Study
 
 @dataclass(frozen=True, eq=False)
 class Realised:
-    """The effective moduli of the springs of a model, known without solving.
+    """The effective moduli of a springs model.
 
     Attributes:
-        name: of the model in the study.
+        name: name of the model in the study.
         springs: the model.
-        by_material: the moduli beside each material, that of the body first, then those of its regions.
-        fitness: whether the springs fit all of them, and which fit better.
-        section: a note on the moduli of the material in its section, empty where they are its own.
+        by_material: each material and the effective moduli for it; the material of the body first, then the regions.
+        fitness: whether the springs fit all materials, and which rule fits better.
+        section: a note if the section changes the moduli of the material, as plane strain does; else empty.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Realised:
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """Titles of the moduli beside each material, with the material where there are several."""
+        """A title for each entry of `by_material`; it names the material if there are several."""
         what = f"effective moduli of '{self.name}', {self.springs.label}"
         if len(self.by_material) == 1:
             return (what,)
@@ -55,7 +55,7 @@ class Realised:
 
 
 def realised_moduli(study: Study) -> Iterator[Realised]:
-    """Yield the effective moduli of each springs model of a study, solving nothing."""
+    """Yield the effective moduli of each springs model of a study."""
     section = study.problem.section
     words = f"in {section.words} the material has {section.moduli_words}" if section and section.moduli_words else ""
     for name, entry in springs_by_rule(study.entries).items():
@@ -67,7 +67,7 @@ def realised_moduli(study: Study) -> Iterator[Realised]:
 
 
 def realised_values(realised: Realised) -> dict[str, Any]:
-    """Return effective moduli as values that JSON can hold: for the material of the body, then for those of regions."""
+    """Return effective moduli as JSON values: for the material of the body, and under `regions` for the others."""
     (material, first), *others = realised.by_material
     fitness, better = realised.fitness, realised.fitness.better
     return {
@@ -88,7 +88,7 @@ def realised_values(realised: Realised) -> dict[str, Any]:
 
 
 def finding_values(findings: Sequence[Finding]) -> list[dict[str, Any]]:
-    """Return findings as values that JSON can hold; a number that is not finite is None."""
+    """Return findings as JSON values; numbers that are not finite become None."""
     return [
         {
             "code": one.code,
@@ -104,7 +104,7 @@ def _material(material: Material) -> dict[str, float]:
 
 
 def write_moduli(study: Study, realised: Sequence[Realised], out: Path) -> Path | None:
-    """Write moduli.json and a picture of Young's modulus by direction into out/STEM; return the picture, if any."""
+    """Write moduli.json and a plot of Young's modulus by direction to out/STEM; return the path of the plot."""
     with Output(out / study.stem, "moduli.json") as output:
         values = {one.name: realised_values(one) for one in realised}
         text = json.dumps(values, indent=2, allow_nan=False)
@@ -128,7 +128,7 @@ def _draw_moduli(study: Study, realised: Sequence[Realised], folder: Path) -> Pa
 
 
 def rule_values() -> dict[str, dict[str, Any]]:
-    """Return the stiffness rules with what they realise and their source, as values that JSON can hold."""
+    """Return elements, effective moduli, parameters and source of each stiffness rule as JSON values."""
     return {
         name: {
             "elements": list(rule.elements),

@@ -1,4 +1,4 @@
-"""Networks from two CSV files: nodes, and the springs between them."""
+"""Read a spring network from two CSV files, one of nodes and one of springs."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from truespring.errors import MeshError, TruespringError
 from truespring.models import SpringNetwork
 from truespring.units import Dimension
 
-# Columns by name, and what they measure; others are refused.
+# Dimension of each allowed column; None for texts and numbers without a unit.
 _NODE_COLUMNS: dict[str, Dimension | None] = {"node": None, "x": "length", "y": "length", "z": "length"}
 _SPRING_COLUMNS: dict[str, Dimension | None] = {
     "a": None,
@@ -20,15 +20,15 @@ _SPRING_COLUMNS: dict[str, Dimension | None] = {
 
 
 def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
-    """Read a network from two CSV files with a line of column names each.
+    """Read a network from two CSV files, each with a header line.
 
     Args:
-        nodes: columns x, y and in space z; `node`, where there is one, names each.
-        springs: columns a and b, the nodes that a spring joins, by their names or, where they have none, by their
-            numbers from 0; stiffness; and rest_length, where springs do not have the distance of their nodes.
+        nodes: columns x, y and, in 3D, z; optionally `node`, the name of each node.
+        springs: columns a and b, the two nodes of each spring, by name or, without names, by number from 0; stiffness;
+            and optionally rest_length, by default the distance of the nodes.
 
-    Numbers are SI; a unit may stand behind a column's name: "x [mm]", "stiffness [N/mm]". Raises MeshError, with file
-    and line, where a file is damaged or names what is not there.
+    Numbers are in SI units unless the header has a unit: "x [mm]", "stiffness [N/mm]". Raises MeshError with file and
+    line if a file is damaged or a spring refers to an unknown node.
     """
     data = Columns(Path(nodes), _NODE_COLUMNS, ("x", "y"))
     axes = [axis for axis in "xyz" if axis in data.columns]
@@ -37,7 +37,7 @@ def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
     number = {name: place for place, name in enumerate(names)}
     if len(number) < len(names):
         twice = next(name for place, name in enumerate(names) if number[name] != place)
-        raise MeshError(f"{nodes}: node {twice} is there twice")
+        raise MeshError(f"{nodes}: node {twice} is listed twice")
     joined = Columns(Path(springs), _SPRING_COLUMNS, ("a", "b", "stiffness"))
     ends = np.array([[joined.known(column, row, number) for column in "ab"] for row in range(joined.n_rows)])
     rest = joined.numbers("rest_length") if "rest_length" in joined.columns else np.zeros(0)

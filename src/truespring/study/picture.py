@@ -1,4 +1,4 @@
-"""The picture of a study before it is solved: what is held, what is loaded, and where the springs are."""
+"""Draw a study before it is solved: supports, loads and springs."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from truespring.study.read import Study
 
 
 def write_picture(study: Study, out: Path) -> Path:
-    """Write out/STEM/check.png, the mesh with springs, supports, loads and the probe; return the file."""
+    """Draw mesh, springs, supports, loads and probe to out/STEM/check.png; return the path."""
     from truespring.report.figures import save_undeformed
     from truespring.report.undeformed import Undeformed
 
@@ -26,6 +26,6 @@ def write_picture(study: Study, out: Path) -> Path:
 
 
 def _springs(model: Model, problem: Problem) -> Ints | None:
-    """Return the pairs of nodes that the springs of a model join, shape (n, 2); None where it has none."""
+    """Return the node numbers of the springs of a model, shape (n, 2); None for a model without springs."""
     potential = model.potential(problem) if model.has_springs else None
     return potential.springs if isinstance(potential, Stretched) else None

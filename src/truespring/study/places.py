@@ -1,4 +1,4 @@
-"""Where the keys of a study file stand, for error messages: file, line and key."""
+"""Locate the keys of a study file for error messages: file, line and key."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from truespring.errors import StudyError, TruespringError, one_line, shown
 
-#: A key as the way to it from the top: ("load", 0, "force"); lists count from 0.
+#: A key as a path from the top of the file: ("load", 0, "force"); lists count from 0.
 Key = tuple[str | int, ...]
 
 
@@ -16,29 +16,31 @@ class Places:
     """A study file and the lines of its keys."""
 
     def __init__(self, file: Path, source: str) -> None:
-        """Take the file as it was named, and its text."""
+        """Store the path as the user gave it, and the text of the file."""
         self.file, self._source = file, source
 
     @cached_property
     def lines(self) -> Mapping[Key, int]:
-        """The line of each key, from 1."""
+        """The line number of each key, from 1."""
         return line_numbers(self._source)
 
     def beside(self, name: str) -> Path:
-        """Return the path of a file that the study names, which stands beside it unless its path is absolute."""
+        """Return the path of a file that the study refers to, relative to the study's folder."""
         return self.file.parent / name
 
     def of(self, key: Key) -> str:
-        """Return file, line and key as an error message begins: "study.toml:12: load.1.force"."""
+        """Return the start of an error message: "study.toml:12: load.1.force"."""
         return place_of(self.file, key, self.lines)
 
     @contextmanager
     def at(self, *key: str | int) -> Iterator[None]:
-        """Put file, line and key before the message of any error, which becomes a StudyError."""
+        """Convert a TruespringError or OSError to a StudyError that begins with file, line and key."""
         try:
             yield
         except TruespringError as error:
-            if isinstance(error, StudyError) and str(error).startswith(f"{self.file}:"):  # named already, more closely
+            if isinstance(error, StudyError) and str(error).startswith(
+                f"{self.file}:"
+            ):  # already located, more precisely
                 raise
             raise StudyError(f"{self.of(key)}: {one_line(str(error))}") from None
         except OSError as error:
@@ -47,14 +49,14 @@ class Places:
 
 
 def place_of(file: Path, key: Key, lines: Mapping[Key, int]) -> str:
-    """Return the file, the line of the key or of the nearest table around it, and the key; lists count from 1."""
+    """Return the file, the line of the key or of the table around it, and the key; lists count from 1."""
     known = next((lines[key[:n]] for n in range(len(key), 0, -1) if key[:n] in lines), None)
     dotted = one_line(".".join(str(part + 1) if isinstance(part, int) else part for part in key), 200)
     return f"{file}:{known}: {dotted}" if known else f"{file}: {dotted}"
 
 
 def line_numbers(source: str) -> dict[Key, int]:
-    """Return the line of each table and key that is written in the plain way; inline tables are left out."""
+    """Return the line number of each table and key; keys in inline tables and dotted keys are left out."""
     lines: dict[Key, int] = {}
     count: dict[str, int] = {}
     table: Key = ()

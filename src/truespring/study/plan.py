@@ -1,4 +1,4 @@
-"""The plan of a study: what `check` shows, without solving."""
+"""Summarise a study without solving it, for `check`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,13 +19,13 @@ from truespring.study.read import Study
 
 
 def _values(material: Material) -> dict[str, float | None]:
-    """The keys of `[material]` with their values [SI]."""
+    """Return the keys of `[material]` with their values in SI units."""
     young, poisson, density = material.young, material.poisson, material.density
     return {"young": young, "poisson": poisson, "density": density, **dict(material.constants)}
 
 
 def plan(study: Study) -> dict[str, Any]:
-    """Return what would be run, solving nothing: sizes, loads, supports, and what the springs realise."""
+    """Return size, mesh, loads, supports, models and effective moduli of a study as JSON values; solve nothing."""
     problem = study.problem
     mesh, loading = problem.mesh, problem.loading
     return {
@@ -58,7 +58,7 @@ def _section(problem: Problem) -> dict[str, Any] | None:
 
 
 def _model_plan(study: Study, name: str) -> Mapping[str, Any]:
-    """Return what is known of a model before it is solved."""
+    """Return label, law, element, number of springs, moduli and warnings of a model."""
     problem, model = study.problem, study.entries[name]
     realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
     plan: dict[str, Any] = {"kind": study.keys.models[name].kind, "label": model.label_on(problem)}

@@ -1,4 +1,4 @@
-"""From a study file to the objects of the Python API: read, checked, nothing solved."""
+"""Read and check a study file, and build the objects of the Python API from it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,20 +23,20 @@ from truespring.study.schema import Scope, StudyKeys
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A study file as objects, checked as far as can be without solving.
+    """A study file as objects, checked as far as possible without solving.
 
     Attributes:
-        title: the study's own.
-        text: what it was read from, with the changes that were made.
-        keys: its checked values in SI, all defaults filled in; elements are counted as fine as the mesh is.
-        halvings: how often the mesh was made finer than the file says.
-        problem, solver: what is asked and how it is solved.
+        title: title of the report.
+        text: the file and its TOML, including changed values.
+        keys: the checked values in SI units with all defaults; `elements` counts those of the refined mesh.
+        halvings: how often the element size of the file was halved.
+        problem, solver: the problem and its solver.
         entries: the models by name: solved here, by another program, or read from a file (ReadSolution).
-        model: the name of the entry that is compared with the others, None where there is nothing to compare.
-        references: the names that it is compared with.
-        probe: number of the node that is watched; None takes the one that moves most.
-        tolerance: the error, rms or of force, up to which two paths agree.
-        refine: whether each reference is solved on finer meshes too, to estimate its own error.
+        model: name of the model that is compared with the references.
+        references: names of the reference models.
+        probe: number of the probe's node; None for the node that moves most.
+        tolerance: largest error, rms or of force, at which two results agree.
+        refine: whether each reference is also solved on a finer mesh to estimate its discretisation error.
     """
 
     title: str
@@ -54,31 +54,31 @@ class Study:
 
     @property
     def file(self) -> Path:
-        """The study's file, as it was named."""
+        """Path of the study file as the user gave it."""
         return self.text.file
 
     @property
     def source(self) -> str:
-        """The text of the file."""
+        """Text of the study file."""
         return self.text.source
 
     def finer(self, halvings: int = 1) -> "Study":
-        """Return this study on a mesh of half the size, so many times, from what was read; raise StudyError."""
+        """Return the study with the element size halved `halvings` times; raise StudyError if that fails."""
         return self.text.study(halvings=self.halvings + halvings)
 
     @property
     def stem(self) -> str:
-        """The file's name without its suffix; names the output folder."""
+        """Name of the file without its suffix, used as the name of the output folder."""
         return self.file.stem
 
 
 @dataclass(frozen=True)
 class StudyText:
-    """A study file as it stands: what studies are made of, as it is or with other values.
+    """A study file that is parsed but not yet checked; builds studies with the values of the file or with others.
 
     Attributes:
-        file, source: the file as it was named, and its text.
-        document: what the text is in TOML with what was changed in it, not yet checked.
+        file, source: path as the user gave it, and text of the file.
+        document: the parsed TOML, including changed values.
     """
 
     file: Path
@@ -87,18 +87,18 @@ class StudyText:
 
     @cached_property
     def places(self) -> Places:
-        """Where its keys stand."""
+        """Line numbers of the keys."""
         return Places(self.file, self.source)
 
     def changed(self, changes: Mapping[str, Any]) -> "StudyText":
-        """Return it with other values by key, such as {"load.1.force": [0, 1]}; raise StudyError."""
+        """Return a copy with other values by dotted key, such as {"load.1.force": [0, 1]}; raise StudyError."""
         try:
             return replace(self, document=changed(self.document, changes))
         except StudyError as error:
             raise StudyError(f"{self.file}: {error}") from None
 
     def keys(self, changes: Mapping[str, Any] | None = None) -> StudyKeys:
-        """Return the checked values in SI, some of them changed; raise StudyError with every fault."""
+        """Return the checked values in SI units, with `changes` by dotted key; raise StudyError with all errors."""
         text = self.changed(changes) if changes else self
         try:
             return StudyKeys.model_validate(text.document)
@@ -106,7 +106,7 @@ class StudyText:
             raise StudyError("\n".join(fault_lines(self.places, error))) from None
 
     def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0) -> Study:
-        """Return the study, checked as far as can be without solving; raise StudyError."""
+        """Return the study, checked as far as possible without solving; raise StudyError. See `read_study`."""
         text = self.changed(changes) if changes else self
         keys = text.keys()
         keys = keys.model_copy(update={"mesh": keys.mesh.finer(halvings)}) if halvings else keys
@@ -114,15 +114,17 @@ class StudyText:
 
 
 def read_text(file: str | Path) -> StudyText:
-    """Read a study file; raise StudyError where it cannot be read or is not valid TOML."""
+    """Read and parse a study file; raise StudyError if it cannot be read or is not valid TOML."""
     return StudyText(Path(file), *parse(Path(file)))
 
 
 def read_study(file: str | Path, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
-    """Read and check a study file; raise StudyError with file, key, value and what is allowed.
+    """Read and check a study file; raise StudyError with file, line, key, value and what is allowed.
 
-    With `halvings` its mesh is that many times finer: elements of half the size, each time. With `changes` some keys
-    have other values: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
+    Args:
+        file: path of the study.
+        halvings: how often to halve the element size.
+        changes: other values by dotted key: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
     """
     return read_text(file).study(changes, halvings)
 
@@ -158,7 +160,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int) -> Study:
 
 
 def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, SpringNetwork | None]:
-    """Return the problem, and the network that its mesh is, None for a mesh of elements."""
+    """Return the problem, and the spring network if the mesh is one, else None."""
     with places.at("mesh"):
         read = keys.mesh.build(places, halvings)
     network = read if isinstance(read, SpringNetwork) else None
@@ -185,10 +187,10 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
 
 
 def _section(keys: StudyKeys, places: Places, mesh: Mesh) -> Section | None:
-    """Return the section of a plane body, None in 3D."""
+    """Return the section of a plane body, None for a body in 3D."""
     with places.at("section"):
         if mesh.dim == 3 and keys.section is not None:
-            raise StudyError("is for plane bodies: a body in 3D has none")
+            raise StudyError("is for plane bodies only: leave it out in 3D")
         if mesh.dim == 3:
             return None
         if keys.section is None:

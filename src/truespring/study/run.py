@@ -1,4 +1,4 @@
-"""Running a study: solve its models and compare them."""
+"""Solve the models of a study and compare them."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,10 @@ from truespring.solvers import Reporter
 from truespring.study.read import Study
 from truespring.study.standings import standings
 
-#: Called with study, model and the load factor reached, for a progress bar.
+#: Callback with study, model and the load factor reached, for a progress bar.
 Progress = Callable[[str, str, float], None]
 
-#: Called with the name of a model and its path as soon as that is known.
+#: Callback with the name of a model and its solution, called when the model is solved.
 Known = Callable[[str, Solution], None]
 
 
@@ -29,11 +29,18 @@ def run(
     known: Known | None = None,
     refining: bool = True,
 ) -> Result:
-    """Solve every model of a study and, if wanted, compare; a model that fails keeps what it reached.
+    """Solve every model of a study and compare the first springs, or the model of `[compare]`, with the references.
 
-    With a `timeout` [s] each model, and the refinement of each reference, ends after that long; another program ends
-    after an hour where none is given. `known` is called with each path before the next model is solved. With
-    `refining`, unless the study leaves it out, references are refined to estimate their own error.
+    A model that fails keeps the load levels that it reached.
+
+    Args:
+        study: the study.
+        progress: callback for a progress bar.
+        comparing: whether to compare the models and judge the springs.
+        timeout: time limit [s] of each model and of the refinement of each reference; default: none, an hour for other
+            programs.
+        known: callback for each solution, called before the next model is solved.
+        refining: whether to refine references to estimate their discretisation error, if the study allows it.
     """
     paths: dict[str, Solution] = {}
     for name, entry in study.entries.items():
@@ -70,9 +77,9 @@ def run(
 
 
 def follow(study: Study, model: Model, report: Reporter | None = None, timeout: float | None = None) -> Solution:
-    """Return the path of a model of a study: solved here, solved by another program, or as it was read.
+    """Return the solution of one model of a study: solved here, solved by another program, or read from a file.
 
-    Whatever is raised on the way is this model's own: its path is at rest then, and tells why.
+    If the model raises an exception, return a solution without load levels that has the reason as a warning.
     """
     try:
         return solve(study.problem, model, study.solver, report, timeout)

@@ -1,4 +1,4 @@
-"""Several studies of one command: all are checked before any is solved."""
+"""Read several studies, and check all of them before any is solved."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,14 +8,16 @@ from truespring.study.read import Study, read_study
 
 
 def read_studies(files: Sequence[str | Path]) -> list[Study]:
-    """Read and check all studies before any is solved; raise StudyError with the faults of all of them."""
+    """Read and check studies; raise StudyError with the errors of all of them, or if two files have the same stem."""
     studies: list[Study] = []
     faults: list[str] = []
     seen: dict[str, str | Path] = {}
     for file in files:
         stem = Path(file).stem.casefold()
         if stem in seen:
-            faults.append(f"{file} and {seen[stem]} have one stem, '{stem}': their outputs would share a folder")
+            faults.append(
+                f"{file} and {seen[stem]} have the same stem, '{stem}', so they share an output folder: rename one"
+            )
         seen[stem] = file
         try:
             studies.append(read_study(file))

@@ -1,4 +1,4 @@
-"""How far the references of a study are themselves off, by refinement that costs little beside the study."""
+"""Estimate the discretisation error of the references of a study by refinement."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,20 +10,21 @@ from truespring.study.read import Study
 def standings(
     study: Study, paths: Mapping[str, Solution], names: Sequence[str], timeout: float | None = None
 ) -> dict[str, Standing]:
-    """Return how each reference stands to its own limit; empty where the study leaves refinement out.
+    """Return the discretisation error of each reference in `names`; empty if the study has `refine = false`.
 
-    All of it takes at most COST times the work of the study's own paths, and each reference `timeout` [s] at most.
+    The total work is limited to COST times that of the solutions in `paths`, the time of each reference to `timeout`
+    [s].
     """
     if not study.refine:
         return {}
     left = COST * sum(work_of(path) for path in paths.values() if path.solved)
     found = {}
-    # What has a law tells most by its limit: springs as references come last.
+    # References with a law are refined first: their error matters most if the work does not suffice for all.
     for name in sorted(names, key=lambda name: study.entries[name].law is None):
         try:
             own = own_error(paths[name], study.entries[name], study.solver, left, timeout)
             left -= own.work
             found[name] = standing(paths[study.model], own)
-        except Exception as error:  # what was solved before is not lost for that
+        except Exception as error:  # keep the results of the study
             found[name] = Standing(None, error_words(error))
     return {name: found[name] for name in names}

@@ -1,4 +1,4 @@
-"""Tables of a study back to TOML."""
+"""Write the tables of a study as TOML."""
 
 import json
 import re
@@ -7,12 +7,12 @@ from typing import Any
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Return tables as tomllib reads them as a TOML document: tables of tables, and lists of tables, by headers."""
+    """Return the TOML text of tables as tomllib reads them; tables and lists of tables get headers."""
     return "\n".join(_tables(tables, "")).lstrip("\n") + "\n"
 
 
 def _tables(table: Mapping[str, Any], name: str) -> Iterator[str]:
-    """Yield the plain keys of a table, then those that are tables of tables at the top, or all at its first level."""
+    """Yield the lines of a table called `name`: first keys with plain values, then tables under their headers."""
     own = {key: value for key, value in table.items() if not _has_header(value, name)}
     for key, value in own.items():
         yield f"{_key(key)} = {_value(value)}"
@@ -22,14 +22,14 @@ def _tables(table: Mapping[str, Any], name: str) -> Iterator[str]:
         whole = f"{name}.{_key(key)}" if name else _key(key)
         for one in value if isinstance(value, list) else [value]:
             if not isinstance(value, list) and one and all(isinstance(inner, Mapping) for inner in one.values()):
-                yield from _tables(one, whole)  # of nothing but tables the header is not needed
+                yield from _tables(one, whole)  # a table that holds only tables needs no header
                 continue
             yield f"\n[[{whole}]]" if isinstance(value, list) else f"\n[{whole}]"
             yield from (f"{_key(inner)} = {_value(what)}" for inner, what in one.items())
 
 
 def _has_header(value: Any, name: str) -> bool:
-    """Whether a value stands below a header of its own: at the first level, and tables in tables of models."""
+    """Return whether a value in table `name` is written under a header: tables, and lists of tables at the top."""
     tables = isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value)
     return isinstance(value, Mapping) or (not name and bool(tables))
 

@@ -1,4 +1,4 @@
-"""The files of a study: curves, summary, VTU series, STL, figures and a page."""
+"""Write the results of a study: curves, summary, VTU series, STL, figures and report."""
 
 import json
 import shlex
@@ -16,12 +16,12 @@ from truespring.study.read import Study
 
 
 def output(study: Study | Result, out: Path) -> Output:
-    """Return the output of a study, in out/STEM."""
+    """Open the output folder of a study, out/STEM."""
     return Output(out / study.stem, "summary.json")
 
 
 def write(result: Result, out: Path, report: bool = True) -> None:
-    """Write curves, summary, VTU series and STL of a study into out/STEM, with `report` the figures and a page too."""
+    """Write curves, summary, VTU series and STL of a study to out/STEM; with `report` also figures and report.html."""
     with output(result, out) as own:
         for name, path in result.paths.items():
             write_model(path, own, name)
@@ -29,13 +29,16 @@ def write(result: Result, out: Path, report: bool = True) -> None:
 
 
 def write_model(path: Solution, output: Output, name: str) -> None:
-    """Write what a model alone leaves, its VTU series and STL, as soon as it is solved."""
+    """Write the VTU series and the STL file of one model."""
     write_series(path, output.staging, name)
     write_stl(path, output.staging / f"deformed_{name}.stl")
 
 
 def write_rest(result: Result, output: Output, command: str | None) -> None:
-    """Write what all models leave together and publish it; figures and a page, which tells the `command`, with one."""
+    """Write the files that cover all models and publish the output.
+
+    Figures and report are written only with `command`, the command line that the report shows.
+    """
     folder = output.staging
     write_curves(result, folder / "curves.csv")
     if moved_supports(result.problem):
@@ -54,7 +57,7 @@ def write_rest(result: Result, output: Output, command: str | None) -> None:
 
 
 def write_overview(results: Sequence[Result], out: Path) -> None:
-    """Write out/report.html over all studies, each written before; over one alone, its own page once more."""
+    """Write out/report.html over several studies that were written before; for one study, copy its report."""
     from truespring.report.page import render_page
 
     if len(results) == 1:
@@ -65,5 +68,5 @@ def write_overview(results: Sequence[Result], out: Path) -> None:
 
 
 def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
-    """Return the command line that verifies studies."""
+    """Return the command line that runs `verify` on the studies."""
     return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])

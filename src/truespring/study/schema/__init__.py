@@ -1,4 +1,4 @@
-"""The keys of study files, as pydantic knows them: what each takes, and what it builds. Numbers are SI inside."""
+"""Pydantic models of the keys of study files: they check values, convert them to SI units and build objects."""
 
 from truespring.study.schema.body import AnyLoad as AnyLoad
 from truespring.study.schema.body import LoadKeys as LoadKeys

@@ -1,4 +1,4 @@
-"""The keys of `[material]`, `[[region]]`, `[section]`, `[[support]]` and `[[load]]`, each of which builds its part."""
+"""Keys of `[material]`, `[[region]]`, `[section]`, `[[support]]` and `[[load]]`."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -30,7 +30,7 @@ from truespring.study.schema.values import (
 
 
 class PlainMaterialKeys(Keys):
-    """What the body is made of."""
+    """The material of the body."""
 
     young: Stress = Field(description='Young\'s modulus: a number in Pa, or a string with its unit such as "10 kPa"')
     poisson: Number = Field(description="Poisson's ratio")
@@ -39,12 +39,12 @@ class PlainMaterialKeys(Keys):
     def build(self) -> Material:
         """Return the material."""
         constants = {name: getattr(self, name, None) for name in material_constants()}
-        given = {name: value for name, value in constants.items() if value is not None}
-        return Material(self.young, self.poisson, self.density, given)
+        stated = {name: value for name, value in constants.items() if value is not None}
+        return Material(self.young, self.poisson, self.density, stated)
 
 
 def with_constants(keys: type[Keys], name: str, constants: Mapping[str, Constant]) -> type[Keys]:
-    """Return a class of this name that takes the constants of laws too, each an optional key with its unit."""
+    """Return a subclass of `keys` called `name` with the constants of laws as further optional keys."""
     fields: dict[str, Any] = {}
     for key, constant in constants.items():
         quantity = Number if constant.dimension is None else QUANTITIES[constant.dimension]
@@ -60,22 +60,22 @@ else:
 
 
 class RegionKeys(MaterialKeys):
-    """A part of the body of another material."""
+    """Elements of another material."""
 
     on: On = Field(
-        description="elements of this material: a group of an imported mesh, or a box that holds their centres"
+        description="elements of this material: a group of an imported mesh, or a box that contains their centres"
     )
 
     def region(self, mesh: Mesh) -> Region:
-        """Return the region; raise MeshError where it selects no element."""
+        """Return the region; raise MeshError if it selects no element."""
         select_elements(mesh, self.on)
         return Region(self.on, self.build())
 
 
 class SectionKeys(Keys):
-    """How a plane body behaves across the plane."""
+    """Section of a plane body: its thickness, and plane stress or plane strain."""
 
-    kind: SectionKind = Field(description="whether stress or strain vanishes across the plane")
+    kind: SectionKind = Field(description="whether the stress or the strain normal to the plane is zero")
     thickness: Length = Field(
         description='thickness of the body: a number in m, or a string with its unit such as "10 mm"'
     )
@@ -105,7 +105,7 @@ class SupportKeys(Keys):
     axis: Annotated[list[Number], three] | None = Field(default=None, description="axis of the rotation in 3D")
 
     def build(self, places: Places, number: int, mesh: Mesh) -> Fixed:
-        """Return the support, number `number` from 0; raise StudyError where it does not fit the mesh."""
+        """Return the support, the `number`-th of the study from 0; raise StudyError if it does not fit the mesh."""
         with places.at("support", number, "on"):
             select(mesh, self.on)
         for key in ("displacement", "about"):
@@ -115,23 +115,23 @@ class SupportKeys(Keys):
 
 
 class LoadKeys(Keys):
-    """A load: one key names it; all but those of the whole body act on a selection."""
+    """A load, which has exactly one of the keys that name a load; most loads act on a selection."""
 
     on: On = None
     kinds: ClassVar[Mapping[str, LoadKind]] = {}
 
     @model_validator(mode="after")
     def _one_load(self) -> Self:
-        given = [name for name in self.kinds if getattr(self, name) is not None]
-        if len(given) != 1:
-            found = f"{' and '.join(given)} are given" if given else "nothing is given"
-            raise ValueError(f"{found}: a load has one of {', '.join(self.kinds)}")
+        named = [name for name in self.kinds if getattr(self, name) is not None]
+        if len(named) != 1:
+            found = f"{' and '.join(named)} are set" if named else "no load is set"
+            raise ValueError(f"{found}: set exactly one of {', '.join(self.kinds)}")
         if self.kind.on_selection and self.on is None:
             raise ValueError(f"on is required and missing: where the {self.key} acts")
         if not self.kind.on_selection and self.on is not None:
             raise ValueError(f"{self.key} acts on the whole body: leave out on")
         for key in sorted(self.model_fields_set - {"on", self.key, *self.kind.further}):
-            raise ValueError(f"{key} does not go with {self.key}: leave it out")
+            raise ValueError(f"{key} cannot be combined with {self.key}: leave it out")
         for key, quantity in self.kind.further.items():
             if getattr(self, key) is None and quantity.default is None:
                 raise ValueError(f"{key} is required and missing: {quantity.about}")
@@ -144,14 +144,15 @@ class LoadKeys(Keys):
 
     @property
     def kind(self) -> LoadKind:
-        """What the load is."""
+        """The kind of the load."""
         return self.kinds[self.key]
 
     @property
     def values(self) -> dict[str, Any]:
-        """The values of the load's keys in SI, by key."""
-        given = {key: getattr(self, key) for key in (self.key, *self.kind.further)}
-        return {key: self.kind.quantities(self.key)[key].default if one is None else one for key, one in given.items()}
+        """The values of the keys in SI units, defaults included, by key."""
+        quantities = self.kind.quantities(self.key)
+        stated = {key: getattr(self, key) for key in (self.key, *self.kind.further)}
+        return {key: quantities[key].default if value is None else value for key, value in stated.items()}
 
     def load(self) -> Load:
         """Return the load."""
@@ -160,7 +161,7 @@ class LoadKeys(Keys):
         return self.kind.load(**({"on": self.on} if self.kind.on_selection else {}), **arguments)
 
     def build(self, places: Places, number: int, mesh: Mesh) -> Load:
-        """Return the load, number `number` from 0; raise StudyError where it does not fit the mesh."""
+        """Return the load, the `number`-th of the study from 0; raise StudyError if it does not fit the mesh."""
         if self.on is not None:
             with places.at("load", number, "on"):
                 select(mesh, self.on)
@@ -171,7 +172,7 @@ class LoadKeys(Keys):
 
 
 def load_form(kinds: Mapping[str, LoadKind]) -> type[LoadKeys]:
-    """Return the schema of `[[load]]` that takes these loads."""
+    """Return the class of keys of `[[load]]` for these kinds of loads."""
     keys = {key: one for name, kind in kinds.items() for key, one in kind.quantities(name).items()}
     fields: dict[str, Any] = {}
     for key, quantity in keys.items():
@@ -190,6 +191,6 @@ else:
 
 
 def check_length(values: Any, mesh: Mesh) -> None:
-    """Raise StudyError for a list that has not one value a direction of the mesh."""
+    """Raise StudyError if a list does not have one value per direction of the mesh."""
     if isinstance(values, list) and len(values) != mesh.dim:
         raise StudyError(f"{values} has {len(values)} values, the body has {mesh.dim} directions")

@@ -1,4 +1,4 @@
-"""The keys of `[mesh]`, one class a form, each of which builds its mesh."""
+"""Keys of `[mesh]`: one class for each form, which builds the mesh."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -32,16 +32,16 @@ class MeshKeys(Keys):
     """A body's mesh."""
 
     def finer(self, halvings: int) -> Self:
-        """Return the keys of a mesh with elements of half the size, so many times, where keys count elements."""
+        """Return the keys with the element size halved `halvings` times, if keys state numbers of elements."""
         return self
 
     @abstractmethod
     def build(self, places: Places, halvings: int) -> Mesh | SpringNetwork:
-        """Return the mesh, refined so many times unless `finer` did that; or a network, which has its own."""
+        """Return the mesh, or the network with its mesh; refine it `halvings` times unless `finer` did."""
 
 
 class ShapeKeys(MeshKeys):
-    """A shape that truespring meshes itself; a subclass has the keys `shape`, `size`, `elements` and `element`.
+    """A shape that truespring meshes; a subclass has the keys `shape`, `size`, `elements` and `element`.
 
     Attributes:
         is_bar: whether it is a rectangle or box with a corner at the origin, for which maps have standard loads.
@@ -56,10 +56,10 @@ class ShapeKeys(MeshKeys):
 
     @abstractmethod
     def divided(self, counts: Sequence[int]) -> Mesh:
-        """Return the shape divided into so many elements along each direction."""
+        """Return the mesh with `counts` elements along each direction."""
 
     def finer(self, halvings: int) -> Self:
-        """Return the shape with elements of half the size, so many times."""
+        """Return the keys with the numbers of elements doubled `halvings` times."""
         return self.model_copy(update={"elements": [count * 2**halvings for count in self.elements]})
 
     def build(self, places: Places, halvings: int) -> Mesh:
@@ -68,41 +68,38 @@ class ShapeKeys(MeshKeys):
 
 
 class RectangleKeys(ShapeKeys):
-    """A rectangle, and what it is divided into."""
+    """A rectangle, divided into elements."""
 
     is_bar: ClassVar[bool] = True
 
-    shape: Literal["rectangle"] = Field(description="a rectangle with a corner in the origin")
+    shape: Literal["rectangle"] = Field(description="a rectangle with a corner at the origin")
     size: Annotated[list[Length], two] = Field(description="lengths along x and y")
     elements: Annotated[list[Count], two] = Field(description="numbers of elements along x and y")
     element: PlaneElement = Field(default="quadrilateral", description="kind of elements")
     diagonal: Diagonal = Field(default="right", description="how triangles split each rectangle")
 
     def divided(self, counts: Sequence[int]) -> Mesh:
-        """Return the rectangle divided into other numbers of elements."""
+        """Return the mesh of the rectangle with `counts` elements along x and y."""
         return rectangle(self.size, counts, self.element, self.diagonal)
 
 
 class BoxKeys(ShapeKeys):
-    """A box, and what it is divided into."""
+    """A box, divided into elements."""
 
     is_bar: ClassVar[bool] = True
 
-    shape: Literal["box"] = Field(description="a box with a corner in the origin")
+    shape: Literal["box"] = Field(description="a box with a corner at the origin")
     size: Annotated[list[Length], three] = Field(description="lengths along x, y and z")
     elements: Annotated[list[Count], three] = Field(description="numbers of elements along x, y and z")
     element: SolidElement = Field(default="hexahedron", description="kind of elements")
 
     def divided(self, counts: Sequence[int]) -> Mesh:
-        """Return the box divided into other numbers of elements."""
+        """Return the mesh of the box with `counts` elements along x, y and z."""
         return box(self.size, counts, self.element)
 
 
 class FileKeys(MeshKeys):
-    """A mesh from a file; mesh files know no units, so `unit` gives their length unit.
-
-    `join` makes nodes at one place one; by default where no two elements share a node.
-    """
+    """A mesh from a file, with the length unit of the file."""
 
     file: FileName = Field(
         description="mesh file, relative to the study: gmsh .msh, Abaqus or CalculiX .inp, VTK .vtk and .vtu"
@@ -110,7 +107,7 @@ class FileKeys(MeshKeys):
     unit: str = Field(default="m", description='length unit of the file, such as "mm", which mesh files do not state')
     join: bool | None = Field(
         default=None,
-        description="whether nodes at the same position become one; default: only where no two elements share a node",
+        description="whether coincident nodes are merged; default: only if no two elements share a node",
     )
 
     def build(self, places: Places, halvings: int) -> Mesh:
@@ -124,14 +121,12 @@ class FileKeys(MeshKeys):
 
 
 class VoxelsKeys(MeshKeys):
-    """A body from a label image, a hexahedron a voxel; `unit` is that of the image's lengths."""
+    """A body from a label image: each voxel of the label is a hexahedron."""
 
     voxels: FileName = Field(description="label image, relative to the study: .nii, .nrrd, .mha, .vti or .npy")
-    label: int | str = Field(
-        description="label of the body in the image: its value, or its name where the file has names"
-    )
+    label: int | str = Field(description="label of the body in the image: its value, or its name if the file has names")
     edge: Length | None = Field(
-        default=None, description="edge of the cubes to which the image is resampled; default: its own voxels"
+        default=None, description="edge of the cubes to which the image is resampled; default: the voxels of the image"
     )
     unit: str = Field(default="mm", description="length unit of the image")
 
@@ -145,7 +140,7 @@ class VoxelsKeys(MeshKeys):
 
 
 class NetworkFilesKeys(MeshKeys):
-    """A plain network from two CSV files; the model of kind "network" takes their stiffness."""
+    """A spring network from two CSV files, for the model of kind "network"."""
 
     nodes: FileName = Field(description="CSV file of nodes, relative to the study: columns x, y and, in 3D, z [m]")
     springs: FileName = Field(
@@ -153,21 +148,21 @@ class NetworkFilesKeys(MeshKeys):
     )
 
     def build(self, places: Places, halvings: int) -> SpringNetwork:
-        """Read the network, which has a mesh of its own."""
+        """Read the network; raise StudyError if it is to be refined."""
         if halvings:
-            raise StudyError("a network cannot be refined: it is as fine as its springs are")
+            raise StudyError("a network cannot be refined")
         return read_network(places.beside(self.nodes), places.beside(self.springs))
 
 
 def _halved(mesh: Mesh, times: int) -> Mesh:
-    """Return a mesh with elements of half the size, so many times; raise MeshError where that does not fit."""
+    """Return the mesh with the element size halved `times` times; raise MeshError if it does not fit in memory."""
     for _ in range(times):
         refuse_too_large(2**mesh.dim * mesh.n_nodes, mesh.dim)
         mesh = refined(mesh)
     return mesh
 
 
-#: The forms of `[mesh]` by what tells them from each other: the value of `shape`, or a key that no other has.
+#: The forms of `[mesh]` by the value of `shape` or, for those without a shape, by a key that only they have.
 MESH_FORMS: Mapping[str, type[MeshKeys]] = MappingProxyType(
     {
         "rectangle": RectangleKeys,
@@ -182,7 +177,7 @@ SHAPES = tuple(name for name, form in MESH_FORMS.items() if issubclass(form, Sha
 
 
 def _form_of(value: Any) -> str | None:
-    """Return the key of MESH_FORMS of what a study gives, None where it is no table."""
+    """Return the key in MESH_FORMS for the value of `mesh`, None if that is not a table."""
     if not isinstance(value, dict):
         return None
     named = (form for form in MESH_FORMS if form not in SHAPES and form in value)

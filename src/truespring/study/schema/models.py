@@ -1,4 +1,4 @@
-"""The keys of `[models.NAME]`, one class a kind, each of which builds its model."""
+"""Keys of `[models.NAME]`: one class for each kind, which builds the model."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -30,21 +30,21 @@ from truespring.problem import Problem
 from truespring.program import ReadSolution
 from truespring.reference import CalculiX, read_stl
 from truespring.solvers import Solver
-from truespring.study.given import read_given
 from truespring.study.places import Places
 from truespring.study.schema.values import FemElement, FileName, Keys, LawName, Number, On, PlainRuleName, RuleName
+from truespring.study.spring_files import read_spring_files
 
 
 @dataclass(frozen=True, eq=False)
 class Scope:
-    """What a model of a study is built for.
+    """The parts of a study that its models are built from.
 
     Attributes:
-        places: the study's file.
-        problem, solver: those of the study.
-        network: the springs of a mesh that is a plain network, else None.
-        models: the keys of all models of the study by name.
-        name: the name of this one.
+        places: locations of the keys, for error messages.
+        problem, solver: problem and solver of the study.
+        network: the network if the mesh is one, else None.
+        models: the keys of all models of the study, by name.
+        name: name of the model to build.
     """
 
     places: Places
@@ -56,10 +56,10 @@ class Scope:
 
 
 class ModelKeys(Keys):
-    """A model; a subclass has the key `kind`, whose one value names it.
+    """A model; a subclass has the key `kind` with one allowed value.
 
     Attributes:
-        of_springs: whether it is springs, which another program may solve too.
+        of_springs: whether the model consists of springs, which another program can solve.
     """
 
     of_springs: ClassVar[bool] = False
@@ -71,14 +71,14 @@ class ModelKeys(Keys):
         """Return the model."""
 
     def check(self, scope: Scope, model: Any) -> None:
-        """Raise TruespringError where the model that was built does not fit the problem; solve nothing."""
+        """Raise TruespringError if the model does not fit the problem; solve nothing."""
         model.check(scope.problem)
 
 
 class StiffnessKeys(Keys):
-    """Springs of the user's own, in units of thickness times Young's modulus; in 3D of Young's modulus times size.
+    """Stiffness of springs by kind, or of each spring from a CSV file.
 
-    Or spring by spring: `file` is a CSV file with columns a, b and stiffness, `volume` one with element and kappa.
+    Numbers are in thickness times Young's modulus; in 3D in Young's modulus times element size.
     """
 
     edge: Number | None = Field(default=None, description="stiffness of the springs along edges")
@@ -96,11 +96,11 @@ class StiffnessKeys(Keys):
     @model_validator(mode="after")
     def _numbers_or_file(self) -> Self:
         if self.file is None and self.edge is None:
-            raise ValueError("edge is required and missing; or file, with the stiffness of each spring")
+            raise ValueError("edge is required and missing; or set file, a CSV file of the stiffness of each spring")
         if self.file is not None and {"edge", "diagonal", "body"} & self.model_fields_set:
             raise ValueError("file gives the stiffness of each spring: leave edge, diagonal and body out")
         if self.file is None and self.volume is not None:
-            raise ValueError("volume, the moduli of the volume term, goes with a file of springs: file is missing")
+            raise ValueError("volume, the moduli of the volume term, needs file, the stiffness of each spring")
         return self
 
 
@@ -134,16 +134,16 @@ class SpringsKeys(ModelKeys):
         if self.stiffness is not None and self.stiffness.file is not None:
             named = sorted({"rule", "sharing", "volume", "k_body"} & self.model_fields_set)
             if named:
-                raise ValueError(f"stiffness is read from a file, spring by spring: leave {' and '.join(named)} out")
+                raise ValueError(f"stiffness is read from a file, so leave {' and '.join(named)} out")
         return self
 
     def build(self, scope: Scope) -> Springs | PrescribedSprings:
-        """Return springs by a rule, by numbers, or as read spring by spring."""
-        own = self.stiffness
-        if own is not None and own.file is not None:
-            volume = None if own.volume is None else scope.places.beside(own.volume)
-            return read_given(scope.problem, scope.places.beside(own.file), volume, self.allow_negative)
-        numbers = None if own is None or own.edge is None else UserStiffness(own.edge, own.diagonal, own.body)
+        """Return springs by a rule, by numbers, or from a file."""
+        keys = self.stiffness
+        if keys is not None and keys.file is not None:
+            volume = None if keys.volume is None else scope.places.beside(keys.volume)
+            return read_spring_files(scope.problem, scope.places.beside(keys.file), volume, self.allow_negative)
+        numbers = None if keys is None or keys.edge is None else UserStiffness(keys.edge, keys.diagonal, keys.body)
         return Springs(self.rule, numbers, self.sharing, self.allow_negative, self.volume, self.k_body)
 
 
@@ -184,7 +184,7 @@ class MassTensorKeys(ModelKeys):
 
 
 class NetworkKeys(ModelKeys):
-    """The network of the mesh itself."""
+    """The spring network that is the mesh."""
 
     of_springs: ClassVar[bool] = True
 
@@ -193,12 +193,12 @@ class NetworkKeys(ModelKeys):
     def build(self, scope: Scope) -> SpringNetwork:
         """Return the network."""
         if scope.network is None:
-            raise StudyError('kind = "network" is for a mesh of nodes and springs')
+            raise StudyError('kind = "network" needs a [mesh] of nodes and springs')
         return scope.network
 
 
 class CalculixKeys(ModelKeys):
-    """The problem in CalculiX, as finite elements of a law, or as the springs of another model of the study."""
+    """CalculiX, with finite elements of a law or with the springs of another model of the study."""
 
     kind: Literal["calculix"] = Field(description="the same problem, solved by CalculiX")
     law: Literal["linear", "saint-venant-kirchhoff"] | None = Field(
@@ -214,24 +214,26 @@ class CalculixKeys(ModelKeys):
     def _one_body(self) -> Self:
         if self.element is not None and self.springs is not None:
             raise ValueError(
-                "element and springs are given: an element is of a continuum, springs name a model; give one"
+                "element and springs are set: element is for finite elements, springs names another model; set one"
             )
         if self.law is not None and self.springs is not None:
-            raise ValueError("law and springs are given: a law is for a continuum, springs name a model; give one")
+            raise ValueError(
+                "law and springs are set: law is for finite elements, springs names another model; set one"
+            )
         return self
 
     def build(self, scope: Scope) -> CalculiX:
-        """Return CalculiX, which is not run."""
+        """Return the model; CalculiX is not run."""
         springs = None if self.springs is None else self._named(scope, self.springs)
         law = {} if self.law is None else {"law": self.law}
         return CalculiX(springs=springs, element=self.element, **law)
 
     def check(self, scope: Scope, model: CalculiX) -> None:
-        """Raise TruespringError where CalculiX cannot be run."""
+        """Raise TruespringError if CalculiX cannot solve the problem."""
         model.check_run(scope.problem, scope.solver)
 
     def _named(self, scope: Scope, name: str) -> Model:
-        """The springs of another model of the study."""
+        """Return the springs model of the study with this name; raise StudyError if there is none."""
         known = [one for one, keys in scope.models.items() if keys.of_springs]
         with scope.places.at("models", scope.name, "springs"):
             if name in known:
@@ -254,11 +256,11 @@ class TerzopoulosKeys(ModelKeys):
 
 
 class BemSpringsKeys(ModelKeys):
-    """A block of boundary elements, and springs beside it."""
+    """A block of boundary elements, and springs elsewhere."""
 
     kind: Literal["bem-springs"] = Field(description="a block of boundary elements, springs elsewhere")
     block: On = Field(
-        description="elements of the block: a group of an imported mesh, or a box that holds their centres"
+        description="elements of the block: a group of an imported mesh, or a box that contains their centres"
     )
     rule: PlainRuleName = Field(default="isotropic", description="stiffness rule of the springs")
     corotated: bool = Field(default=False, description="whether the block may rotate without strain")
@@ -269,7 +271,7 @@ class BemSpringsKeys(ModelKeys):
 
 
 class StlKeys(ModelKeys):
-    """A deformed mesh of another program; STL knows no units, so `unit` tells its length unit."""
+    """A deformed mesh of another program, as STL files with their length unit."""
 
     kind: Literal["stl"] = Field(description="a deformed mesh computed by another program")
     file: FileName = Field(description="STL file of the deformed body, relative to the study")
@@ -280,21 +282,21 @@ class StlKeys(ModelKeys):
     unit: str = Field(default="m", description='length unit of the files, such as "mm", which STL files do not state')
 
     def build(self, scope: Scope) -> ReadSolution:
-        """Return what the files hold."""
+        """Return the solution in the files."""
         undeformed = None if self.undeformed is None else scope.places.beside(self.undeformed)
         file = scope.places.beside(self.file)
         return ReadSolution(read_stl(scope.problem, file, self.load_factor, undeformed, self.unit))
 
     def check(self, scope: Scope, model: Model) -> None:
-        """Find no fault: the files were read."""
+        """Do nothing: `build` has checked the files."""
 
 
 def _by_kind(*classes: type[ModelKeys]) -> Mapping[str, type[ModelKeys]]:
-    """Return classes by the value of their key `kind`."""
+    """Return the classes by the allowed value of their key `kind`."""
     return MappingProxyType({get_args(one.model_fields["kind"].annotation)[0]: one for one in classes})
 
 
-#: The kinds of models; a new one is a class above, and its name here.
+#: The keys of each kind of model; add the class of a new kind here.
 MODEL_KINDS = _by_kind(
     SpringsKeys,
     FemKeys,

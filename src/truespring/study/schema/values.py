@@ -1,4 +1,4 @@
-"""Values of study files as pydantic types: quantities in SI, names of tables, selections, files."""
+"""Pydantic types of values in study files: quantities in SI units, names, selections and files."""
 
 import math
 from collections.abc import Callable, Collection
@@ -31,12 +31,12 @@ def _si(dimension: Dimension) -> BeforeValidator:
 
 def _quantity(dimension: Dimension) -> WithJsonSchema:
     unit, example = SI_UNITS[dimension]
-    description = f"a {dimension}: a number in {unit}, or a text with its unit such as {example}"
+    description = f"{dimension}: a number in {unit}, or a string with its unit such as {example}"
     return WithJsonSchema({"type": ["number", "string"], "description": description})
 
 
 def _key_of(names: Collection[str]) -> BeforeValidator:
-    """Accept the keys of a mapping such as RULES, so that it is the one list of them."""
+    """Return a validator that accepts the keys of a mapping such as RULES."""
 
     def check(value: Any) -> Any:
         if not isinstance(value, str) or value not in names:
@@ -79,7 +79,7 @@ SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": l
 Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
 SectionKind = Annotated[str, _key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
-#: A file, beside the study's own where the name is no absolute one.
+#: Path of a file, relative to the folder of the study unless absolute.
 FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
 Direction = Literal["x", "y", "z"]
 
@@ -100,7 +100,7 @@ def _selection(value: Any) -> Selection:
     if key == "near":
         return Near(_point(what))
     if key == "box":
-        if isinstance(what, list) and len(what) in (4, 6):  # the corners in one list
+        if isinstance(what, list) and len(what) in (4, 6):  # both corners in one list
             what = [what[: len(what) // 2], what[len(what) // 2 :]]
         if not isinstance(what, list) or len(what) != 2:
             raise TruespringError(f"box = {shown(what)}: must be two corners, [[xmin, ymin], [xmax, ymax]]")
@@ -143,12 +143,12 @@ Probe = Annotated[
 
 
 Count = Annotated[int, Field(ge=1, le=10**9)]
-#: Numbers of values of lists: one a direction in 2D, in 3D, or in either.
+#: Lengths of lists with one value per direction, in 2D, in 3D, or in either.
 two, three = Field(min_length=2, max_length=2), Field(min_length=3, max_length=3)
 two_or_three = Field(min_length=2, max_length=3)
 
 
 class Keys(BaseModel):
-    """The keys of a part of a study file: frozen, and no others are allowed."""
+    """Base class of the tables of a study file: frozen, other keys are errors."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, protected_namespaces=())

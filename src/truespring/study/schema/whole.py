@@ -1,4 +1,4 @@
-"""The keys of a whole study file: `[solver]`, `[compare]`, and what the other parts are."""
+"""Keys of a whole study file, of `[solver]` and of `[compare]`."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -57,7 +57,7 @@ class SolverKeys(Keys):
     )
 
     def build(self, places: Places, problem: Problem) -> Solver:
-        """Return the solver; raise StudyError where it does not fit the problem."""
+        """Return the solver; raise StudyError if it does not fit the problem."""
         common: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
         past = {**common, "linear": "direct" if self.linear == "auto" else self.linear}
         self._check_control(places)
@@ -74,17 +74,17 @@ class SolverKeys(Keys):
             return Newton(self.load_steps, method=self.method, linear=self.linear, **common)
 
     def _check_control(self, places: Places) -> None:
-        """Raise StudyError where keys of displacement control are missing, or given for another control."""
+        """Raise StudyError if keys of displacement control are missing, or set for another control."""
         for key in ("on", "direction", "to"):
-            given = getattr(self, key) is not None
-            if given != (self.control == "displacement"):
+            is_set = getattr(self, key) is not None
+            if is_set != (self.control == "displacement"):
                 with places.at("solver", key):
-                    fault = "is" if given else "is required and missing"
+                    fault = "is only" if is_set else "is required and missing"
                     raise StudyError(f'{fault} for control = "displacement"')
 
 
 class CompareKeys(Keys):
-    """Which path is compared with which, and where one looks."""
+    """Which models are compared, and at which node."""
 
     model: str | None = Field(
         default=None, description="name of the model that is compared with the others; default: the first springs"
@@ -100,18 +100,19 @@ class CompareKeys(Keys):
         default=0.05, description="largest error at which two models agree"
     )
     refine: bool = Field(
-        default=True, description="whether each reference is solved on finer meshes too, to estimate its own error"
+        default=True,
+        description="whether each reference is also solved on a finer mesh, to estimate its discretisation error",
     )
 
     def node(self, places: Places, mesh: Mesh) -> int | None:
-        """Return the number of the probe's node, None for the one that moves most."""
+        """Return the node number of the probe, None for the node that moves most."""
         with places.at("compare", "probe"):
             if self.probe is None:
                 return None
             return named_point(mesh, self.probe) if isinstance(self.probe, str) else nearest_node(mesh, self.probe)
 
     def names(self, places: Places, models: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
-        """Return the model that is compared, by default the first springs, and its references, by default the rest."""
+        """Return the name of the compared model, by default the first springs, and those of its references."""
         springs = [name for name, model in models.items() if model.has_springs]
         compared = self.model or (springs or list(models))[0]
         self._check_known(places, "model", compared, models)
@@ -121,7 +122,9 @@ class CompareKeys(Keys):
             self._check_known(places, "references", reference, models)
             if reference == compared:
                 with places.at("compare", "references"):
-                    raise StudyError(f"'{reference}' is the model itself: name others, or leave the list empty")
+                    raise StudyError(
+                        f"'{reference}' is the compared model itself: name other models, or leave the list empty"
+                    )
         return compared, tuple(dict.fromkeys(self.references))
 
     def _check_known(self, places: Places, key: str, name: str, models: Mapping[str, Model]) -> None:
@@ -134,7 +137,7 @@ ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 
 class StudyKeys(Keys):
-    """A whole study file."""
+    """A study file."""
 
     title: str | None = Field(default=None, description="title of the report; default: the file's name")
     mesh: AnyMesh = Field(description="the body: a shape, a mesh file, a label image or a network")
@@ -156,7 +159,7 @@ class StudyKeys(Keys):
     @field_validator("models")
     @classmethod
     def _names_of_files(cls, models: dict[str, ModelKeys]) -> dict[str, ModelKeys]:
-        """Refuse names of files that some system takes for another: they differ by case only, or Windows keeps them."""
+        """Reject names that cannot be file names on all systems: equal up to case, or reserved."""
         seen: set[str] = set()
         for name in models:
             if name.casefold() in seen | _TAKEN_NAMES:

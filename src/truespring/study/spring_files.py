@@ -1,4 +1,4 @@
-"""Springs of a stiffness that stands in CSV files, spring by spring: read, and written."""
+"""Read and write the stiffness of each spring of a mesh as CSV files."""
 
 import csv
 from collections.abc import Iterable
@@ -17,19 +17,19 @@ _COLUMNS: dict[str, Dimension | None] = {"a": None, "b": None, "stiffness": "sti
 _VOLUME_COLUMNS: dict[str, Dimension | None] = {"element": None, "kappa": "stress"}
 
 
-def read_given(
+def read_spring_files(
     problem: Problem, file: str | Path, volume: str | Path | None = None, allow_negative: bool = False
 ) -> PrescribedSprings:
-    """Read the stiffness of each spring of a problem's mesh from a CSV file with a line of column names.
+    """Read the stiffness of each spring of a mesh from CSV files with a header line.
 
     Args:
-        problem: whose mesh tells the springs: the edges and diagonals of its elements.
-        file: columns a and b, the numbers of the nodes that a spring joins, from 0, and stiffness [N/m].
-        volume: columns element, its number from 0, and kappa, the modulus of its volume term [Pa].
-        allow_negative: accept springs of negative stiffness.
+        problem: the problem; its springs are the edges and diagonals of the elements.
+        file: columns a and b, the two nodes of each spring by number from 0, and stiffness [N/m].
+        volume: columns element, the number of each element from 0, and kappa, the modulus of its volume term [Pa].
+        allow_negative: whether springs of negative stiffness are accepted.
 
-    Raises MeshError, with file and line, where a file is damaged, names a spring or an element that the mesh does not
-    have or names one twice, leaves one out, or a stiffness is negative.
+    Raises MeshError with file and line if a file is damaged, if a spring or element is missing, duplicate or not in the
+    mesh, or if a stiffness is negative.
     """
     place = Path(file)
     springs, _ = shared_springs(problem.mesh)
@@ -66,24 +66,24 @@ def _read_kappa(problem: Problem, file: Path) -> Floats:
 
 
 def _whole(data: Columns, file: Path, column: str, count: int) -> Ints:
-    """A column of numbers 0 ... count - 1."""
+    """Return a column of integers from 0 to count - 1, shape (n_rows,)."""
     values = data.numbers(column)
     wrong = np.flatnonzero((values != np.round(values)) | (values < 0) | (values >= count))
     if wrong.size:
         raise MeshError(
-            f"{file}:{data.line(int(wrong[0]))}: {column} = {values[wrong[0]]:g}: the mesh has the numbers 0 to "
+            f"{file}:{data.line(int(wrong[0]))}: {column} = {values[wrong[0]]:g}: must be an integer from 0 to "
             f"{count - 1}"
         )
     return values.astype(np.int64)
 
 
 def _by_number(file: Path, data: Columns, numbers: Ints, values: Floats, names: list[str], what: str) -> Floats:
-    """Values in the mesh's order; raise MeshError where one is there twice or left out."""
+    """Return values in the order of the mesh, shape (len(names),); raise MeshError if one is duplicate or missing."""
     count = np.bincount(numbers, minlength=len(names))
     twice = np.flatnonzero(count[numbers] > 1)
     if twice.size:
         row = int(twice[-1])
-        raise MeshError(f"{file}:{data.line(row)}: {what} {names[numbers[row]]} is there twice")
+        raise MeshError(f"{file}:{data.line(row)}: {what} {names[numbers[row]]} is listed twice")
     missing = np.flatnonzero(count == 0)
     if missing.size:
         raise MeshError(
@@ -95,8 +95,8 @@ def _by_number(file: Path, data: Columns, numbers: Ints, values: Floats, names: 
     return ordered
 
 
-def write_given(springs: PrescribedSprings, file: Path, volume: Path) -> tuple[Path, ...]:
-    """Write springs as `read_given` reads them; the second file only where there is a volume term."""
+def write_spring_files(springs: PrescribedSprings, file: Path, volume: Path) -> tuple[Path, ...]:
+    """Write springs for `read_spring_files`, and the volume term, if any, to `volume`; return the files written."""
     rows = [(a, b, repr(k)) for (a, b), k in zip(springs.springs.tolist(), springs.stiffness.tolist(), strict=True)]
     _write(file, ("a", "b", "stiffness [N/m]"), rows)
     if not springs.kappa.size:
