@@ -51,6 +51,7 @@ ALLOWED = {
         "study",
         "report",
         "comparison",
+        "support_errors",
         "equilibrium",
         "converging",
         "models",
@@ -64,6 +65,7 @@ ALLOWED = {
     "calibration": {
         "carrying",
         "comparison",
+        "support_errors",
         "equilibrium",
         "linear",
         "mesh",
@@ -123,6 +125,7 @@ ALLOWED = {
     },
     "report": {
         "comparison",
+        "support_errors",
         "refining",
         "equilibrium",
         "reactions",
@@ -133,10 +136,11 @@ ALLOWED = {
         "mesh",
         "material",
     },
-    "comparison": {"carrying", "equilibrium", "reactions", "problem", "mesh"},
+    "comparison": {"carrying", "support_errors", "solution", "problem", "mesh"},
+    "support_errors": {"reactions", "solution"},
     "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh"},
-    "carrying": {"equilibrium", "problem", "mesh"},
-    "misfit": {"comparison", "equilibrium"},
+    "carrying": {"solution", "problem", "mesh"},
+    "misfit": {"comparison", "solution"},
     "reference": {
         "exports",
         "equilibrium",

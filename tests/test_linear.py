@@ -103,7 +103,7 @@ def test_multigrid_needs_few_iterations_at_every_size(build: Callable[..., ts.Pr
     assert path.newton_iterations <= 8
     assert path.cost.factorisations == 1
     assert path.cost.cg_iterations <= 15 * path.newton_iterations
-    assert path.cost.lanczos_iterations <= 2 * 25, "stability is told at rest and at the end"
+    assert path.cost.lanczos_iterations <= 2 * 25, "stability is computed at rest and at the end"
 
 
 @pytest.mark.parametrize("name", ["scipy", "rslab", "pardiso", "multigrid"])
@@ -166,8 +166,8 @@ def test_what_runs_again_is_the_same_to_the_last_bit() -> None:
     assert np.array_equal(one.states[-1].positions, two.states[-1].positions)
 
 
-def test_compiling_is_told_while_it_goes_on_and_counted_once() -> None:
-    """What a solve takes is told without it: it must be known before the block ends."""
+def test_compile_time_is_known_within_the_block_and_counted_once() -> None:
+    """`solve` subtracts it before the block ends."""
 
     def inner(x: float) -> float:
         return x + 1.0

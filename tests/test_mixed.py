@@ -52,7 +52,7 @@ def test_one_step_to_half_the_length_takes_few_iterations(model: str) -> None:
 
 
 def test_a_state_inside_out_is_searched_again_and_said() -> None:
-    """A short bar under P L^2 / EI = 30 in one step: mixed integration points end inside out, line search does not."""
+    """A short bar under P L^2 / EI = 30 in one step: only mixed integration points invert an element."""
     mesh = ts.rectangle((10, 1), (40, 4))
     force = 30 * 1e4 * (0.01 / 12) / 10**2
     problem = ts.Problem(mesh, SOFT, THIN, [ts.Fixed("left")], [ts.Force("right", (0, -force))])
@@ -64,6 +64,7 @@ def test_a_state_inside_out_is_searched_again_and_said() -> None:
     assert alone.status is ts.Status.INVERTED
     assert path.status is searched.status is ts.Status.CONVERGED
     assert path.cost is not None
-    assert path.cost.notes == ("line search at load factor 1: mixed integration points turned an element inside out",)
+    (note,) = path.cost.notes
+    assert "line search" in note and "load factor 1:" in note and "inverted" in note
     tip = searched.states[-1].displacement
     assert np.abs(path.states[-1].displacement - tip).max() <= 1e-8 * np.abs(tip).max()

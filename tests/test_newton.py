@@ -14,7 +14,7 @@ from scipy import sparse
 
 import truespring as ts
 from tests.closed_forms import bending_factor, buckled_column_tip
-from truespring.solvers.line_search import _positive_neighbours
+from truespring.solvers.line_search import _candidates
 
 SOFT = ts.Material(young=1.0, poisson=1 / 3)
 THIN = ts.PlaneStress(1.0)
@@ -225,7 +225,7 @@ def test_prescribed_motion_gives_the_forces_back(model: str) -> None:
     assert state.energy == pytest.approx(there.energy, rel=1e-8)
 
 
-def test_a_body_held_at_every_node_is_moved_as_told() -> None:
+def test_a_body_held_at_every_node_moves_as_prescribed() -> None:
     mesh = ts.rectangle((1.0, 1.0), (1, 1))
     supports = [ts.Fixed(on=[node], displacement=mesh.nodes[node] * [0.5, -0.2]) for node in range(4)]
     path = ts.solve(ts.Problem(mesh, SOFT, THIN, supports), MODELS["springs"], ts.Newton(load_steps=4))
@@ -303,7 +303,7 @@ def test_a_body_turned_inside_out_is_said_to_be_inverted() -> None:
     assert any("inverted" in warning for warning in path.warnings)
     linear = ts.solve(ts.Problem(mesh, SOFT, THIN, supports), MODELS["linear"], ts.Newton(load_steps=4))
     assert linear.status is ts.Status.CONVERGED
-    assert any("a linear model does not notice" in warning for warning in linear.warnings)
+    assert any("inverted" in warning and "linear" in warning for warning in linear.warnings)
 
 
 def test_a_law_with_a_barrier_stops_before_it() -> None:
@@ -406,16 +406,16 @@ def slender(share: float) -> tuple[ts.Problem, float]:
 
 
 @pytest.mark.parametrize("share", [1e-7, 1e-9])
-def test_a_load_that_drowns_in_rounding_is_not_balanced(share: float) -> None:
+def test_a_load_below_rounding_errors_does_not_converge(share: float) -> None:
     """What is unbalanced is no longer small beside the load: no such state is called converged."""
     problem, _ = slender(share)
     path = ts.solve(problem, ts.Springs("isotropic"), ts.Newton(load_steps=2))
     assert path.status is ts.Status.NOT_CONVERGED and len(path.states) == 1
     assert path.best is not None and path.best.residual > 1e-3
-    assert any("lost in rounding" in text for text in path.warnings)
+    assert any("rounding" in text for text in path.warnings)
 
 
-def test_a_motion_is_told_from_one_that_drowns_in_rounding() -> None:
+def test_a_motion_below_rounding_errors_does_not_converge() -> None:
     """Of a body moved as a whole all forces are rounding: no harm, unless its coordinates do not hold the motion."""
     mesh, material = ts.rectangle((0.1, 0.05), (4, 2)), ts.Material(1e9, 0.3)
 
@@ -427,13 +427,13 @@ def test_a_motion_is_told_from_one_that_drowns_in_rounding() -> None:
     assert whole.status is ts.Status.CONVERGED
     assert whole.states[-1].displacement[:, 0] == pytest.approx(1e-7, rel=1e-6)
     assert moved(0.0, 1e-7).status is ts.Status.CONVERGED
-    drowned = moved(0.0, 1e-16)  # a few times what 0.1 is rounded to
-    assert drowned.status is ts.Status.NOT_CONVERGED and drowned.best is not None and drowned.best.residual > 1e-3
+    lost = moved(0.0, 1e-16)  # a few times the rounding error of 0.1
+    assert lost.status is ts.Status.NOT_CONVERGED and lost.best is not None and lost.best.residual > 1e-3
 
 
 @pytest.mark.parametrize("model", [ts.Springs("isotropic"), ts.Fem("linear"), ts.Fem("saint-venant-kirchhoff")])
 @pytest.mark.parametrize("share", [1e-3, 1e-5])
-def test_a_slender_body_follows_a_load_that_nearly_drowns(model: ts.Springs | ts.Fem, share: float) -> None:
+def test_a_slender_body_follows_a_load_near_rounding_errors(model: ts.Springs | ts.Fem, share: float) -> None:
     """Under tiny loads the answer is linear in them, though rounding of the positions makes forces nearly as large."""
     problem, tip = slender(share)
     path = ts.solve(problem, model, ts.Newton(load_steps=4))
@@ -463,7 +463,7 @@ def test_an_indefinite_tangent_is_shifted_by_ever_more_of_its_diagonal() -> None
     """The smallest shift that helps is the best: it is tried first."""
     tangent = sparse.csr_array(np.array([[2.0, 5.0], [5.0, -4.0]]))
     balance: Any = SimpleNamespace(potential=None, in_blocks=lambda matrix: matrix)
-    first, *others = _positive_neighbours(balance, np.zeros((1, 2)), tangent)
+    first, *others = _candidates(balance, np.zeros((1, 2)), tangent)
     assert first is tangent
     shares = [(one - tangent).diagonal() / [2.0 + 3.0, 4.0 + 3.0] for one in others]
     assert all(share == pytest.approx(share[0], rel=1e-6) for share in shares)

@@ -235,7 +235,7 @@ def test_an_indentation_is_judged_by_its_force() -> None:
     assert summary(found)["comparison"]["neo"]["supports"][0]["on"] == "support 2"
 
 
-def test_dictated_nodes_are_left_out() -> None:
+def test_prescribed_nodes_are_left_out() -> None:
     """What supports hold or move in all directions tells nothing of a model."""
     problem = block(ts.Fixed("left"), ts.Fixed("right", displacement=(0.006, 0.003, 0)))
     paths = [ts.solve(problem, one, Newton(2)) for one in (SPRINGS, RUBBER)]

@@ -1,4 +1,4 @@
-"""The assembly of element matrices and vectors into those of a body."""
+"""Assembly of element matrices and vectors into a sparse matrix and a vector of all nodes."""
 
 import sys
 from collections.abc import Callable
@@ -9,26 +9,28 @@ from scipy import sparse
 from truespring.arrays import Floats, Ints
 from truespring.potential import SparseMatrix
 
-# Element matrices are held in slices of so many bytes, which stay in the processor's cache.
+# Size of the slices in which element matrices are computed [bytes]: they stay in the processor's cache.
 _SLICE_BYTES = 4 * 2**20
-# References to an array of which only its owner knows: the owner's, and that of the question.
+# sys.getrefcount of an array that only its owner refers to: the owner's reference and that of the call.
 _UNREFERENCED = 2
-# Threads share the rows of a slice from so many on.
+# Smallest number of rows that is worth another thread.
 _SMALLEST_SLAB = 256
 
 
 class Pattern:
-    """The fixed sparsity of a sum of element matrices, built once and filled many times.
+    """Fixed sparsity of a sum of element matrices, built once and filled many times.
 
     Attributes:
-        starts, columns: the nodes that share an element with each node, itself included, ascending.
-        slots: the place of each element's blocks among them, shape (n_elements, k, k).
-        at_starts, at: the elements at each node, as element * k + its place there.
-        zero: as many zeros as there are directions, which tells compiled loops the dimension.
+        starts, columns: for each node, the nodes that share an element with it, itself included, ascending; shape
+            (n_nodes + 1,) and (n_blocks,).
+        slots: index of the block of each pair of an element's nodes, shape (n_elements, k, k).
+        at_starts, at: for each node, its elements as element * k + local node; shape (n_nodes + 1,) and
+            (n_elements * k,).
+        zero: tuple of dim zeros, from whose type compiled loops take the dimension.
     """
 
     def __init__(self, elements: Ints, n_nodes: int, dim: int) -> None:
-        """Take the node numbers of each element, shape (n_elements, k)."""
+        """Build the sparsity from the node numbers of each element, shape (n_elements, k)."""
         from truespring.kernels import sparsity
         from truespring.kernels.threads import run
 
@@ -46,19 +48,19 @@ class Pattern:
         run(sparsity.fill_slots, len(elements), self.elements, self.starts, self.columns, self.slots)
 
     def values(self) -> Floats:
-        """Return room for the values of a matrix, one block of shape (dim, dim) a pair of nodes; not filled."""
-        # Room that nothing refers to any more is used again: the system takes long to give large arrays.
+        """Return an array for the values of a matrix, shape (n_blocks, dim, dim), uninitialised."""
+        # Reuse the last array if nothing refers to it: allocating large arrays is slow.
         if self._room is None or sys.getrefcount(self._room) > _UNREFERENCED:
             self._room = np.empty((len(self.columns), self.dim, self.dim))
         return self._room
 
     def matrix(self, values: Floats) -> SparseMatrix:
-        """Return values of shape (n_blocks, dim, dim) as a sparse matrix, without a copy."""
+        """Return values of shape (n_blocks, dim, dim) as a sparse matrix, shape (n_dof, n_dof), without a copy."""
         size = self.n_nodes * self.dim
         return sparse.bsr_array((values, self.columns, self.starts), shape=(size, size))
 
     def summed(self, blocks: Callable[[int, int], Floats]) -> SparseMatrix:
-        """Sum element matrices, which `blocks(first, last)` gives for a slice of the elements, see `add`."""
+        """Return the sum of element matrices, shape (n_dof, n_dof); `blocks` as in `add`."""
         values = self.values()
         values[:] = 0.0
         self.add(blocks, values)
@@ -67,8 +69,8 @@ class Pattern:
     def add(self, blocks: Callable[[int, int], Floats], values: Floats) -> None:
         """Add element matrices to the values of a matrix of this pattern, shape (n_blocks, dim, dim).
 
-        `blocks(first, last)` gives those of a slice of the elements, shape (last - first, k * dim, k * dim).
-        A slice at a time is held; each thread adds to rows of its own, in the order of the elements.
+        `blocks(first, last)` returns the matrices of elements first to last, shape (last - first, k * dim, k * dim). It
+        is called for one slice at a time; each thread adds to different rows, in the order of the elements.
         """
         from truespring.kernels import sparsity
         from truespring.kernels.threads import run
@@ -91,7 +93,7 @@ class Pattern:
             run(add, rows, smallest=_SMALLEST_SLAB)
 
     def vector(self, values: Floats) -> Floats:
-        """Sum vectors of the elements' nodes, shape (n_elements, k * dim), into one of shape (n_nodes, dim)."""
+        """Return the sum of element vectors, shape (n_elements, k * dim), by node, shape (n_nodes, dim)."""
         from truespring.kernels import sparsity
         from truespring.kernels.threads import run
 

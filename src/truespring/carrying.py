@@ -1,4 +1,4 @@
-"""Paths carried to the mesh of another: node by node where the nodes are the same, else by their own elements."""
+"""Solutions interpolated at the nodes of another mesh."""
 
 from dataclasses import dataclass, replace
 
@@ -6,23 +6,23 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.equilibrium import Solution, State
 from truespring.errors import ProblemError
 from truespring.mesh import Grid, Interpolation
 from truespring.problem import Problem
+from truespring.solution import Solution, State
 
-# Nodes are the same where they are this near, a share of the diameter: other programs print six digits.
+# Nodes closer than this share of the diameter are the same: other programs print six digits.
 _SAME_NODE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A path on the nodes of a problem's mesh.
+    """A solution on the nodes of a problem's mesh.
 
     Attributes:
-        path: the path there.
-        outside: the nodes that lie outside of the body it was known on, shape (n_nodes,); the nearest point of that
-            stands for them.
+        path: the solution on that mesh.
+        outside: true for nodes outside of the body of the original solution, shape (n_nodes,); their displacement is
+            that of the nearest point of the body.
         node_by_node: whether the nodes are the same, so that nothing was interpolated.
     """
 
@@ -32,10 +32,10 @@ class Carried:
 
 
 def carried(path: Solution, problem: Problem) -> Carried:
-    """Return `path` on the nodes of `problem`, by the own interpolation of its elements.
+    """Return the solution `path` on the nodes of `problem`: as it is if the nodes are the same, else interpolated.
 
-    A solid is carried to a plane body at the middle of its depth. Raises ProblemError where the nodes are others and
-    the path is not known between its own.
+    Its elements interpolate; a solid is interpolated on a plane mesh at the middle of its depth. Raises ProblemError
+    if the nodes differ and the solution has no elements.
     """
     nodes = problem.mesh.nodes
     nowhere = np.zeros(len(nodes), dtype=bool)
@@ -53,14 +53,17 @@ def carried(path: Solution, problem: Problem) -> Carried:
         found = grid.locate(places)
     else:
         raise ProblemError(
-            f"{path.label} is known at its {len(grid.points)} points only, which are others than those it is compared "
-            "at: one of both must be a body of elements"
+            f"{path.label} is known at {len(grid.points)} points only, and these are not the nodes of the other: one "
+            "of the two must consist of elements"
         )
     return Carried(_on(path, problem, grid, found, same), found.outside, same is not None)
 
 
 def matching_points(grid: Grid, places: Floats) -> Ints | None:
-    """Return the number of the grid's point at each of `places` [m], None unless each place has one of its own."""
+    """Return the number of the grid's point at each of `places`, shape (n,); None unless all have different ones.
+
+    `places` [m] has shape (n, dim).
+    """
     from scipy.spatial import KDTree
 
     if places.shape[1] != grid.dim or len(places) > len(grid.points):
@@ -72,32 +75,35 @@ def matching_points(grid: Grid, places: Floats) -> Ints | None:
 
 
 def _equal(mine: Floats, theirs: Floats) -> bool:
-    """Whether two meshes have the same nodes in the same order, to rounding."""
+    """Return whether two arrays of nodes are equal to rounding, in the same order."""
     if mine.shape != theirs.shape:
         return False
     return bool(np.allclose(mine, theirs, rtol=0, atol=1e-9 * float(np.linalg.norm(np.ptp(mine, axis=0)))))
 
 
 def _in_its_dimensions(nodes: Floats, grid: Grid) -> Floats:
+    """Return nodes in the dimension of a grid: plane nodes at the middle of its depth, shape (n_nodes, grid.dim)."""
     if nodes.shape[1] == grid.dim:
         return nodes
     if nodes.shape[1] > grid.dim:
-        raise ProblemError("a plane body says nothing of places in space: compare at the places of the plane one")
+        raise ProblemError("a plane body has no displacement at positions in space: compare at the plane body's nodes")
     middle = (grid.points[:, 2].min() + grid.points[:, 2].max()) / 2
     return np.column_stack([nodes, np.full(len(nodes), middle)])
 
 
 def _picked(numbers: Ints, n_points: int) -> "sparse.csr_array":
+    """Return the matrix that selects points by their numbers, shape (len(numbers), n_points)."""
     rows = np.arange(len(numbers))
     return sparse.csr_array((np.ones(len(rows)), (rows, numbers)), shape=(len(rows), n_points))
 
 
 def _with_own_supports(path: Solution, state: State) -> State:
-    """A state with what the supports of its own problem do, not those of the problem that it is carried to."""
+    """Return a state that keeps the forces of the supports of its original problem."""
     return replace(state, supports=path.support_forces(state)) if path.problem.stated else state
 
 
 def _on(path: Solution, problem: Problem, grid: Grid, found: Interpolation, same: Ints | None) -> Solution:
+    """Return a solution interpolated from a grid to the nodes of a problem; `same` are the points there, if equal."""
     mesh = problem.mesh
     as_many = mesh.dim == path.problem.mesh.dim
 

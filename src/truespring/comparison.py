@@ -1,113 +1,43 @@
-"""Solution against path: how far a model may be trusted, level by level and in a sentence."""
+"""Compare two solutions: the errors of a model against a reference at each load level."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.carrying import carried, matching_points
-from truespring.equilibrium import Solution, State
 from truespring.errors import ProblemError
 from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point, nearest_node, surface_distance
 from truespring.mesh.facets import triangles_of
 from truespring.problem import Problem
-from truespring.reactions import SupportForce
+from truespring.solution import Solution, State
+from truespring.support_errors import Decisive, SupportError, decisive, support_errors
 
-#: What "agrees" means where nothing else is said: an error of 5 %.
+#: Default tolerance: two solutions agree if their error is below 5 %.
 TOLERANCE = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class SupportError:
-    """How force and torque of a moved support differ from those of the reference.
-
-    Attributes:
-        mine, theirs: of the model and of the reference.
-        load: length of the total load there [N], None where no load acts beside the motion, or loads have no total.
-    """
-
-    mine: SupportForce
-    theirs: SupportForce
-    load: float | None = None
-
-    @property
-    def force_apart(self) -> Floats | None:
-        """Difference of the forces over the length of the reference's, shape (dim,); None where that vanishes."""
-        return _apart(self.mine.force, self.theirs.force) if self.theirs.has_force else None
-
-    @property
-    def torque_apart(self) -> Floats | None:
-        """Difference of the torques over the length of the reference's, shape (1 or 3,); None where that vanishes."""
-        return _apart(self.mine.torque, self.theirs.torque) if self.theirs.has_torque else None
-
-    @property
-    def force_error(self) -> float | None:
-        """Length of the difference of the forces over that of the reference's; None where that vanishes."""
-        return _length(self.force_apart)
-
-    @property
-    def torque_error(self) -> float | None:
-        """Length of the difference of the torques over that of the reference's; None where that vanishes."""
-        return _length(self.torque_apart)
-
-    @property
-    def share_of_load(self) -> float | None:
-        """The reference's force over the total load; None where no load acts."""
-        return float(np.linalg.norm(self.theirs.force)) / self.load if self.load else None
-
-
-class Decisive(NamedTuple):
-    """The error that decides: `error`, not a number where none is known, and of what.
-
-    `quantity` is "displacement", "force" or "torque", empty where none is known; `support` the name of the support.
-    """
-
-    error: float
-    quantity: str
-    support: str = ""
-
-
-def decisive(displacement: float, supports: Sequence[SupportError]) -> Decisive:
-    """Return the larger of the rms error of displacement and the largest error of a support's force or torque.
-
-    The one rule by which verdicts, maps, comparisons and calibrations judge; of equal errors the first counts.
-    """
-    errors = [Decisive(displacement, "displacement")]
-    for one in supports:
-        errors.append(Decisive(_or_nan(one.force_error), "force", one.mine.name))
-        errors.append(Decisive(_or_nan(one.torque_error), "torque", one.mine.name))
-    return largest(errors)
-
-
-def largest(errors: Sequence[Decisive]) -> Decisive:
-    """Return the largest error that is known, of equal ones the first."""
-    known = [one for one in errors if not np.isnan(one.error)]
-    # Errors that differ by rounding are equal.
-    return max(known, key=lambda one: float(f"{one.error:.6g}")) if known else Decisive(float("nan"), "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """How a path differs from a reference. All errors are relative to the reference's own size.
+    """Errors of a solution against a reference, relative to the size of the reference's quantity.
 
     Attributes:
-        model, reference: the two paths, on the nodes of one mesh: that on which they are compared.
-        known_on: the two paths as they were given, each on its own mesh.
-        outside: nodes that lie outside of the other body, which are left out of all errors, shape (n_nodes,).
-        compared: nodes that rms and largest errors are over: within both bodies, and not moved (or held) in all
-            directions by supports, which tells nothing of a model, shape (n_nodes,).
+        model, reference: the two solutions on the mesh on which they are compared.
+        known_on: the two solutions on their original meshes.
+        outside: true for nodes outside of the other body, excluded from all errors, shape (n_nodes,).
+        compared: true for nodes that enter the rms and largest errors: within both bodies, and not prescribed in all
+            directions by supports (there both agree whatever the model), shape (n_nodes,).
         node_by_node: whether both had the same nodes, so that nothing was interpolated.
-        probe: number of the node that is watched.
-        tolerance: the error up to which the two agree.
-        load_factors: the loaded levels that both paths have, ascending, shape (n,).
-        rms_errors: root-mean-square nodal distance over root-mean-square displacement, shape (n,).
-        max_errors: largest nodal distance over largest displacement, shape (n,).
-        probe_errors: distance over displacement at the probe, shape (n,).
+        probe: number of the probe node.
+        tolerance: the error below which the two agree [-].
+        load_factors: levels above zero that both solutions have, ascending, shape (n,).
+        rms_errors: root-mean-square nodal distance over root-mean-square displacement [-], shape (n,).
+        max_errors: largest nodal distance over largest displacement [-], shape (n,).
+        probe_errors: distance over displacement at the probe [-], shape (n,).
         rms_distances, max_distances: root-mean-square and largest nodal distance [m], shape (n,).
-        support_errors: at each level those of the moved supports whose forces both paths know, of length n.
+        support_errors: for each level, the errors of the moved supports whose forces both solutions have, length n.
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
     """
 
@@ -132,68 +62,69 @@ class Comparison:
         return f"Comparison({self})"
 
     def _at_full_load(self, errors: Floats) -> float | None:
+        """Return the last of the errors if it is at full load and not NaN, else None."""
         reached = self.load_factors.size and self.load_factors[-1] == 1.0
         return float(errors[-1]) if reached and np.isfinite(errors[-1]) else None
 
     @property
     def probe_error(self) -> float | None:
-        """The probe's error at full load; None where one path did not get there."""
+        """The probe's error at full load; None if a solution does not reach it."""
         return self._at_full_load(self.probe_errors)
 
     @property
     def rms_error(self) -> float | None:
-        """The rms error at full load; None where one path did not get there."""
+        """The rms error at full load; None if a solution does not reach it."""
         return self._at_full_load(self.rms_errors)
 
     @property
     def max_error(self) -> float | None:
-        """The largest error at full load; None where one path did not get there."""
+        """The largest error at full load; None if a solution does not reach it."""
         return self._at_full_load(self.max_errors)
 
     @cached_property
     def decisive(self) -> tuple[Decisive, ...]:
-        """At each level the error that decides: the larger of rms error and force error, of length n."""
+        """The error that decides at each level: the larger of rms error and force error; length n."""
         return tuple(map(decisive, self.rms_errors.tolist(), self.support_errors))
 
     @cached_property
     def errors(self) -> Floats:
-        """The error that decides at each level, shape (n,); not a number where none is known."""
+        """The error that decides at each level [-], shape (n,); NaN where none is known."""
         return np.array([one.error for one in self.decisive])
 
     @cached_property
     def force_errors(self) -> Floats:
-        """The largest error of a support's force or torque at each level, shape (n,); not a number where none is."""
+        """The largest error of a support's force or torque at each level [-], shape (n,); NaN where none is known."""
         return np.array([decisive(np.nan, several).error for several in self.support_errors])
 
     @property
     def supports(self) -> tuple[SupportError, ...]:
-        """The errors of the moved supports at full load; empty where one path did not get there."""
+        """The errors of the moved supports at full load; empty if a solution does not reach it."""
         reached = self.load_factors.size and self.load_factors[-1] == 1.0
         return self.support_errors[-1] if reached else ()
 
     @property
     def error(self) -> float | None:
-        """The error that decides at full load; None where one path did not get there."""
+        """The error that decides at full load; None if a solution does not reach it."""
         return self._at_full_load(self.errors)
 
     @property
     def decided_by(self) -> str | None:
-        """What decides at full load: "displacement", "force" or "torque"; None where nothing is known there."""
+        """The quantity whose error decides at full load: "displacement", "force" or "torque"; None if none is known."""
         return None if self.error is None else self.decisive[-1].quantity
 
     @property
     def force_error(self) -> float | None:
-        """The largest error of a moved support's force or torque at full load; None where there is none to tell."""
+        """The largest error of a moved support's force or torque at full load; None if none is known."""
         return self._at_full_load(self.force_errors)
 
     @property
     def n_outside(self) -> int:
-        """The number of nodes that lie outside of the other body."""
+        """The number of nodes outside of the other body."""
         return int(self.outside.sum())
 
     @cached_property
     def n_reference_outside(self) -> int | None:
-        """The number of the reference's own nodes outside of the model's body; None where the model has no inside."""
+        """The number of nodes of the reference's mesh outside of the model's body; None if that encloses no volume."""
         model, reference = self.known_on
         nodes = reference.problem.mesh.nodes
         if not reference.states or not model.states or not model.whole.fills or nodes.shape[1] != model.whole.dim:
@@ -202,15 +133,14 @@ class Comparison:
 
     @cached_property
     def hausdorff(self) -> Gap | None:
-        """How far the deformed surfaces of both are apart at the last level that both have [m].
+        """The Hausdorff distance of the deformed surfaces at the last level that both have [m].
 
-        Corners of elements span the surfaces. None where one of both has no surface, or one lies in the plane and the
-        other in space.
+        Corners of elements span the surfaces. None if one has no surface, or if one is plane and the other in space.
         """
-        met = float(self.load_factors[-1]) if self.load_factors.size else None
-        # One that is a surface only has no levels to meet at, but its own.
+        shared = float(self.load_factors[-1]) if self.load_factors.size else None
+        # A solution read as a surface has one level and no states.
         alone = next((path.load_factor for path in self.known_on if not path.states), None)
-        level = met if alone is None else alone
+        level = shared if alone is None else alone
         if level is None:
             return None
         mine, theirs = (_facets(path, level) for path in self.known_on)
@@ -220,7 +150,7 @@ class Comparison:
 
     @property
     def energy_error(self) -> float | None:
-        """Difference over size of the stored energy at full load; None where one of both does not tell it."""
+        """Relative difference of the stored energy at full load; None if one of the two is not known."""
         mine, theirs = self.model.at(1.0), self.reference.at(1.0)
         if mine is None or theirs is None or not np.isfinite(mine.energy) or not theirs.energy:
             return None
@@ -229,10 +159,10 @@ class Comparison:
 
     @property
     def agrees_up_to_load_factor(self) -> float | None:
-        """The largest level up to which, without a gap from zero, the error that decides is under the tolerance.
+        """The last of the levels, from the first on, at which the error that decides is below the tolerance.
 
-        Zero where the first level already differs; None for a reference of one level, read from a file, and where
-        there is nothing to compare.
+        Zero if the error of the first level is not; None if the reference has no unloaded state (as one read from a
+        file) or no error is known.
         """
         if not self.load_factors.size or self.reference.states[0].load_factor != 0.0 or np.isnan(self.errors).all():
             return None
@@ -242,9 +172,9 @@ class Comparison:
         return float(self.load_factors[beyond[0] - 1]) if beyond[0] else 0.0
 
     def __str__(self) -> str:
-        """Return the comparison in a sentence."""
+        """Return the errors at full load in a sentence."""
         if self.error is None:
-            return f"{self.model.label} and {self.reference.label} do not meet at full load"
+            return f"{self.model.label} against {self.reference.label}: no error at full load is known"
         up_to = self.agrees_up_to_load_factor
         within = "" if up_to is None else f", within {self.tolerance:.0%} up to load factor {up_to:g}"
         found = [] if self.rms_error is None else [f"{self.rms_error:.1%} rms"]
@@ -258,15 +188,22 @@ def compare(
     probe: int | str | Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Comparison:
-    """Compare two paths at the loaded levels that both have: node by node where their nodes are the same.
+    """Return the errors of `model` against `reference` at the levels above zero that both have.
 
-    Else the reference is carried to the nodes of the model by the own interpolation of its elements; and the model to
-    those of the reference where only they will do: a reference of markers or surfaces in space, a plane one beside a
-    solid. What lies outside of the other body is left out and counted.
+    If both have the same nodes, they are compared node by node. Else the displacement of the reference is interpolated
+    at the nodes of the model by its elements; or that of the model at the nodes of the reference, if the reference is
+    known at points only (markers, a surface in space) or is plane and the model a solid. Nodes outside of the other
+    body are excluded and counted.
 
-    `probe` is a node number of the model, a named point such as "right-middle" or a place [m], by default the node of
-    the model that moves most. Raises ProblemError where neither path can be carried, MeshError where there is no such
-    point.
+    Args:
+        model: solution to judge.
+        reference: solution to compare with.
+        probe: node number of the model, named point such as "right-middle", or position [m]; by default the node of
+            the model that moves most.
+        tolerance: relative error below which the two agree.
+
+    Raises ProblemError if neither solution can be interpolated at the nodes of the other, MeshError if the probe does
+    not exist.
     """
     problem = _common_problem(model, reference)
     mine, theirs = carried(model, problem), carried(reference, problem)
@@ -274,12 +211,12 @@ def compare(
     inside = np.flatnonzero(~outside)
     if not inside.size:
         raise ProblemError(
-            f"no node of {model.label} lies within {reference.label}: are unit, axes and origin the same?"
+            f"no node of {model.label} lies within {reference.label}: check unit, axes and origin of the two"
         )
     watched = _watched(mine.path, inside, model, probe)
     pairs = [(state, theirs.path.at(state.level)) for state in mine.path.states if state.loaded]
     both = [(one, other) for one, other in pairs if other is not None]
-    compared = ~outside & ~_dictated(mine.path, theirs.path)
+    compared = ~outside & ~_prescribed(mine.path, theirs.path)
     found = [_Distances.between(one, other, compared) for one, other in both]
     return Comparison(
         model=mine.path,
@@ -295,47 +232,25 @@ def compare(
         known_on=(model, reference),
         outside=outside,
         compared=compared,
-        support_errors=tuple(tuple(_support_errors(mine.path, theirs.path, *pair)) for pair in both),
+        support_errors=tuple(tuple(support_errors(mine.path, theirs.path, *pair)) for pair in both),
         node_by_node=mine.node_by_node and theirs.node_by_node,
         surface=_surface_distance(mine.path, theirs.path),
     )
 
 
-def _dictated(mine: Solution, theirs: Solution) -> Bools:
-    """The nodes that supports move or hold in all directions, in both paths where both tell, shape (n_nodes,)."""
-    told = [one for one in (mine.dictated, theirs.dictated) if one is not None]
-    return np.logical_and.reduce(told) if told else np.zeros(mine.problem.mesh.n_nodes, dtype=bool)
-
-
-def _support_errors(mine: Solution, theirs: Solution, one: State, other: State) -> Iterator[SupportError]:
-    """Yield the errors of the supports that both paths know, by their numbers."""
-    wanted = {found.support: found for found in theirs.support_forces(other)}
-    load = _total_load(mine, one)
-    for found in mine.support_forces(one):
-        if found.support in wanted and found.force.shape == wanted[found.support].force.shape:
-            yield SupportError(found, wanted[found.support], load)
-
-
-def _total_load(path: Solution, state: State) -> float | None:
-    """The length of the total load at a state [N]; None where none acts beside the motion, or it has no total."""
-    if not path.problem.stated or path.problem.loading.driven_by_motion:
-        return None
-    loads = path.problem.loading.force(state.positions, state.load_factor)
-    total = float(np.linalg.norm(state.applied_force))
-    return total if total > _NO_TOTAL * float(np.linalg.norm(loads, axis=1).sum()) else None
-
-
-# Loads that balance but for this share have no total.
-_NO_TOTAL = 1e-9
+def _prescribed(mine: Solution, theirs: Solution) -> Bools:
+    """Return which nodes are prescribed in all directions, in both solutions if known in both, shape (n_nodes,)."""
+    known = [one for one in (mine.prescribed, theirs.prescribed) if one is not None]
+    return np.logical_and.reduce(known) if known else np.zeros(mine.problem.mesh.n_nodes, dtype=bool)
 
 
 def _common_problem(model: Solution, reference: Solution) -> Problem:
-    """The problem on whose nodes two paths are compared: the model's but where those of the reference tell more."""
+    """Return the problem on whose nodes two solutions are compared: the model's, or the reference's; see `compare`."""
     mine, theirs = model.problem, reference.problem
     if mine.mesh.dim != theirs.mesh.dim:
         return mine if mine.mesh.dim == 2 else theirs
     if mine.mesh.n_nodes == theirs.mesh.n_nodes and matching_points(model.whole, theirs.mesh.nodes) is not None:
-        # One body: by its elements rather than as a network, with its supports and loads rather than without.
+        # The same nodes: prefer elements to a network, and a problem with supports and loads to one without.
         return max((mine, theirs), key=lambda one: (one.mesh.element != "line", one.stated))
     if not reference.whole.fills and model.whole.fills:  # markers, networks, surfaces in space
         return theirs
@@ -343,7 +258,7 @@ def _common_problem(model: Solution, reference: Solution) -> Problem:
 
 
 def _watched(on: Solution, inside: Ints, model: Solution, probe: int | str | Sequence[float] | None) -> int:
-    """The node to watch, by its number where the paths are compared."""
+    """Return the number of the probe node on the mesh on which the solutions are compared."""
     mesh = on.problem.mesh
     if isinstance(probe, str):
         return named_point(mesh, probe)
@@ -354,33 +269,36 @@ def _watched(on: Solution, inside: Ints, model: Solution, probe: int | str | Seq
 
 
 def closest(comparisons: Mapping[str, Comparison]) -> str | None:
-    """Return the name of the reference with the smallest rms error at full load, None where there is none."""
+    """Return the name of the comparison with the smallest rms error at full load, None if no such error is known."""
     errors = {name: one.rms_error for name, one in comparisons.items()}
     known = {name: error for name, error in errors.items() if error is not None}
-    # Errors that differ by rounding are equal; finite elements come first among equals.
+    # Errors that differ by rounding are equal; of equal ones, finite elements come first.
     is_fem = {name: comparisons[name].reference.element is not None for name in known}
     order = {name: (float(f"{error:.9g}"), not is_fem[name]) for name, error in known.items()}
     return min(order, key=lambda name: order[name]) if order else None
 
 
 def most_moved(path: Solution, among: Ints | None = None) -> int:
-    """Return the node that moves most at the last level, of all or `among` some; of several, by smaller coordinates."""
+    """Return the number of the node that moves most at the last level, of all nodes or of those in `among`.
+
+    Of nodes that move equally, the one with the smallest coordinates (x first). Nodes prescribed in all directions
+    count only if there are no others.
+    """
     if not path.states:
         return 0
-    # A node whose motion is prescribed in full tells nothing of the model.
-    told = path.problem.loading.held.all(axis=1)
-    moved = np.linalg.norm(path.states[-1].displacement, axis=1) * (told.all() | ~told)
+    prescribed = path.problem.loading.held.all(axis=1)
+    moved = np.linalg.norm(path.states[-1].displacement, axis=1) * (prescribed.all() | ~prescribed)
     if among is not None:
-        apart = np.ones(len(moved), dtype=bool)
-        apart[among] = False
-        moved[apart] = -1.0
+        others = np.ones(len(moved), dtype=bool)
+        others[among] = False
+        moved[others] = -1.0
     ties = np.flatnonzero(moved >= moved.max() * (1 - 1e-9))
     return int(min(ties, key=lambda node: tuple(path.problem.mesh.nodes[node])))
 
 
 @dataclass(frozen=True, slots=True)
 class _Distances:
-    """Root-mean-square and largest nodal distance of two states, and size of the reference's displacement [m]."""
+    """Root-mean-square and largest nodal distance of two states [m], and the same of the reference's displacement."""
 
     rms: float
     max: float
@@ -389,7 +307,7 @@ class _Distances:
 
     @staticmethod
     def between(mine: State, theirs: State, compared: Bools) -> "_Distances":
-        """Distances over some nodes; not a number where there are none."""
+        """Return the distances over the nodes of a mask, NaN if it is empty."""
         distance = np.linalg.norm(mine.displacement[compared] - theirs.displacement[compared], axis=1)
         size = np.linalg.norm(theirs.displacement[compared], axis=1)
         if not distance.size:
@@ -400,25 +318,13 @@ class _Distances:
 
 
 def _probe_error(mine: State, theirs: State, probe: int) -> float:
-    """The relative error at the probe; not a number where the reference does not move there."""
+    """Return the relative error at the probe, NaN if the reference does not move there."""
     size = float(np.linalg.norm(theirs.displacement[probe]))
     return float(np.linalg.norm(mine.displacement[probe] - theirs.displacement[probe])) / size if size else np.nan
 
 
-def _apart(mine: Floats, theirs: Floats) -> Floats:
-    return np.asarray((mine - theirs) / np.linalg.norm(theirs))
-
-
-def _length(apart: Floats | None) -> float | None:
-    return None if apart is None else float(np.linalg.norm(apart))
-
-
-def _or_nan(error: float | None) -> float:
-    return np.nan if error is None else error
-
-
 def _facets(path: Solution, level: float) -> Floats | None:
-    """The deformed surface by its segments or triangles [m], shape (n, 2, 2) or (n, 3, 3); None where there is none."""
+    """Return segments or triangles of the deformed surface [m], shape (n, 2, 2) or (n, 3, 3); None without one."""
     if not path.states:
         known = path.surface or path.shell
         return None if known is None else known.facets
@@ -434,6 +340,7 @@ def _facets(path: Solution, level: float) -> Floats | None:
 
 
 def _surface_distance(model: Solution, reference: Solution) -> SurfaceDistance | None:
+    """Return the distances between the outline of a plane model and a reference read as a surface, None for others."""
     if reference.surface is None or model.problem.mesh.dim != 2:
         return None
     state = model.at(reference.surface.load_factor)

@@ -10,7 +10,14 @@ from truespring.potential import Potential
 
 
 class Turn(NamedTuple):
-    """Nodes turned as a rigid body: `arms` [m] to them from the centre, a unit `axis` in space, `angle` [rad]."""
+    """Prescribed rotation of nodes as a rigid body.
+
+    Attributes:
+        nodes: node numbers, shape (n,).
+        arms: vectors from the centre to the nodes [m], shape (n, dim).
+        axis: unit vector in space, shape (3,).
+        angle: [rad].
+    """
 
     nodes: Ints
     arms: Floats
@@ -18,7 +25,7 @@ class Turn(NamedTuple):
     angle: float
 
     def motion(self, share: float) -> Floats:
-        """Return the displacement of the nodes [m] turned by a share of the angle, by Rodrigues' formula."""
+        """Return the displacement of the nodes for a share of the angle [m], shape (n, dim), by Rodrigues' formula."""
         sine, cosine = np.sin(share * self.angle), np.cos(share * self.angle)
         arms = np.zeros((len(self.arms), 3))
         arms[:, : self.arms.shape[1]] = self.arms
@@ -29,14 +36,14 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Loading:
-    """What acts on a potential from outside at load factor 1; every part of it scales with the load factor.
+    """Loads and prescribed motion of a potential at load factor 1; all scale with the load factor.
 
     Attributes:
         external_force: dead load [N], shape (n_nodes, dim).
-        held: true where the displacement is prescribed, shape (n_nodes, dim).
-        displacement: the prescribed displacement [m], zero where free, shape (n_nodes, dim).
-        turns: prescribed rotations, which come on top.
-        following: loads that follow the body, as potentials: the energy is minus the work of the load [J].
+        held: true for prescribed directions, shape (n_nodes, dim).
+        displacement: prescribed displacement [m], zero in free directions, shape (n_nodes, dim).
+        turns: prescribed rotations, added to the displacement.
+        following: loads that follow the body, as potentials whose energy is minus the work of the load [J].
     """
 
     external_force: Floats
@@ -50,7 +57,7 @@ class Loading:
             array.setflags(write=False)
 
     def motion(self, load_factor: float = 1.0) -> Floats:
-        """Return the prescribed displacement at a load factor [m], zero where free, shape (n_nodes, dim)."""
+        """Return the prescribed displacement at a load factor [m], zero in free directions, shape (n_nodes, dim)."""
         motion = load_factor * self.displacement
         for turn in self.turns:
             motion[turn.nodes] += turn.motion(load_factor)
@@ -64,39 +71,40 @@ class Loading:
         return np.asarray(force)
 
     def at_rest(self, nodes: Floats) -> "Loading":
-        """Return the loading of a linear theory: loads that follow the body act as they do on the body at rest."""
+        """Return the loading of a linear theory: following loads become dead loads with their undeformed forces."""
         return replace(self, external_force=self.force(nodes), following=()) if self.following else self
 
     @property
     def driven_by_motion(self) -> bool:
-        """Whether nothing but prescribed displacements loads the body."""
+        """Whether there are no loads but prescribed displacements."""
         return not self.external_force.any() and not self.following
 
 
 @runtime_checkable
 class Refined(Potential, Protocol):
-    """A potential with more nodes than the problem's mesh, whose nodes come first."""
+    """A potential with further nodes after those of the problem's mesh."""
 
     @property
     def parents(self) -> Ints:
-        """The two nodes of the mesh midway between which each further node stands, shape (n_further, 2)."""
+        """The two nodes of the mesh that each further node lies midway between, shape (n_further, 2)."""
         ...
 
     @property
     def elements(self) -> Ints:
-        """The nodes of each element, corners first, in VTK's order, shape (n_elements, k)."""
+        """Node numbers of each element in VTK's order, corners first, shape (n_elements, k)."""
         ...
 
     @property
     def loading(self) -> Loading:
-        """The problem's loading on all its nodes."""
+        """The problem's loading on all nodes of the potential."""
         ...
 
 
 def on_the_mesh(force: Floats, parents: Ints) -> Floats:
-    """Return forces on all nodes of a refined potential [N] as forces on those of the mesh, shape (n_nodes, dim).
+    """Return the forces on the nodes of the mesh [N], shape (n_nodes, dim), from those on all nodes.
 
-    What acts between two nodes of the mesh acts on both by half.
+    The force on a further node acts by half on each of its two parents. `force` has shape (n_all, dim) [N], `parents`
+    (n_further, 2).
     """
     n_nodes = len(force) - len(parents)
     found, further = force[:n_nodes].copy(), force[n_nodes:]

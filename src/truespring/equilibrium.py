@@ -1,4 +1,4 @@
-"""solve(problem, model, solver) -> Solution: the equilibria of a body and where they should not be trusted."""
+"""solve(problem, model, solver) -> Solution: compute the equilibria of a body."""
 
 import time
 from collections.abc import Iterable, Iterator
@@ -31,35 +31,36 @@ def solve(
     progress: Reporter | None = None,
     timeout: float | None = None,
 ) -> Solution:
-    """Follow the equilibria of `problem` under `model` from no load to the full one.
+    """Compute the equilibria of a problem from load factor 0 to 1.
 
     Args:
-        problem: the body, its supports and loads.
-        model: Springs, Fem, any object with a method `potential(problem)`, or a potential such as a SpringNetwork,
-            which is taken as it is (the problem then needs no material).
-        solver: Newton, the default, which applies the load in steps and keeps to stable states; DisplacementControl or
-            ArcLength, which continue past limit points, through unstable states too; or any object with a method
+        problem: body, supports and loads.
+        model: Springs, Fem, any object with a method `potential(problem)`, or a potential such as a SpringNetwork (the
+            problem then needs no material).
+        solver: Newton (the default) applies the load in steps and keeps to stable states; DisplacementControl and
+            ArcLength continue past limit points, also through unstable states; or any object with a method
             `follow(potential, loading, report, geometry)`.
         progress: called after each iteration with load factor, iteration and relative residual.
-        timeout: seconds after which the path ends; of another program an hour by default.
+        timeout: time limit [s]; none by default, an hour for another program.
 
-    A failure is not an exception: see Solution.status and Solution.best; what a library raises on the way ends the
-    path. Raises ModelError where the model does not fit the problem, ProblemError where the solver does not.
+    Solver failures are not exceptions: see Solution.status and Solution.best. An exception of a numerical library ends
+    the solution at the last equilibrium. Raises ModelError if the model does not fit the problem, ProblemError if the
+    solver does not.
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
     if isinstance(model, Program):
         return model.run(problem, solver, progress, timeout)
-    realised = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
+    moduli = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
     from truespring.kernels.threads import compiling
 
     with compiling() as compiled:
         started = time.perf_counter()
         path = _solve(problem, model, solver, _timed(progress, timeout))
-        return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=realised)
+        return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=moduli)
 
 
 def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
-    """Return a reporter that raises TimeoutError when the time is up."""
+    """Return a reporter that raises TimeoutError after the time limit [s]."""
     if timeout is None:
         return report
     end = time.monotonic() + timeout
@@ -74,7 +75,7 @@ def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
 
 
 def geometry_of(problem: Problem, finite: bool = True) -> Geometry:
-    """Return the geometry of a body for a solver: where strains are finite, inverted elements are not admissible."""
+    """Return the geometry of a body for a solver; with finite strains, inverted elements are not admissible."""
 
     def upright(positions: Floats) -> bool:
         return not finite or problem.mesh.smallest_area_ratio(positions) > 0
@@ -83,11 +84,12 @@ def geometry_of(problem: Problem, finite: bool = True) -> Geometry:
 
 
 def check_solver(problem: Problem, solver: Solver) -> None:
-    """Raise ProblemError where a solver does not fit the problem, as one that controls a held displacement."""
+    """Raise ProblemError if a solver does not fit the problem, as one that controls a held displacement."""
     solver.check(problem.loading, geometry_of(problem))
 
 
 def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | None) -> Solution:
+    """Return the solution of a model that has a potential, without its time and moduli."""
     potential = model.potential(problem)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
@@ -99,7 +101,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
     found, broken = _followed(solver.follow(potential, loading, report, geometry), potential)
-    found, drowned = _up_to_drowned(problem, found)
+    found, below_rounding = _above_rounding(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
     stable = solver.keeps_to_stable_states
@@ -112,7 +114,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         warnings=(
             *model.warnings(problem),
             *broken,
-            *path_warnings(states, best, model.finite, stable, drowned),
+            *path_warnings(states, best, model.finite, stable, below_rounding),
         ),
         best=best,
         potential=potential,
@@ -125,10 +127,10 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     )
 
 
-def _up_to_drowned(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[list[Equilibrium], bool]:
-    """Return the states of a path, and whether the load of the last one drowns in rounding.
+def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[list[Equilibrium], bool]:
+    """Return the states up to the first whose load is below rounding errors, and whether there is one.
 
-    Such a state, whose unbalanced force is not small beside the load, ends the path and has not converged.
+    The unbalanced force of that state is not small against the load: it is returned last, as not converged.
     """
     found: list[Equilibrium] = []
     for one in follow:
@@ -140,10 +142,10 @@ def _up_to_drowned(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[lis
 
 
 def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
-    """Whether motion alone drives the body, by more than its coordinates are rounded.
+    """Return whether motion alone drives the body, and exceeds the rounding errors of the coordinates.
 
-    The unbalanced force is then rounding beside what the motion takes. Where that is nothing, as of a body moved as a
-    whole, all forces are rounding, and their ratio tells nothing.
+    Such a state is an equilibrium whatever its residual: of a body moved as a whole all forces are rounding errors,
+    and so is their ratio.
     """
     loading, nodes = problem.loading, problem.mesh.nodes
     rounding = float(np.finfo(float).eps * np.abs(nodes).max())
@@ -152,7 +154,7 @@ def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
 
 
 def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list[Equilibrium], tuple[str, ...]]:
-    """The states up to where the path or an exception ends, at least that at rest; and what is to be said of it."""
+    """Return the states up to the end or an exception, at least the unloaded one; and a warning of the exception."""
     found: list[Equilibrium] = []
     try:
         for one in follow:
@@ -167,21 +169,21 @@ def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list
 
 
 def error_words(error: BaseException) -> str:
-    """Return what an exception says, in one line: its kind too where it is not meant for the reader."""
+    """Return the message of an exception in one line, preceded by its class if a library raised it."""
     if isinstance(error, MemoryError):
-        return "out of memory: take fewer elements"
+        return "out of memory: use fewer elements"
     text = one_line(str(error))
     return text if isinstance(error, TruespringError | TimeoutError) else f"{type(error).__name__}: {text}"
 
 
 def _rest(nodes: Floats) -> Equilibrium:
-    """The body without load, of whose stability nothing is known."""
+    """Return the undeformed state without load, of unknown stability."""
     still = np.zeros_like(nodes)
     return Equilibrium(0.0, nodes, still, still, 0.0, 0, 0.0, converged=True)
 
 
 def unsolved(problem: Problem, model: Model | Potential, error: BaseException) -> Solution:
-    """Return the path of a model that an exception ended before anything was known: the body at rest, and why."""
+    """Return the solution of a model that an exception ended at once: the undeformed state, and a warning."""
     model = as_model(model)
     nodes = problem.mesh.nodes
     rest = _rest(nodes)
@@ -217,6 +219,7 @@ def unsolved(problem: Problem, model: Model | Potential, error: BaseException) -
 
 
 def _state(problem: Problem, potential: Potential, loading: Loading, found: Equilibrium) -> State:
+    """Return the state on the mesh of a problem from an equilibrium of its potential."""
     reaction = np.where(loading.held, found.internal_force - found.external_force, 0.0)
     stretch = potential.stretch(found.positions) if isinstance(potential, Stretched) else None
     n_nodes = problem.mesh.n_nodes
@@ -246,7 +249,7 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
 
 
 def _level(found: Equilibrium) -> float | None:
-    """The level of a state; of a critical point, which lies between levels, None."""
+    """Return the level of an equilibrium; None at a critical point, which lies between levels."""
     if found.critical:
         return None
     return found.load_factor if found.level is None else found.level

@@ -1,4 +1,4 @@
-"""Two bodies that are one, told in other units, along other axes or from another origin: noticed, never mended."""
+"""Detect that two bodies differ by unit, axes or origin only; nothing is corrected."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -8,33 +8,34 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints, in_space
 from truespring.comparison import Comparison
-from truespring.equilibrium import Solution
+from truespring.solution import Solution
 
-# Boxes whose corners are this near, as a share of their diagonal, are of one body; those of deformed ones less so.
+# Bounding boxes are equal if their corners differ by less than this share of their diagonal, undeformed or deformed.
 _SAME_BOX = 0.02
 _SAME_DEFORMED_BOX = 0.2
 
-# By the size of a unit over that which was taken.
+# Ratios of the unit of a file to the unit that was assumed.
 _FACTORS = (1e-3, 1e3, 1e-2, 1e2, 10.0, 0.1, 1e-6, 1e6, 0.0254, 1 / 0.0254, 0.3048, 1 / 0.3048)
 
-# So much of a cloud of points may lie beside the body, along each axis: some may be measured off it.
+# A cloud of points fits a body if this share of its extent along each axis lies within that of the body.
 _SHARED = 0.5
 
-#: Points at which displacements are compared to tell axes apart.
+#: Number of points at which displacements are compared.
 _SAMPLE = 400
 
-# A displacement that is so much nearer along other axes, or in another unit, tells that these were meant.
+# Other axes or units are reported if the error of the displacement is above the first number, and theirs is below this
+# share of it.
 _POOR, _BETTER = 0.5, 0.2
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """What makes a body lie where another lies.
+    """A change of unit, axes and origin that places one body on another.
 
     Attributes:
-        factor: what its lengths are to be multiplied by.
-        axes: its axes along ours, such as ("x", "z", "-y").
-        shift: what is added to its places then [m].
+        factor: factor of the lengths [-].
+        axes: axes of the body along x, y and z, such as ("x", "z", "-y").
+        shift: translation after factor and axes [m].
     """
 
     factor: float = 1.0
@@ -44,7 +45,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class _Box:
-    """A box in space; of a plane body its `lower` and `upper` along z are not numbers."""
+    """Bounding box: `lower` and `upper` corner [m], shape (3,), NaN along z for a plane body; `filled` by elements."""
 
     lower: Floats
     upper: Floats
@@ -56,9 +57,9 @@ class _Box:
 
 
 def find_misfit(path: Solution, reference: Solution, factors: Sequence[float] = _FACTORS) -> Misfit | None:
-    """Return what would make a body lie where the reference lies; None where it does, or where nothing would.
+    """Return the change that places a body on the reference; None if it lies there already, or if there is no such one.
 
-    `factors` are what its lengths may be multiplied by: sizes of units over that which was taken.
+    `factors` are the factors of lengths to try: ratios of units to the unit that was assumed.
     """
     mine, theirs, tolerance = _boxes(path, reference)
     if _fits(mine, theirs, tolerance):
@@ -67,7 +68,7 @@ def find_misfit(path: Solution, reference: Solution, factors: Sequence[float] = 
     for candidates in _tiers(mine, theirs, tolerance, factors):
         for one in candidates:
             error = _sampled_error(path, reference, one)
-            # The less is changed the likelier, but for what brings the motion much nearer.
+            # Prefer few changes, unless another one reduces the error of the displacement by much.
             if best is None or error < _BETTER * least or (error < least and _changes(one) == _changes(best)):
                 best, least = one, error
         if least < _POOR:
@@ -76,27 +77,28 @@ def find_misfit(path: Solution, reference: Solution, factors: Sequence[float] = 
 
 
 def _changes(one: Misfit) -> int:
+    """Return how many of factor, axes and shift differ from the default."""
     return (one.factor != 1) + (one.axes != ("x", "y", "z")) + any(one.shift)
 
 
 def same_place(path: Solution, reference: Solution) -> bool:
-    """Tell whether two bodies lie in one place, as far as their boxes tell."""
+    """Return whether the bounding boxes of two bodies are equal, to a tolerance."""
     return _fits(*_boxes(path, reference))
 
 
 def _boxes(path: Solution, reference: Solution) -> "tuple[_Box, _Box, float]":
-    """The boxes of both, and how much they may differ as a share of their diagonal."""
+    """Return the bounding boxes of two bodies, and their tolerance as a share of the diagonal."""
     if path.states and reference.states:
         return _box(path), _box(reference), _SAME_BOX
-    level = (reference if path.states else path).load_factor  # one is known deformed only: the other is taken there too
+    level = (reference if path.states else path).load_factor  # one is known deformed only: compare both deformed
     return _box(path, level), _box(reference, level), _SAME_DEFORMED_BOX
 
 
 def displacement_misfit(comparison: Comparison) -> Misfit | None:
-    """Return other axes or another unit in which the displacement of a body that lies right would be much nearer.
+    """Return axes or a factor that reduce the error of the displacement by much, for bodies in the same place.
 
-    Axes of the whole body, where it then still lies right, or of its displacement alone; the factor is that of the
-    displacement alone. None where the two are near, or nothing brings them nearer.
+    The axes are those of the whole body, if its place remains right, or of the displacement alone; the factor is that
+    of the displacement alone. None if the displacements agree, or if nothing reduces the error.
     """
     model, reference = comparison.known_on
     if not comparison.load_factors.size or not comparison.rms_errors[-1] > _POOR:
@@ -104,14 +106,15 @@ def displacement_misfit(comparison: Comparison) -> Misfit | None:
     mine, theirs = _box(model), _box(reference)
     plain = Misfit()
     turned = [one for axes in _axes() if _fits(_moved(mine, one := Misfit(axes=axes)), theirs, _SAME_BOX)]
-    told = [(one, one) for one in turned]  # how places are told, and how their displacement
-    told += [(plain, one) for one in (*turned, *(Misfit(factor) for factor in _FACTORS))]
-    errors = [_sampled_error(model, reference, *pair) for pair in told]
+    pairs = [(one, one) for one in turned]  # changes of positions and of displacements
+    pairs += [(plain, one) for one in (*turned, *(Misfit(factor) for factor in _FACTORS))]
+    errors = [_sampled_error(model, reference, *pair) for pair in pairs]
     best = int(np.argmin(errors))
-    return told[best][1] if errors[best] < _BETTER * _sampled_error(model, reference, plain) else None
+    return pairs[best][1] if errors[best] < _BETTER * _sampled_error(model, reference, plain) else None
 
 
 def _box(path: Solution, level: float | None = None) -> _Box:
+    """Return the bounding box of a body, undeformed or at a level."""
     if path.states:
         state = None if level is None else path.at(level)
         points = path.whole.points if state is None else state.all_positions
@@ -124,7 +127,10 @@ def _box(path: Solution, level: float | None = None) -> _Box:
 
 
 def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
-    """Whether one box is the other; of points alone, whether most lie within the other and are not lost in it."""
+    """Return whether two boxes are equal; if one is of points alone, whether most of it lies within the other.
+
+    Points whose extent is a tiny part of the body do not fit: their unit is wrong.
+    """
     room = tolerance * max(mine.diameter, theirs.diameter)
     low, high = mine.lower - theirs.lower, mine.upper - theirs.upper
     known = ~(np.isnan(low) | np.isnan(high))
@@ -140,17 +146,19 @@ def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
 
 
 def _moved(box: _Box, misfit: Misfit) -> _Box:
+    """Return a box after a change of unit, axes and origin."""
     ends = np.stack([_turned(corner[None], misfit.axes)[0] for corner in (box.lower, box.upper)])
     low, high = misfit.factor * np.fmin(*ends), misfit.factor * np.fmax(*ends)
     return _Box(low + np.array(misfit.shift), high + np.array(misfit.shift), box.filled)
 
 
 def _turned(vectors: Floats, axes: tuple[str, ...]) -> Floats:
+    """Return vectors of shape (n, 3) along other axes, shape (n, 3)."""
     return np.stack([(-1.0 if axis[0] == "-" else 1.0) * vectors[:, "xyz".index(axis[-1])] for axis in axes], axis=1)
 
 
 def _axes() -> Iterator[tuple[str, ...]]:
-    """All other axes, right-handed ones first."""
+    """Yield all axes but ("x", "y", "z"), right-handed ones first."""
     order = [
         (float(np.linalg.det(_turned(np.eye(3), axes))), axes)
         for letters in itertools.permutations("xyz")
@@ -161,7 +169,7 @@ def _axes() -> Iterator[tuple[str, ...]]:
 
 
 def _tiers(mine: _Box, theirs: _Box, tolerance: float, factors: Sequence[float]) -> Iterator[Iterator[Misfit]]:
-    """What fits of ever more that is changed: unit, axes, origin, and two or all of them."""
+    """Yield the changes that fit, in tiers: unit, axes, origin, then two and three of them."""
     units = [Misfit(factor) for factor in factors if abs(factor - 1) > 1e-9]
     axes = [Misfit(axes=one) for one in _axes()]
     both = [Misfit(one.factor, other.axes) for one in units for other in axes]
@@ -177,6 +185,7 @@ def _tiers(mine: _Box, theirs: _Box, tolerance: float, factors: Sequence[float])
 
 
 def _shifted(several: list[Misfit], mine: _Box, theirs: _Box, tolerance: float) -> Iterator[Misfit]:
+    """Yield changes of several candidates that fit with a translation."""
     for one in several:
         shift = np.nan_to_num(theirs.lower - _moved(mine, one).lower)
         moved = Misfit(one.factor, one.axes, tuple(float(f"{part:.6g}") for part in shift))
@@ -185,17 +194,17 @@ def _shifted(several: list[Misfit], mine: _Box, theirs: _Box, tolerance: float) 
 
 
 def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: Misfit | None = None) -> float:
-    """The relative rms error of a body's displacement at some of its points, were it told otherwise; 0 if not known.
+    """Return the relative rms error of a body's displacement at some of its points after a change, 0 if not known.
 
-    The `motion` is told otherwise as places are where nothing else is given.
+    `places` changes the positions, `motion` the displacements (by default as the positions).
     """
     grid, other = path.whole, reference.whole
     state = path.states[-1] if path.states else None
     theirs = None if state is None else reference.at(state.level)
     if state is None or theirs is None or not other.fills:
         return 0.0
-    some, told = _some(len(grid.points)), motion or places
-    moved = told.factor * _turned(in_space((state.all_positions - grid.points)[some]), told.axes)
+    some, change = _some(len(grid.points)), motion or places
+    moved = change.factor * _turned(in_space((state.all_positions - grid.points)[some]), change.axes)
     rest = places.factor * _turned(in_space(grid.points[some]), places.axes) + np.array(places.shift)
     dim = min(other.dim, grid.dim)
     if other.dim == 3 and grid.dim == 2:
@@ -204,10 +213,11 @@ def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: 
     inside = ~found.outside
     if not inside.any():
         return np.inf
-    wanted = found.carry(theirs.all_positions - other.points)[inside, :dim]
-    size = float(np.linalg.norm(wanted))
-    return float(np.linalg.norm(moved[inside, :dim] - wanted)) / size if size else np.inf
+    target = found.carry(theirs.all_positions - other.points)[inside, :dim]
+    size = float(np.linalg.norm(target))
+    return float(np.linalg.norm(moved[inside, :dim] - target)) / size if size else np.inf
 
 
 def _some(n_points: int) -> Ints:
+    """Return the numbers of at most _SAMPLE points, evenly spaced."""
     return np.unique(np.linspace(0, n_points - 1, _SAMPLE).astype(np.int64))

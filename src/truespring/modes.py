@@ -6,7 +6,10 @@ from truespring.arrays import Floats
 
 
 def rigid_body_modes(nodes: Floats) -> Floats:
-    """Return translations, then rotations about the centre of the nodes [m], shape (n_dof, 3 or 6), each of size 1."""
+    """Return translations, then rotations about the centre of the nodes, shape (n_dof, 3 or 6), largest component 1.
+
+    `nodes` [m] has shape (n_nodes, dim).
+    """
     return modes_at(centred(nodes))
 
 
@@ -16,16 +19,19 @@ def n_modes(dim: int) -> int:
 
 
 def centred(nodes: Floats) -> Floats:
-    """Return positions about their centre, shape (n_nodes, dim), divided by the largest coordinate.
+    """Return positions relative to their centre, divided by the largest coordinate [-], shape (n_nodes, dim).
 
-    Translations and rotations are then of one size.
+    Translations and rotations then have the same size.
     """
     places = nodes - nodes.mean(axis=0)
     return np.asarray(places / max(float(np.abs(places).max()), np.finfo(float).tiny))
 
 
 def modes_at(places: Floats) -> Floats:
-    """Return translations, then infinitesimal rotations of positions about the origin, shape (n_dof, 3 or 6)."""
+    """Return translations, then infinitesimal rotations about the origin, shape (n_dof, 3 or 6).
+
+    `places` are positions about the origin, shape (n_nodes, dim).
+    """
     n_nodes, dim = places.shape
     turns = [(first, second) for first in range(dim) for second in range(first + 1, dim)]
     modes = np.zeros((n_nodes, dim, dim + len(turns)))

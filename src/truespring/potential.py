@@ -1,7 +1,7 @@
-"""The protocol between models and solvers, and nothing else.
+"""Protocols between models and solvers.
 
-A model turns a problem into a `Potential`; a solver sees potentials and a `Loading`, never a
-spring, an element or a mesh.
+A model makes a `Potential` from a problem. A solver uses potentials and a `Loading`; it has no access to springs,
+elements or meshes.
 """
 
 from collections.abc import Mapping
@@ -11,68 +11,74 @@ from scipy import sparse
 
 from truespring.arrays import Floats, Ints
 
-#: Blocks of one row and column a direction, one for each pair of nodes that share an element.
+#: Blocks of shape (dim, dim), one for each pair of nodes that share an element.
 SparseMatrix = sparse.bsr_array[Any]
 
 
 @runtime_checkable
 class Potential(Protocol):
-    """Elastic energy of the node positions.
+    """Elastic energy as a function of the positions of the nodes, shape (n_nodes, dim).
 
-    `energy` may be infinite where the law does not reach (a collapsed element); the others are
-    asked only where it is finite.
+    `energy` may be infinite where the law is not defined (a collapsed element); solvers evaluate the other methods only
+    where it is finite.
     """
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim): rigid-body modes and rotations come from them."""
+        """Undeformed positions [m], shape (n_nodes, dim); rigid-body modes and rotations follow from them."""
         ...
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         ...
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         ...
 
     def hessian(self, positions: Floats) -> SparseMatrix:
-        """Tangent stiffness [N/m], symmetric, shape (n_dof, n_dof); dof = node * dim + direction."""
+        """Return the tangent stiffness [N/m], symmetric, shape (n_dof, n_dof); dof = node * dim + direction."""
         ...
 
 
 @runtime_checkable
 class Projectable(Potential, Protocol):
-    """A potential that knows a positive semidefinite neighbour of its Hessian."""
+    """A potential with a positive semidefinite approximation of its Hessian."""
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Sum of the spring or element Hessians, each projected to its nearest semidefinite one [N/m]."""
+        """Return the sum of the spring or element Hessians, each projected to the nearest semidefinite matrix [N/m].
+
+        Symmetric, shape (n_dof, n_dof).
+        """
         ...
 
 
 @runtime_checkable
 class Stressed(Potential, Protocol):
-    """A potential whose geometric stiffness can be built from a given stress (MIP Newton).
+    """A potential whose geometric stiffness can be built from a given stress (mixed integration points).
 
-    Source: Magisano, Leonetti, Garcea, CMAME 313 (2017), mixed integration points.
+    Source: Magisano, Leonetti, Garcea, CMAME 313 (2017).
     """
 
     def stress(self, positions: Floats) -> Floats:
-        """What multiplies the second derivative of the strain: tension [N] of springs, stress [Pa] of elements."""
+        """Return the stress conjugate to the strain: tension [N] of each spring, stress [Pa] at each Gauss point."""
         ...
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """The stress at `positions` carried on linearly along `step` [m], as if strain were linear in the nodes."""
+        """Return the stress at `positions` plus its linear change along `step` [m], shaped as `stress` returns it."""
         ...
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m] with the geometric part of `stress`, by default that of the positions."""
+        """Return the tangent stiffness [N/m] with the geometric part of `stress`, by default that of the positions.
+
+        Symmetric, shape (n_dof, n_dof).
+        """
         ...
 
 
 @runtime_checkable
 class Stretched(Potential, Protocol):
-    """A potential of springs: which nodes they join, and how far they are stretched."""
+    """A potential of springs."""
 
     @property
     def springs(self) -> Ints:
@@ -80,19 +86,19 @@ class Stretched(Potential, Protocol):
         ...
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length, shape (n_springs,)."""
+        """Return length over rest length [-], shape (n_springs,)."""
         ...
 
 
 @runtime_checkable
 class Visible(Potential, Protocol):
-    """A potential that can be drawn: its cells and what lives on them."""
+    """A potential that can be drawn: cells, and fields on them."""
 
     @property
     def cells(self) -> Mapping[str, Ints]:
-        """Node numbers of the cells by VTK's name of their kind, shape (n_cells, k)."""
+        """Node numbers of the cells, shape (n_cells, k), by VTK's name of their kind."""
         ...
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Values on the cells by name, each of shape (n_cells, ...), kind after kind, SI units."""
+        """Return values on the cells in SI units, by name, each of shape (n_cells, ...), in the order of `cells`."""
         ...

@@ -1,4 +1,4 @@
-"""Reactions by support: one force and one torque for each support that moves."""
+"""Force and torque of each moved support."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +10,11 @@ from truespring.arrays import Floats
 from truespring.loading import Held
 from truespring.problem import Problem
 
-# Shares of what the nodes' reactions add up to, below which a resultant vanishes: one that the prescribed motion does
-# work with only where it is zero by symmetry; an idle one, such as the torque of a straight pull, already where it may
-# be due to the mesh alone (coarse tetrahedra make one of 4 %).
+# A resultant vanishes if it is below this share of the sum of the sizes of the nodes' reactions. The first number is
+# for a resultant that does work with the prescribed motion: it vanishes by symmetry only. The second is for one that
+# does no work, such as the torque of a straight pull: it may be an error of the mesh (coarse tetrahedra give 4 %).
 _VANISHING, _IDLE = 1e-3, 0.1
-# Shares of the way at which the motion of a support is measured: a full turn ends where it began.
+# Shares of the motion at which the distance of a support is measured: after a full turn it is zero again.
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _EQUAL = 1e-9
 
@@ -23,15 +23,15 @@ Rows = sparse.csr_array[Any, tuple[int, int]]
 
 @dataclass(frozen=True, eq=False)
 class SupportForce:
-    """The force and the torque of a moved support on the body, the resultant of its reactions.
+    """Force and torque of a moved support on the body: the resultant of its reactions.
 
     Attributes:
-        support: its number among the supports of the problem, from 0.
-        name: what it is on, "support 2" where that has no name.
-        force: sum of its reactions [N], shape (dim,).
-        torque: sum of arm x reaction [N m], shape (1,) in the plane (about z), (3,) in space. It does work with the
-            rotation of the support: arms are those of the deformed body, from the point of `point_of_torque`.
-        has_force, has_torque: whether there is a resultant to compare, not reactions that cancel.
+        support: index among the supports of the problem.
+        name: selection that it is on; "support 2" if that has no name.
+        force: sum of the reactions [N], shape (dim,).
+        torque: sum of arm x reaction [N m], shape (1,) in the plane (about z), (3,) in space; arms are those of the
+            deformed body, from `point_of_torque`.
+        has_force, has_torque: whether the resultant does not vanish.
     """
 
     support: int
@@ -43,17 +43,14 @@ class SupportForce:
 
 
 def moved_supports(problem: Problem) -> list[int]:
-    """Return the numbers of the supports that are moved or turned; none of a body that no problem was stated for."""
+    """Return the indices of the supports that are moved or turned; empty if the problem states no supports."""
     if not problem.stated:
         return []
     return [number for number, held in enumerate(problem.held) if held.motion.any() or held.turn is not None]
 
 
 def leading_support(problem: Problem) -> int | None:
-    """Return the number of the support that moves most, of equals the first stated; None where none moves.
-
-    By the largest distance that one of its nodes gets from where it stood.
-    """
+    """Return the index of the support whose nodes move farthest, the first of equal ones; None if none moves."""
     found = None
     largest = 0.0
     for number in moved_supports(problem):
@@ -66,18 +63,17 @@ def leading_support(problem: Problem) -> int | None:
 def support_forces(
     problem: Problem, positions: Floats, reaction: Floats, load_factor: float
 ) -> tuple[SupportForce, ...]:
-    """Return force and torque of each support that moves, in the order in which they are stated.
+    """Return force and torque of each moved support, in the order of the supports.
 
-    A support acts only in the directions that it holds. A direction of a node that several supports hold is shared
-    equally by them, so that the forces of all supports add up to the total reaction. The torque is taken about the
-    point `about` of a turn, moved along with the support's displacement, else about the centre of the nodes where they
-    are: with that a support that lets its nodes slide has no torque of its own where it only pulls.
+    A support acts only in the directions that it holds. If several supports hold a direction of a node, they share its
+    reaction equally, so that the forces of all supports add up to the total reaction. The torque is about the point
+    `about` of a turn, moved with the support, else about the centre of its deformed nodes.
 
     Args:
-        problem: whose supports.
-        positions: of the nodes [m], shape (n_nodes, dim).
-        reaction: at the nodes [N], shape (n_nodes, dim).
-        load_factor: share of the prescribed motion.
+        problem: problem with the supports.
+        positions: positions of the nodes [m], shape (n_nodes, dim).
+        reaction: reactions at the nodes [N], shape (n_nodes, dim).
+        load_factor: share of the prescribed motion [-].
     """
     moved = moved_supports(problem)
     if not moved:
@@ -87,7 +83,7 @@ def support_forces(
 
 
 def _holders(problem: Problem) -> Floats:
-    """The number of supports that hold each direction of each node, shape (n_nodes, dim)."""
+    """Return the number of supports that hold each direction of each node, shape (n_nodes, dim)."""
     holders = np.zeros(problem.mesh.nodes.shape)
     for held in problem.held:
         holders[held.nodes[:, None], held.directions] += 1
@@ -95,9 +91,9 @@ def _holders(problem: Problem) -> Floats:
 
 
 def resultant_rows(problem: Problem, support: int, positions: Floats, load_factor: float) -> tuple[Rows, Rows]:
-    """Return what makes force and torque of a support from the reactions of all nodes, at given positions.
+    """Return the matrices that map the reactions of all nodes, shape (n_dof,), to force and torque of a support.
 
-    Sparse, shape (dim, n_dof) and (1 or 3, n_dof), for reactions of shape (n_dof,); arguments as support_forces.
+    They are sparse, of shape (dim, n_dof) [-] and (1 or 3, n_dof) [m]. Arguments as support_forces.
     """
     held, dim = problem.held[support], problem.mesh.dim
     dofs = held.nodes[:, None] * dim + np.array(held.directions)
@@ -117,12 +113,12 @@ def resultant_rows(problem: Problem, support: int, positions: Floats, load_facto
 
 
 def torque_axes(dim: int) -> str:
-    """Return the axes about which a torque acts: z in the plane, all in space."""
+    """Return the names of the axes of a torque: z in the plane, xyz in space."""
     return "xyz" if dim == 3 else "z"
 
 
 def point_of_torque(problem: Problem, support: int, positions: Floats, load_factor: float) -> Floats:
-    """Return the point about which the torque of a support is taken [m], shape (dim,); arguments as support_forces."""
+    """Return the point about which the torque of a support acts [m], shape (dim,); arguments as support_forces."""
     held = problem.held[support]
     if held.turn is None:
         return np.asarray(positions[held.nodes].mean(axis=0))
@@ -131,6 +127,7 @@ def point_of_torque(problem: Problem, support: int, positions: Floats, load_fact
 
 
 def _resultant(problem: Problem, number: int, positions: Floats, shared: Floats, load_factor: float) -> SupportForce:
+    """Return force and torque of a support from reactions that are shared between supports, shape (n_nodes, dim)."""
     held = problem.held[number]
     reaction = np.zeros((len(held.nodes), positions.shape[1]))
     reaction[:, held.directions] = shared[held.nodes[:, None], held.directions]
@@ -150,20 +147,20 @@ def _resultant(problem: Problem, number: int, positions: Floats, shared: Floats,
 
 
 def support_name(problem: Problem, number: int) -> str:
-    """Return what a support is on where that has a name, else its number, counted from 1."""
+    """Return the name of the selection that a support is on, if it is the only one there, else "support N" from 1."""
     on = problem.supports[number].on
     alone = sum(isinstance(one.on, str) and one.on == on for one in problem.supports) == 1
     return on if isinstance(on, str) and alone else f"support {number + 1}"
 
 
 def _cross(arms: Floats, forces: Floats) -> Floats:
-    """Arms times forces, shape (n, 1) in the plane, (n, 3) in space."""
+    """Return arm x force [N m], shape (n, 1) in the plane, (n, 3) in space."""
     if arms.shape[1] == 2:
         return np.asarray(arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1])
     return np.asarray(np.cross(arms, forces))
 
 
 def _way(held: Held) -> float:
-    """The largest distance of a node of a support from where it stood [m]."""
+    """Return the largest distance that a node of a support moves [m]."""
     ways = [share * held.motion + (0.0 if held.turn is None else held.turn.motion(share)) for share in _SHARES]
     return max(float(np.linalg.norm(np.atleast_2d(way), axis=1).max()) for way in ways)

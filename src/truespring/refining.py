@@ -1,4 +1,4 @@
-"""Refining: how far a path is from its own limit, by the same law on a finer mesh or by elements of second order."""
+"""Discretisation error of a solution, from a finer mesh of the same law or from elements of second order."""
 
 import math
 import time
@@ -33,34 +33,34 @@ from truespring.potential import Potential
 from truespring.problem import Problem, Region
 from truespring.solvers import Newton, Solver, as_solver
 
-#: The order of convergence that refinement is taken to have: the lowest that is met, at clamps and corners. Bodies
-#: without these have twice that or more, and their error is overestimated: by half, and twofold at most.
+#: Assumed order of convergence: the lowest observed, at clamps and corners. Bodies without these have order 2 or more;
+#: their error is overestimated, usually by half, at most twofold.
 ORDER = 1.0
-#: The share of an error of first order that elements of second order on the same nodes still have, at most: measured on
-#: cantilevers, blocks and tubes, 0.004 to 0.08.
+#: Upper bound for the error of second-order elements over that of first-order elements on the same nodes. Measured on
+#: cantilevers, blocks and tubes: 0.004 to 0.08.
 SECOND_ORDER = 1 / 11
-#: Refinement may cost so many times what the paths of a study did.
+#: Largest work of refinement over the work of all solutions of a study.
 COST = 10.0
 
-# How work grows with the number of unknowns, measured in the plane and in space.
+# Exponent of work as a power of the number of unknowns, measured in the plane and in space.
 _GROWTH = 1.25
-# Newton iterations from the coarse state, of which five are usual.
+# Newton iterations from the coarse state: estimate (five are usual) and limit.
 _ITERATIONS, _MOST_ITERATIONS = 6, 10
-# Meshes are halved twice at most.
+# Largest number of halvings of the mesh.
 _LEVELS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class OwnError:
-    """How far a path is from its own limit: that of finer and finer meshes, under its law, loads and supports.
+    """Discretisation error of a solution: its distance to the limit of ever finer meshes, with the same law and loads.
 
     Attributes:
-        value: at full load, relative as Comparison.error is: the larger of the rms distance of nodes and the error of a
-            moved support's force or torque; None where it is not known.
-        how: by what it was found: "second order", "refined" or "coarser"; or why it is not known.
-        limit: the path on the finer mesh or of the better elements, None without one.
-        comparison: of the path with `limit`, None without one.
-        work: what it took, as `work_of` counts it.
+        value: relative error at full load, as Comparison.error: the larger of the rms distance of nodes and the error
+            of a moved support's force or torque; None if not known.
+        how: method: "second order", "refined" or "coarser"; or why it is not known.
+        limit: solution on the finer mesh or with elements of second order, None without one.
+        comparison: comparison of the solution with `limit`, None without one.
+        work: work of the estimate, see `work_of`.
     """
 
     value: float | None
@@ -70,18 +70,18 @@ class OwnError:
     work: float = 0.0
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return value and method."""
         return f"not known: {self.how}" if self.value is None else f"{self.value:.2%} ({self.how})"
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How a reference stands to its own limit, and a model compared with it to that limit.
+    """Discretisation error of a reference, and the error of a model against the refined reference.
 
     Attributes:
-        value, how: of the reference, see OwnError.
-        refined_error: the model's error at full load against the finer path of the reference, as Comparison.error is;
-            None where there is none.
+        value, how: error of the reference, see OwnError.
+        refined_error: error of the model at full load against the refined reference, as Comparison.error; None without
+            a refined reference.
     """
 
     value: float | None
@@ -90,37 +90,43 @@ class Standing:
 
 
 def standing(model: Solution, found: OwnError) -> Standing:
-    """Return how a reference stands whose own error was found, and `model` to its limit."""
+    """Return the standing of a reference with the error `found`, for the solution `model`."""
     against = None if found.limit is None else compare(model, found.limit).error
     return Standing(found.value, found.how, against)
 
 
 def work_of(path: Solution) -> float:
-    """Return what solving a path took: Newton iterations times unknowns to the power of their growth, no times."""
+    """Return the work of a solution: Newton iterations times a power of the number of unknowns; independent of time."""
     return float(max(path.newton_iterations, 1) * path.n_unknowns**_GROWTH)
 
 
 def reference_error(
     problem: Problem, model: Model, solver: Solver | None = None, most_work: float = math.inf
 ) -> OwnError:
-    """Solve a problem and return how far the solution is from its own limit, whatever that costs; see `own_error`."""
+    """Solve a problem and return the discretisation error of its solution, see `own_error`."""
     solver = Newton() if solver is None else as_solver(solver)
     return own_error(solve(problem, model, solver), model, solver, most_work)
 
 
 def own_error(path: Solution, model: Any, solver: Solver, most_work: float, timeout: float | None = None) -> OwnError:
-    """Return how far the path of a model is from its own limit at full load.
+    """Return the discretisation error of a solution at full load.
 
-    A model of first order whose law has elements of second order is held against these, on simplices of the same
-    nodes; they have the share SECOND_ORDER of its error at most. Others are solved on meshes of half and, if that costs
-    little, of a quarter of the size, which have the share 2^(-p k) of it after k halvings, p = ORDER (Richardson).
-    Where that takes more than `most_work` or does not fit in memory, a mesh of twice the size tells instead, if
-    elements are alike and along the axes and their numbers even: its distance over 2^p - 1. It is not known of a path
-    that did not reach full load, was read from a file, or finds no equilibrium on other meshes. All of it ends after
-    `timeout` [s]; what was found until then counts.
+    A model of first order whose law has elements of second order is compared with these, on simplices of the same
+    nodes; their error is at most SECOND_ORDER of its own. Other models are solved on meshes of half and, if the work is
+    small, a quarter of the element size; k halvings multiply the error by 2^(-p k), p = ORDER (Richardson
+    extrapolation). If that exceeds `most_work` or the memory, the error follows from a mesh of twice the element size,
+    as its distance over 2^p - 1; that needs equal elements along the axes, in even numbers. The error is not known if
+    the solution did not reach full load, was read from a file, or has no equilibrium on other meshes.
+
+    Args:
+        path: the solution.
+        model: its model.
+        solver: its solver.
+        most_work: largest work of the estimate, see `work_of`.
+        timeout: time limit [s]; the last estimate before it is returned.
     """
     if not path.complete or not path.solved:
-        return OwnError(None, "it was not solved to full load here")
+        return OwnError(None, "it was not solved to full load in this run")
     model = as_model(model)
     found, spent, clock = None, 0.0, _Clock(timeout)
     try:
@@ -130,7 +136,7 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float, time
                 break
             try:
                 limit = _solve(finer, found.limit if found and found.limit else path, solver, most_work - spent, clock)
-            except MeshError:  # an element is too far from convex to be divided into simplices: halved it is as good
+            except MeshError:  # a nonconvex element cannot be divided into simplices: halve the mesh instead
                 continue
             spent += work_of(limit)
             against = compare(path, limit)
@@ -139,14 +145,14 @@ def own_error(path: Solution, model: Any, solver: Solver, most_work: float, time
             if finer.how == _SECOND:
                 break
     except (TruespringError, MemoryError):
-        pass  # what was found before stands, else a coarser mesh tells
+        pass  # keep the last estimate; without one, use a coarser mesh
     if found is None:
         found = _from_coarser(path, model, solver, most_work - spent, clock)
     return replace(found, work=spent + found.work)
 
 
 def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float, clock: "_Clock") -> OwnError:
-    """How far a path is from its limit by the distance of a mesh of twice the size."""
+    """Return the error of a solution from that on a mesh of twice the element size."""
     if not model.any_mesh:
         return OwnError(None, _OWN_MESH.format(model.label))
     try:
@@ -162,10 +168,10 @@ def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float
 
 
 def _whole(distance: float, left: float) -> float:
-    """Return the error of a path by its distance to one that has the share `left` of it.
+    """Return the error of a solution from its distance to a finer one, whose error is the share `left` of it.
 
-    With the limit u, the path (1 - e) u and the other (1 - left e) u, their distance relative to that one is
-    d = (1 - left) e / (1 - left e): small ones are multiplied by 1 / (1 - left), none becomes more than the whole.
+    With the limit u, the solution (1 - e) u and the finer one (1 - left e) u, their relative distance is
+    d = (1 - left) e / (1 - left e); hence e = d / (1 - left (1 - d)).
     """
     return distance / (1 - left * max(1 - distance, 0.0))
 
@@ -175,7 +181,7 @@ _OWN_MESH = "{} can be solved on its own mesh only"
 
 
 class _Finer(NamedTuple):
-    """A finer way to solve a problem, made when it is wanted, and the share of the error that it still has."""
+    """A finer discretisation of a problem: `problem` makes it, `left` is its error over that of the coarse one."""
 
     problem: Callable[[], Problem]
     model: Model
@@ -185,7 +191,7 @@ class _Finer(NamedTuple):
 
 
 def _finer(path: Solution, model: Model) -> Iterator[_Finer]:
-    """Yield finer and finer ways to solve the problem of a path."""
+    """Yield finer and finer discretisations of the problem of a solution."""
     problem, n_unknowns = path.problem, path.n_unknowns
     growth = 2**problem.mesh.dim
     better = model.second_order(problem)
@@ -200,16 +206,17 @@ def _finer(path: Solution, model: Model) -> Iterator[_Finer]:
 
 
 def _halved(problem: Problem, times: int) -> Problem:
+    """Return a problem on a mesh that is halved `times` times."""
     for _ in range(times):
         problem = refined_problem(problem)
     return problem
 
 
 def in_second_order(problem: Problem, model: Model) -> tuple[Problem, Model] | None:
-    """Return a problem on simplices of the same nodes, and the model of second order for it.
+    """Return a problem on simplices of the same nodes, and a model of second order for it.
 
-    None where the model has no such elements, is of them already, where its elements were chosen by name, or where the
-    mesh cannot be divided into simplices.
+    None if the model has no such elements, if its elements were chosen by name, if the mesh consists of simplices, or
+    if it cannot be divided into them.
     """
     if not model.element_is_open or problem.mesh.element in SIMPLICES:
         return None
@@ -220,7 +227,7 @@ def in_second_order(problem: Problem, model: Model) -> tuple[Problem, Model] | N
 
 
 def refined_problem(problem: Problem) -> Problem:
-    """Return a problem on a mesh of elements of half the size; raise MeshError where that does not fit in memory."""
+    """Return a problem on a mesh of half the element size; raise MeshError if that does not fit in memory."""
     mesh = problem.mesh
     refuse_too_large(2**mesh.dim * mesh.n_nodes, mesh.dim)
     named = _by_groups(problem)
@@ -228,16 +235,16 @@ def refined_problem(problem: Problem) -> Problem:
 
 
 def simplex_problem(problem: Problem) -> Problem:
-    """Return a problem on triangles or tetrahedra of the same nodes; raise MeshError where these would be inverted."""
+    """Return a problem on triangles or tetrahedra of the same nodes; raise MeshError if these would be inverted."""
     named = _by_groups(problem)
     return replace(named, mesh=in_simplices(named.mesh)[0])
 
 
 def coarser_problem(problem: Problem) -> Problem:
-    """Return a problem on a mesh of elements of twice the size; raise MeshError where there is none.
+    """Return a problem on a mesh of twice the element size; raise MeshError if there is none.
 
-    For rectangles and bricks that are alike and along the axes, an even number in each direction, without groups of
-    elements or facets, node numbers or regions.
+    Needs equal rectangles or bricks along the axes, an even number in each direction; no groups of elements or facets,
+    no node numbers, no regions.
     """
     mesh, counts = problem.mesh, cell_counts(problem.mesh)
     chosen = [one.on for one in problem.supports] + [one.on for one in problem.loads]
@@ -254,9 +261,9 @@ def coarser_problem(problem: Problem) -> Problem:
 
 
 def _by_groups(problem: Problem) -> Problem:
-    """The problem with a group in place of each selection by numbers, and of elements by a box: these go with the mesh.
+    """Return a problem whose supports, loads and regions select by group, not by number or by the centres of elements.
 
-    A group of nodes, or of elements, is divided as the mesh is; numbers would be others, and centres lie elsewhere.
+    Refinement divides groups with the mesh; numbers and centres of elements change.
     """
     mesh = problem.mesh
     nodes, elements = dict(mesh.node_groups), dict(mesh.element_groups)
@@ -283,9 +290,9 @@ def _by_groups(problem: Problem) -> Problem:
 
 
 def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float, clock: "_Clock") -> Solution:
-    """The path of a finer way: from the coarse state, else all the way if that costs little enough."""
+    """Solve a finer problem: from the coarse state, else from no load if the work allows."""
     problem = finer.problem()
-    # From a state that is near, so that the path is not taken again, and on the same branch.
+    # Starting from the coarse state saves the load steps and stays on the same branch.
     nearby = solver.starting_at(_carrying(coarse), _MOST_ITERATIONS)
     if nearby is not None:
         path = clock.solve(problem, finer.model, nearby)
@@ -300,18 +307,18 @@ def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float, cl
 
 
 class _Clock:
-    """Solves until a time limit [s]; None is no limit."""
+    """Solve problems until a time limit [s]; None is no limit."""
 
     def __init__(self, timeout: float | None) -> None:
         self._timeout, self._end = timeout, math.inf if timeout is None else time.monotonic() + timeout
 
     def check(self) -> None:
-        """Raise ModelError where the time is up."""
+        """Raise ModelError after the time limit."""
         if time.monotonic() > self._end:
             raise ModelError(f"the time limit of {self._timeout:g} s was reached (--timeout)")
 
     def solve(self, problem: Problem, model: Model, solver: Solver) -> Solution:
-        """Return the path of a model; raise ModelError where the time is up."""
+        """Return the solution of a model; raise ModelError after the time limit."""
         self.check()
         left = self._end - time.monotonic()
         path = solve(problem, model, solver, timeout=None if math.isinf(left) else left)
@@ -321,12 +328,12 @@ class _Clock:
 
 
 def _sound(path: Solution) -> bool:
-    """Whether a path reached full load and is stable there."""
+    """Return whether a solution reached full load and is stable there."""
     return path.complete and not path.states[-1].negative_eigenvalues
 
 
 def _carrying(coarse: Solution) -> Callable[[Potential], Floats]:
-    """What gives the nodes of a finer potential the displacement of a coarse state, by its elements' interpolation."""
+    """Return a function that interpolates the last coarse state at the nodes of a finer potential, as positions [m]."""
 
     def start(potential: Potential) -> Floats:
         whole = coarse.whole

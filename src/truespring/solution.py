@@ -16,12 +16,12 @@ from truespring.problem import Problem
 from truespring.reactions import SupportForce, leading_support, support_forces
 from truespring.solvers import Cost
 
-#: Levels this near are one: other programs print six digits.
+#: Levels closer than this are equal: other programs print six digits.
 SAME_LEVEL = 2e-6
 
 
 class Status(StrEnum):
-    """How a path ended; `advice` says what it means and what to try."""
+    """How a solution ended; `advice` explains it and suggests a remedy."""
 
     CONVERGED = "converged"
     UNSTABLE = "unstable"
@@ -31,18 +31,19 @@ class Status(StrEnum):
 
     @property
     def advice(self) -> str:
-        """What the status means, and the way out."""
+        """Explanation of the status, and a remedy."""
         return _ADVICE[self]
 
 
 _ADVICE = {
-    Status.CONVERGED: "every load level ended at a stable equilibrium",
-    Status.UNSTABLE: "a real body would leave such a state; load less, or add a small side force to choose a branch",
-    Status.INVERTED: "an element is turned inside out; load less or take more load_steps: springs and "
-    "St. Venant-Kirchhoff have nothing that resists it",
-    Status.READ: "read from a file: what it converged to is known to the program that wrote it",
-    Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; load less, take more load_steps, "
-    "or another law: each bears a largest load",
+    Status.CONVERGED: "a stable equilibrium was found at every load level",
+    Status.UNSTABLE: "a real body would leave such a state; reduce the load, or add a small side force to choose a "
+    "branch",
+    Status.INVERTED: "an element is inverted; reduce the load or use more load_steps: springs and "
+    "St. Venant-Kirchhoff do not resist inversion",
+    Status.READ: "read from a file, which does not state whether it converged",
+    Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; reduce the load, use more "
+    "load_steps or another law: each has a largest load",
 }
 
 
@@ -53,24 +54,25 @@ class State:
     Attributes:
         load_factor: share of the full load [-].
         positions, displacement: [m], shape (n_nodes, dim).
-        all_positions: of every node of the potential, the mesh's first: quadratic elements have more [m].
-        reaction: force of the supports [N], shape (n_nodes, dim), zero where nothing is held.
+        all_positions: of all nodes of the potential, the mesh's first [m], shape (n_all, dim); quadratic elements have
+            more nodes than the mesh.
+        reaction: force of the supports [N], shape (n_nodes, dim), zero in free directions.
         applied_force: total of the loads [N], shape (dim,).
         energy: stored elastic energy [J].
         iterations: Newton iterations.
         residual: relative unbalanced force [-].
-        negative_eigenvalues: of the tangent; 0 is stable, None is not proven.
-        branched: true where an unstable equilibrium was left for a stable one nearby.
-        snapped: true where the body moved much further than the step before lets expect.
-        critical: "limit point" or "bifurcation" where stability changes there, else None.
-        mode: the way in which the body gives way at a critical point, largest component 1, shape (n_nodes, dim).
-        level: the share of what the solver controls, 0 to 1: under load control the load factor, under displacement
-            control the share of the displacement; None at a critical point, which lies between levels.
-        area_ratio: smallest corner Jacobian over its rest value; an element is inverted where not positive.
-        stretch: smallest and largest length over rest length of the springs, None without springs.
-        supports: force and torque of each moved support where they were told with the state (read from a file, or
-            known on another mesh), None where the reactions tell them: see Solution.support_forces.
-        reason: why no balance was looked for beyond it, in words, where it was not.
+        negative_eigenvalues: number of negative eigenvalues of the tangent: 0 if stable, None if not known.
+        branched: true if the solver left an unstable equilibrium for a stable one nearby.
+        snapped: true if the body moved much further than the previous step suggests.
+        critical: "limit point" or "bifurcation" if stability changes at this state, else None.
+        mode: buckling mode of a critical point, largest component 1 [-], shape (n_nodes, dim); None of other states.
+        level: share of the controlled quantity, 0 to 1: the load factor under load control, the share of the
+            displacement under displacement control; None at a critical point, which lies between levels.
+        area_ratio: smallest corner Jacobian over its undeformed value [-]; an element is inverted if not positive.
+        stretch: smallest and largest length over rest length of the springs [-], None without springs.
+        supports: force and torque of each moved support, if they do not follow from the reactions (read from a file,
+            or interpolated on another mesh), else None; see Solution.support_forces.
+        reason: why the solver did not look for equilibria beyond this state, else empty.
     """
 
     load_factor: float
@@ -95,7 +97,7 @@ class State:
 
     @property
     def loaded(self) -> bool:
-        """Whether the state is at a level above zero."""
+        """Whether the level is above zero."""
         return self.level is not None and self.level > 0
 
     def __repr__(self) -> str:
@@ -107,27 +109,28 @@ class State:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """The equilibria of one model of one problem, by load level.
+    """The equilibria of a model of a problem, by load level.
 
     Attributes:
-        label: how figures and tables call it.
-        kind: "springs", "fem", or what the path was read from.
-        states: equilibria in path order, the unloaded state first; read from a file, the one level it is for.
-        best: where a level was not reached, the best state there (not an equilibrium).
-        status, warnings: how it ended, and what should be known before it is trusted.
-        seconds: wall time from the built mesh to the last equilibrium.
-        surface, shell: what was read from a file that holds no more than a deformed surface, in the plane, in space.
-        grid: the points and cells of a path that was read, the mesh's nodes first among the points: `all_positions` of
-            its states are theirs. None where the mesh's own elements tell how a displacement goes on between nodes.
-        potential: what was solved, None for a path from elsewhere.
-        moduli: effective moduli on the problem's own material, None for other models and networks.
-        finite: whether strains are finite, false for a linear theory; None where not known, as of a file.
-        has_springs: whether its potential is springs, see Model.
-        element: the interpolation of finite elements, one of ELEMENTS; None of other models.
-        lines: the name of the lines that it is drawn by, see Model.
-        n_unknowns: the directions of nodes that were free, 0 where nothing was solved.
-        cost: how it was solved and what that took, None where nothing was.
-        held: the directions of nodes that supports held, of a path that was read with them, shape (n_nodes, dim).
+        problem: the problem that was solved.
+        label: name in figures and tables.
+        kind: "springs", "fem", or the format of the file that it was read from.
+        states: equilibria in the order of the path, the unloaded state first; of a file with one level, that alone.
+        best: if a level was not reached, the state of least residual there (not an equilibrium), else None.
+        status, warnings: how it ended, and limits to its validity.
+        seconds: wall time from the built mesh to the last equilibrium [s].
+        surface, shell: deformed surface, in the plane or in space, of a file with no more than that.
+        grid: points and cells of a solution that was read, the mesh's nodes first; `all_positions` of the states are
+            the positions of these points. None if the elements of the mesh interpolate.
+        potential: potential that was solved, None if another program solved it.
+        moduli: effective moduli for the problem's material, None for other models and networks.
+        finite: whether strains are finite, false for a linear theory; None if not known, as of a file.
+        has_springs: whether the potential consists of springs, see Model.
+        element: interpolation of finite elements, one of ELEMENTS; None of other models.
+        lines: name of the lines that figures draw, see Model.
+        n_unknowns: number of free directions of all nodes, 0 if nothing was solved.
+        cost: methods and costs of the solver, None if nothing was solved here.
+        held: directions that supports hold, shape (n_nodes, dim), if the file gives them; else None.
     """
 
     problem: Problem
@@ -158,12 +161,12 @@ class Solution:
 
     @cached_property
     def load_factors(self) -> Floats:
-        """Load factors of the states, shape (n_states,)."""
+        """Load factors of the states [-], shape (n_states,)."""
         return np.array([state.load_factor for state in self.states])
 
     @cached_property
     def whole(self) -> Grid:
-        """All points, those of the mesh first, and the cells by which a displacement goes on between them."""
+        """All points, those of the mesh first, and the cells that interpolate between them."""
         mesh = self.problem.mesh
         if self.grid is not None:
             return self.grid
@@ -174,12 +177,12 @@ class Solution:
 
     @property
     def is_cloud(self) -> bool:
-        """Whether it was read as points alone, which lines of its mesh join for no more than order."""
+        """Whether it was read as points without cells; the lines of its mesh then have no meaning."""
         return self.grid is not None and not self.grid.cells
 
     @property
     def load_factor(self) -> float:
-        """The last load level reached; of a surface that was read, its own."""
+        """The last load factor reached; of a surface that was read, the load factor of the file."""
         if self.states:
             return self.states[-1].load_factor
         only = self.surface or self.shell
@@ -187,35 +190,35 @@ class Solution:
 
     @property
     def complete(self) -> bool:
-        """Whether the full load was reached, or the whole displacement that was controlled."""
+        """Whether the full load, or the full controlled displacement, was reached."""
         return bool(self.states and self.states[-1].level == 1.0) or (not self.states and self.load_factor == 1.0)
 
     @property
     def solved(self) -> bool:
-        """Whether it was solved, here or by another program: not where it was read from a file."""
+        """Whether it was solved in this run, by this or another program, not read from a file."""
         return self.potential is not None or self.n_unknowns > 0
 
     @property
     def newton_iterations(self) -> int:
-        """All Newton iterations spent."""
+        """The number of all Newton iterations."""
         return sum(state.iterations for state in self.states) + (self.best.iterations if self.best else 0)
 
     def at(self, level: float | None) -> State | None:
-        """Return the state at a level, see State.level; None where the path has none there, and for None."""
+        """Return the state at a level (see State.level); None if there is none, or if `level` is None."""
         if level is None:
             return None
-        apart = {abs(state.level - level): state for state in reversed(self.states) if state.level is not None}
-        return apart[min(apart)] if apart and min(apart) <= SAME_LEVEL else None
+        distances = {abs(state.level - level): state for state in reversed(self.states) if state.level is not None}
+        return distances[min(distances)] if distances and min(distances) <= SAME_LEVEL else None
 
     @cached_property
-    def dictated(self) -> Bools | None:
-        """Nodes whose motion supports dictate in all directions, shape (n_nodes,); None where no supports are told."""
+    def prescribed(self) -> Bools | None:
+        """True for nodes that supports prescribe in all directions, shape (n_nodes,); None if supports are unknown."""
         if self.held is not None:
             return np.asarray(self.held.all(axis=1))
         return np.asarray(self.problem.loading.held.all(axis=1)) if self.problem.stated else None
 
     def support_forces(self, state: State) -> tuple[SupportForce, ...]:
-        """Return force and torque of each moved support at a state; empty where none moves or they are not known."""
+        """Return force and torque of each moved support at a state; empty if none moves or they are not known."""
         if state.supports is not None:
             return state.supports
         if not self.problem.stated or not np.isfinite(state.reaction).all():
@@ -227,9 +230,9 @@ class Solution:
         return leading_support(self.problem)
 
     def applied_force(self, state: State) -> Floats:
-        """Return the total applied force [N], shape (dim,); without loads, that of the support that moves most.
+        """Return the total applied force [N], shape (dim,); without loads, the force of the support that moves most.
 
-        Of supports that move equally far, the first stated. Not a number where it is not known.
+        Of supports that move equally far, the first one counts. NaN if it is not known.
         """
         if not self.problem.stated or not self.problem.loading.driven_by_motion:
             return state.applied_force

@@ -1,18 +1,21 @@
-"""How far a path may be trusted: its status, and warnings of states that are inverted, unstable or not balanced."""
+"""Status and warnings of a solution: inverted, unstable and unbalanced states."""
 
 import numpy as np
 
 from truespring.mesh.selections import AXES
 from truespring.solution import State, Status
 
-# A relative residual above this is a warning; it can only come from loads that are lost in rounding.
+# A larger relative residual is reported; it occurs only under loads that are near rounding errors.
 _LOOSE = 1e-6
-#: Above this a state is no equilibrium: what is unbalanced is no longer small beside the load.
+#: A state with a larger relative residual is no equilibrium: the unbalanced force is not small against the load.
 UNBALANCED = 1e-3
 
 
 def path_status(states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool) -> Status:
-    """Return the status of a path that ended at `states[-1]`, or did not reach `best`."""
+    """Return the status of a solution; `best` is the state of a level that was not reached, else None.
+
+    `finite` and `keeps_to_stable` are those of model and solver, see Model.finite and Solver.keeps_to_stable_states.
+    """
     if best is not None:
         return Status.NOT_CONVERGED
     if any(state.area_ratio <= 0 for state in states) and finite:
@@ -23,9 +26,12 @@ def path_status(states: tuple[State, ...], best: State | None, finite: bool, kee
 
 
 def path_warnings(
-    states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool, drowned: bool
+    states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool, below_rounding: bool
 ) -> tuple[str, ...]:
-    """Return why a path ended and where it should not be trusted, in sentences."""
+    """Return warnings about a solution: why it ended, and which states are not valid.
+
+    `below_rounding` is true if it ended because the load is below rounding errors; other arguments as `path_status`.
+    """
     warnings = []
     if best is not None:
         bad = [
@@ -33,7 +39,7 @@ def path_warnings(
         ]
         good = [state.load_factor for state in states if not bad or state.load_factor < bad[0]]
         last = f"{good[-1]:.6g}" if good else "none"
-        why = _DROWNED if drowned else Status.NOT_CONVERGED.advice
+        why = _BELOW_ROUNDING if below_rounding else Status.NOT_CONVERGED.advice
         warnings.append(
             best.reason
             or f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
@@ -42,7 +48,7 @@ def path_warnings(
     inverted = [state for state in states if state.area_ratio <= 0]
     what = "area" if states and states[0].positions.shape[1] == 2 else "volume"
     if inverted:
-        advice = "a linear model does not notice" if not finite else Status.INVERTED.advice
+        advice = "a linear model does not detect it" if not finite else Status.INVERTED.advice
         warnings.append(
             f"inverted from load factor {inverted[0].load_factor:.6g} on "
             f"(smallest {what} ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
@@ -60,36 +66,37 @@ def path_warnings(
     branched = [state for state in states if state.branched]
     if branched:
         warnings.append(
-            f"stability was lost before load factor {branched[0].load_factor:.6g}: the path goes on along a stable "
-            "branch nearby (buckling); the side it took is arbitrary"
+            f"stability was lost before load factor {branched[0].load_factor:.6g}: the solution follows a stable "
+            "branch nearby (buckling); to which side is arbitrary"
         )
     snapped = [state for state in states if state.snapped]
     if snapped:
         warnings.append(
-            f"just before load factor {snapped[0].load_factor:.6g} the body moved much further than the step before "
-            "lets expect: it may have snapped past unstable states, which are not on the path; more load_steps tell"
+            f"just before load factor {snapped[0].load_factor:.6g} the body moved much further than the previous step "
+            "suggests: it may have snapped through unstable states, which are not in the solution; use more load_steps"
         )
     loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
     if loose > _LOOSE:
-        warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load drowns in rounding")
+        warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load is near rounding errors")
     if any(state.negative_eigenvalues is None for state in states):
-        warnings.append("stability not proven: the inertia of a tangent could not be found")
+        warnings.append("stability not proven: the inertia of a tangent was not computed")
     return tuple(warnings)
 
 
-_DROWNED = (
-    "the load is lost in rounding: it is too small for the stiffness and the coordinates of the body; apply a larger "
-    "load, or place the body near the origin"
+_BELOW_ROUNDING = (
+    "the load is below rounding errors: it is too small for the stiffness and the coordinates of the body; apply a "
+    "larger load, or place the body near the origin"
 )
 
 
 def _critical_warning(state: State) -> str:
-    assert state.mode is not None  # a critical point has one
+    """Return the warning about a critical point."""
+    assert state.mode is not None  # every critical point has a mode
     node, axis = np.unravel_index(int(np.abs(state.mode).argmax()), state.mode.shape)
     place = f"node {node} moves most, along {AXES[axis]}"
     if state.critical == "limit point":
         return f"limit point at load factor {state.load_factor:.6g}: under this load the body snaps through; {place}"
     return (
         f"bifurcation at load factor {state.load_factor:.6g}: the body buckles to the side; {place}. "
-        "The path goes on straight ahead, which a real body would leave"
+        "The solution stays on the primary branch, which a real body would leave"
     )

@@ -12,9 +12,10 @@ from truespring.calibration.cases import LoadCase
 from truespring.calibration.identifiability import Identifiability
 from truespring.calibration.objective import relative_errors
 from truespring.calibration.unknowns import Unknowns
-from truespring.comparison import Decisive, compare, largest
+from truespring.comparison import compare
 from truespring.equilibrium import Solution, Status
 from truespring.models import PrescribedSprings, Springs
+from truespring.support_errors import Decisive, largest
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Linear solvers: what solves a tangent, and what it tells of it. They see matrices and nodes only."""
+"""Linear solvers: solve with a tangent stiffness and determine its stability, from matrices and nodes only."""
 
 from truespring.linear.choice import LinearSolver as LinearSolver
 from truespring.linear.choice import Tangent as Tangent

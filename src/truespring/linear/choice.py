@@ -1,6 +1,6 @@
-"""Linear solvers behind one interface: a tangent made ready, which solves and tells of its stability.
+"""Protocols of linear solvers, and the choice among them.
 
-Directions that are held take no part: right sides and solutions of shape (n_nodes, dim) are zero there.
+Held directions are excluded: right sides and solutions, shape (n_nodes, dim), are zero there.
 """
 
 from types import MappingProxyType
@@ -13,40 +13,40 @@ from truespring.linear.iterative import Multigrid
 from truespring.memory import available_memory
 from truespring.potential import SparseMatrix
 
-# Up to so many free directions, in the plane and in space, a factorisation is as quick as multigrid, and exact.
+# Largest number of free directions for which "auto" factorises, in the plane and in space: as fast as multigrid there.
 _DIRECT = MappingProxyType({2: 8_000, 3: 3_000})
 
 
 class Tangent(Protocol):
-    """A tangent stiffness made ready to be solved with."""
+    """A tangent stiffness prepared for solving."""
 
-    #: Whether it stays good when the solver is given the next one.
+    #: Whether it remains valid when the solver prepares the next tangent.
     lasting: ClassVar[bool]
 
     @property
     def negative_eigenvalues(self) -> int | None:
-        """Their number; of an iterative solver 1 where there is any; None where it is not known."""
+        """The number of negative eigenvalues; of an iterative solver 1 if there are any; None if not known."""
         ...
 
     def solve(self, right: Floats, accuracy: float = 1e-12) -> Floats:
-        """Return x of tangent x = right, to a relative residual of `accuracy` or better.
+        """Return x of tangent x = right, shape (n_nodes, dim), with a relative residual of at most `accuracy`.
 
-        Raises IndefiniteError where an iterative solver meets a negative direction.
+        Raises IndefiniteError if an iterative solver finds a direction of negative curvature.
         """
         ...
 
     def lowest_mode(self) -> Floats | None:
-        """Return a mode of a negative eigenvalue, largest component +1; None where there is no way to it."""
+        """Return a mode of a negative eigenvalue, largest component +1, shape (n_nodes, dim); None if not available."""
         ...
 
 
 class LinearSolver(Protocol):
-    """What makes tangents ready.
+    """A method that prepares tangents for solving.
 
     Attributes:
-        name: what is used, in words.
-        factorisations, cg_iterations, lanczos_iterations: what was spent so far.
-        memory: the most that factors or coarse levels took [bytes].
+        name: name for notes and reports.
+        factorisations, cg_iterations, lanczos_iterations: costs so far, see Cost.
+        memory: largest memory of factors or coarse levels so far [bytes].
     """
 
     name: str
@@ -56,26 +56,30 @@ class LinearSolver(Protocol):
     memory: int
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
-        """Take a tangent at some positions; raise SingularMatrixError where it has no inverse."""
+        """Prepare the tangent at `positions` [m], shape (n_nodes, dim); raise SingularMatrixError without an inverse.
+
+        `matrix` has shape (n_dof, n_dof).
+        """
         ...
 
 
-#: What `linear` may be of a solver's settings.
+#: Allowed values of a solver's `linear`.
 LINEAR = ("auto", "direct", "multigrid", *FACTORISERS)
 
 
 def check_linear(name: str) -> None:
-    """Raise ProblemError for a linear solver that does not exist or is not installed."""
+    """Raise ProblemError if a linear solver does not exist or is not installed."""
     if name not in LINEAR:
         raise ProblemError(f"linear = '{name}' is unknown{nearest(name, LINEAR)}; allowed: {', '.join(LINEAR)}")
     if name in FACTORISERS and not present(name):
-        raise ProblemError(f"linear = '{name}': it is not installed; try: pip install {FACTORISERS[name].package}")
+        raise ProblemError(f"linear = '{name}' is not installed; try: pip install {FACTORISERS[name].package}")
 
 
 def choose(name: str, nodes: Floats, held: Bools) -> LinearSolver:
-    """Return the linear solver `name` of LINEAR; "auto" goes by size and dimension.
+    """Return the linear solver `name`, one of LINEAR; "auto" chooses by size and dimension.
 
-    Raises ProblemError where a factorisation would not fit in memory, by estimate.
+    `nodes` [m] and `held` have shape (n_nodes, dim). Raises ProblemError if a factorisation does not fit in memory, by
+    estimate.
     """
     check_linear(name)
     n_free, dim = int((~held).sum()), nodes.shape[1]
@@ -87,6 +91,6 @@ def choose(name: str, nodes: Floats, held: Bools) -> LinearSolver:
     if needed > there:
         raise ProblemError(
             f"linear = '{name}': a factorisation for {len(nodes):,} nodes needs about {needed / 2**30:,.0f} GiB, "
-            f"{there / 2**30:,.1f} GiB are there: take linear = 'multigrid' or fewer elements"
+            f"{there / 2**30:,.1f} GiB are available: use linear = 'multigrid' or fewer elements"
         )
     return Direct(held, name)

@@ -1,4 +1,4 @@
-"""Factorisations, which also tell the inertia of their matrix."""
+"""Factorisations of tangents; their pivots give the number of negative eigenvalues."""
 
 import importlib.util
 import math
@@ -14,22 +14,28 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from truespring.arrays import Bools, Floats
 from truespring.potential import SparseMatrix
 
-# Up to this size the eigenvalues themselves decide where the pivots cannot.
+# Largest number of unknowns for which eigenvalues are computed if the pivots do not give their signs.
 _DENSE = 2000
 
-# What a factorisation takes at its peak: its fill grows with n log n in the plane (25 million entries at 1e5
-# nodes, 433 million at 1e6), with n^(4/3) in space (119 million at 3.2e4).
+# Peak memory over n log2 n in the plane, over n^(4/3) in space [bytes]: the fill is 25 million entries at 1e5 nodes and
+# 433 million at 1e6 in the plane, 119 million at 3.2e4 in space.
 _BYTES_PLANE, _BYTES_SPACE = 450.0, 2500.0
 
 FreeMatrix = sparse.csr_array[Any, tuple[int, int]]
 
 
 class SingularMatrixError(ArithmeticError):
-    """The matrix has no inverse: a mechanism, or a state exactly at a limit or bifurcation point."""
+    """The matrix has no inverse: the body is a mechanism, or the state is a critical point."""
 
 
 class Factors(NamedTuple):
-    """What a library made of a matrix: how to solve with it, its negative eigenvalues if known, its size [bytes]."""
+    """Factors of a matrix.
+
+    Attributes:
+        solve: returns the solution for a right side, shape (n,).
+        negative_eigenvalues: number of negative eigenvalues, None if not known.
+        n_bytes: memory of the factors [bytes].
+    """
 
     solve: Callable[[Floats], Floats]
     negative_eigenvalues: int | None
@@ -37,7 +43,8 @@ class Factors(NamedTuple):
 
 
 def _superlu(matrix: FreeMatrix) -> Factors:
-    # Without row pivoting on the diagonal SuperLU's U carries D of L D L^T.
+    """Factorise by SciPy's SuperLU."""
+    # Without row pivoting, the diagonal of SuperLU's U is D of L D L^T.
     lu = splu(
         sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
@@ -51,6 +58,7 @@ def _superlu(matrix: FreeMatrix) -> Factors:
 
 
 def _rslab(matrix: FreeMatrix) -> Factors:
+    """Factorise by rslab."""
     import rslab
 
     from truespring.kernels.threads import n_threads
@@ -63,9 +71,10 @@ def _rslab(matrix: FreeMatrix) -> Factors:
 
 
 def _pardiso(matrix: FreeMatrix) -> Factors:
+    """Factorise by MKL Pardiso."""
     import pypardiso
 
-    solver = pypardiso.PyPardisoSolver(mtype=-2)  # real, symmetric, indefinite: its upper half is taken
+    solver = pypardiso.PyPardisoSolver(mtype=-2)  # real, symmetric, indefinite: uses the upper triangle
     upper = sparse.csr_matrix(sparse.triu(matrix))
     try:
         solver.factorize(upper)
@@ -80,7 +89,7 @@ def _pardiso(matrix: FreeMatrix) -> Factors:
 
 
 class Factoriser(NamedTuple):
-    """A library: what it is called, the package it is installed by and its module, and how it factorises."""
+    """A library of factorisations: title, package on PyPI, module, and function."""
 
     title: str
     package: str
@@ -88,7 +97,7 @@ class Factoriser(NamedTuple):
     factorise: Callable[[FreeMatrix], Factors]
 
 
-#: Libraries by the names under which they may be chosen; "direct" takes the first that is present.
+#: Libraries by their name in `linear`; "direct" chooses the first that is installed.
 FACTORISERS: MappingProxyType[str, Factoriser] = MappingProxyType(
     {
         "pardiso": Factoriser("MKL Pardiso", "pypardiso", "pypardiso", _pardiso),
@@ -99,12 +108,12 @@ FACTORISERS: MappingProxyType[str, Factoriser] = MappingProxyType(
 
 
 def present(name: str) -> bool:
-    """Return whether the library of this name is installed."""
+    """Return whether a library of FACTORISERS is installed."""
     return importlib.util.find_spec(FACTORISERS[name].module) is not None
 
 
 def direct_bytes(shape: tuple[int, int]) -> float:
-    """Estimate what a factorisation for nodes of shape (n_nodes, dim) takes at its peak [bytes]."""
+    """Return an estimate of the peak memory of a factorisation [bytes] for nodes of shape (n_nodes, dim)."""
     n_nodes, dim = shape
     if dim < 3:
         return _BYTES_PLANE * n_nodes * max(1.0, math.log2(max(n_nodes, 1)))
@@ -112,10 +121,10 @@ def direct_bytes(shape: tuple[int, int]) -> float:
 
 
 class Direct:
-    """Factorisation of the free directions by one of FACTORISERS."""
+    """Linear solver that factorises the free directions by one of FACTORISERS."""
 
     def __init__(self, held: Bools, name: str) -> None:
-        """Take the directions that are held, shape (n_nodes, dim), and a name of FACTORISERS or "direct"."""
+        """Choose a library, a name of FACTORISERS or "direct"; `held` directions have shape (n_nodes, dim)."""
         chosen = next(filter(present, FACTORISERS)) if name == "direct" else name
         self._library = FACTORISERS[chosen]
         self.name = f"direct ({self._library.title})"
@@ -123,11 +132,11 @@ class Direct:
         self._free = np.flatnonzero(~held.ravel())
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> "Factorisation":
-        """Factorise a tangent; raise SingularMatrixError where it has no inverse."""
+        """Factorise a tangent of shape (n_dof, n_dof); raise SingularMatrixError if it has no inverse."""
         if not np.isfinite(matrix.data).all():
-            raise SingularMatrixError("the matrix holds values that are not finite")
+            raise SingularMatrixError("the matrix has values that are not finite")
         free = sparse.csr_array(sparse.csr_array(matrix)[self._free][:, self._free])
-        # By a power of two to the order of one: libraries that scale by themselves then do the same in any units.
+        # A power of two that makes the largest entry about one: results are then the same in any units.
         scale = 2.0 ** -np.frexp(np.abs(free.data).max(initial=0.0))[1]
         try:
             factors = self._library.factorise(scale * free)
@@ -140,7 +149,15 @@ class Direct:
 
 @dataclass(frozen=True, eq=False)
 class Factorisation:
-    """L D L^T of the free directions of a symmetric matrix times `scale`."""
+    """L D L^T of the free directions of a symmetric matrix.
+
+    Attributes:
+        matrix: the free directions times `scale`.
+        scale: factor of the matrix.
+        factors: the factors of `matrix`.
+        free: indices of the free directions, shape (n,).
+        shape: (n_nodes, dim).
+    """
 
     matrix: FreeMatrix
     scale: float
@@ -152,17 +169,18 @@ class Factorisation:
 
     @property
     def negative_eigenvalues(self) -> int | None:
-        """Their number, by Sylvester's law from the pivots.
+        """The number of negative eigenvalues, that of negative pivots by Sylvester's law of inertia.
 
-        None where these were permuted away from the diagonal and the matrix is too large for another way.
+        None if pivots are not on the diagonal and the matrix is too large to compute its eigenvalues.
         """
         return self.factors.negative_eigenvalues
 
     def solve(self, right: Floats, accuracy: float = 0.0) -> Floats:
-        """Return the solution of matrix x = right, shape (n_nodes, dim) both."""
+        """Return x of tangent x = right, shape (n_nodes, dim); `accuracy` has no effect."""
         return self._whole(self.factors.solve(self.scale * right.ravel()[self.free]))
 
     def _whole(self, values: Floats) -> Floats:
+        """Return values of the free directions, shape (n,), as an array of shape (n_nodes, dim), else zero."""
         whole = np.zeros(self.shape)
         whole.ravel()[self.free] = values
         return whole
@@ -170,7 +188,7 @@ class Factorisation:
     def lowest_mode(self) -> Floats:
         """Return the eigenvector of a negative eigenvalue, largest component +1, shape (n_nodes, dim).
 
-        The one nearest to zero; in tiny systems the lowest.
+        The negative eigenvalue nearest to zero; the lowest one for at most ten unknowns.
         """
         return self._mode("SA", lambda values: int(values.argmin()))
 
@@ -179,6 +197,7 @@ class Factorisation:
         return self._mode("LM", lambda values: int(np.abs(values).argmin()))
 
     def _mode(self, which: Any, chosen: Callable[[Floats], int]) -> Floats:
+        """Return an eigenvector, shape (n_nodes, dim): `which` of eigsh, `chosen` from all values of a small matrix."""
         n = self.matrix.shape[0]
         if n <= 10:
             values, vectors = np.linalg.eigh(self.matrix.toarray())
@@ -188,7 +207,7 @@ class Factorisation:
             start = np.random.default_rng(9).normal(size=n)
             try:
                 vector = eigsh(self.matrix, k=1, sigma=0.0, which=which, OPinv=inverse, v0=start)[1][:, 0]
-            except ArpackError:  # inverse iteration needs no more than solves
+            except ArpackError:  # use inverse iteration instead
                 vector = start
                 for _ in range(50):
                     vector = self.factors.solve(vector)

@@ -1,4 +1,4 @@
-"""Preconditioned conjugate gradients, and the lowest eigenvalue by the same recurrence."""
+"""Preconditioned conjugate gradients, and the lowest eigenvalue by the Lanczos method."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,18 +11,18 @@ from truespring.arrays import Floats
 Product = Callable[[Floats, Floats], float]
 Preconditioner = Callable[[Floats], Floats]
 
-# The lowest Ritz value is taken for an eigenvalue where its error bound is within this share of it.
+# The lowest Ritz value is accepted if its error bound is below this share of it.
 _SETTLED = 0.3
-# A random start knows of every eigenvector, but of each so little that it takes some iterations to show.
+# Smallest and largest number of iterations: a random start contains little of each eigenvector.
 _FEWEST, _MOST = 10, 60
 
 
 class IndefiniteError(ArithmeticError):
-    """A direction was met along which the matrix is not positive."""
+    """The matrix is not positive definite: a direction of negative curvature was found."""
 
 
 class SlowError(ArithmeticError):
-    """The iterations allowed were not enough; `best` is what was reached."""
+    """The iterations did not reach the accuracy; `best` is the last iterate."""
 
     def __init__(self, best: Floats) -> None:
         super().__init__("conjugate gradients did not reach the accuracy")
@@ -30,7 +30,7 @@ class SlowError(ArithmeticError):
 
 
 class Solved(NamedTuple):
-    """What conjugate gradients found, and the iterations that took."""
+    """Solution of a linear system, and the number of iterations."""
 
     solution: Floats
     iterations: int
@@ -42,7 +42,7 @@ def norm(x: Floats) -> float:
 
 
 def scalar_product(a: Floats, b: Floats) -> float:
-    """Return a . b, arrays of one shape."""
+    """Return the scalar product of two arrays of the same shape."""
     from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
@@ -50,6 +50,7 @@ def scalar_product(a: Floats, b: Floats) -> float:
 
 
 def _turn_towards(z: Floats, share: float, p: Floats) -> None:
+    """Set p to z + share p."""
     from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
@@ -57,6 +58,7 @@ def _turn_towards(z: Floats, share: float, p: Floats) -> None:
 
 
 def _advance(length: float, p: Floats, q: Floats, x: Floats, r: Floats) -> float:
+    """Add length p to x, subtract length q from r, and return the norm of r."""
     from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
@@ -67,45 +69,50 @@ def _advance(length: float, p: Floats, q: Floats, x: Floats, r: Floats) -> float
 def conjugate_gradients(
     product: Product, precondition: Preconditioner, right: Floats, accuracy: float, max_iterations: int
 ) -> Solved:
-    """Solve A x = right until the residual is `accuracy` of `right` in size, shapes (n, k).
+    """Return x of A x = right, shape (n, k), with a relative residual of at most `accuracy`.
 
-    `product(x, result)` writes A x and returns x . A x; `precondition(r)` returns an approximate solution,
-    good until it is called again.
-    Raises IndefiniteError where the matrix is not positive along a direction that was met, SlowError where the
-    iterations do not suffice or the preconditioner is not positive.
+    Args:
+        product: `product(x, result)` writes A x to `result` and returns x . A x.
+        precondition: returns an approximate solution for a residual, valid until the next call.
+        right: right side, shape (n, k).
+        accuracy: relative residual of the solution.
+        max_iterations: largest number of iterations.
+
+    Raises IndefiniteError if A has negative curvature along a direction, SlowError if the iterations do not reach the
+    accuracy or the preconditioner is not positive definite.
     """
     x, r = np.zeros(right.shape), right.copy()
-    wanted = accuracy * norm(right)
+    target = accuracy * norm(right)
     p, q = np.zeros(right.shape), np.empty(right.shape)
     previous = np.inf
     for iteration in range(1, max_iterations + 1):
         z = precondition(r)
         slope = scalar_product(r, z)
         if not slope > 0:
-            raise SlowError(x)  # the preconditioner is that of another state, which was not positive
+            raise SlowError(x)  # the preconditioner is that of another state and not positive definite here
         _turn_towards(z, slope / previous, p)
         curvature = product(p, q)
         if not curvature > 0:
             raise IndefiniteError("the matrix is not positive")
         size = _advance(slope / curvature, p, q, x, r)
-        if size <= wanted:
+        if size <= target:
             return Solved(x, iteration)
         previous = slope
     raise SlowError(x)
 
 
 class Lowest(NamedTuple):
-    """The lowest eigenvalue of M^-1 A: its sign is that of A's own (Sylvester); None where it did not settle."""
+    """The lowest eigenvalue of M^-1 A, which has the sign of that of A; None if it did not converge."""
 
     eigenvalue: float | None
     iterations: int
 
 
 def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Floats) -> Lowest:
-    """Estimate the lowest eigenvalue of the preconditioned matrix from `start`, shape (n, k), by Lanczos.
+    """Return an estimate of the lowest eigenvalue of the preconditioned matrix, from `start`, shape (n, k).
 
-    The recurrence is that of conjugate gradients, whose coefficients are the tridiagonal matrix (Golub and
-    Van Loan, 10.3 and 11.5); where a direction of negative curvature is met, that is the answer.
+    The coefficients of conjugate gradients form the tridiagonal matrix of Lanczos (Golub and Van Loan, 10.3 and 11.5).
+    A direction of negative curvature ends the iteration: its Rayleigh quotient is returned.
     """
     r, x = start.copy(), np.zeros(start.shape)
     p, q = np.zeros(start.shape), np.empty(start.shape)

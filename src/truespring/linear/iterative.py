@@ -1,4 +1,4 @@
-"""Conjugate gradients with multigrid as a linear solver."""
+"""Linear solver: conjugate gradients preconditioned by multigrid."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,18 +13,18 @@ from truespring.linear.multigrid import Hierarchy, Level, Matrix, build, condens
 from truespring.modes import rigid_body_modes
 from truespring.potential import SparseMatrix
 
-# Coarse levels that need more iterations than this for two digits are built anew for the state at hand.
+# Coarse levels are rebuilt if two digits of accuracy take more iterations than this.
 _STALE = 25
 _MAX_ITERATIONS = 150
 
 
 class Multigrid:
-    """Conjugate gradients, preconditioned by multigrid whose coarse levels are frozen and turn with the body."""
+    """Conjugate gradients preconditioned by multigrid, whose coarse levels are fixed and rotate with the body."""
 
     name = "multigrid"
 
     def __init__(self, nodes: Floats, held: Bools) -> None:
-        """Take the reference positions [m] and the directions that are held, shape (n_nodes, dim) both."""
+        """Begin with the undeformed positions [m] and the held directions, shape (n_nodes, dim) both."""
         self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
         self._held = np.ascontiguousarray(held)
         self._level: Level | None = None
@@ -35,7 +35,10 @@ class Multigrid:
         self._stale = False
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> "Preconditioned":
-        """Take a tangent; the coarse levels are built for the first one, and again where they have grown stale."""
+        """Prepare a tangent, shape (n_dof, n_dof); build the coarse levels for the first one, and if they are stale.
+
+        Raises SingularMatrixError if values are not finite, or if no coarse levels exist.
+        """
         from truespring.kernels import multigrid
         from truespring.kernels.threads import run, writable
 
@@ -43,19 +46,19 @@ class Multigrid:
         if self._coarse is None or self._stale:
             self._scale = 2.0 ** -float(np.frexp(max(matrix.data.max(), -matrix.data.min()))[1])
         if not np.isfinite(self._scale):
-            raise SingularMatrixError("the matrix holds values that are not finite")
+            raise SingularMatrixError("the matrix has values that are not finite")
         positive = condense(level, tangent, self._scale)
         if positive and (self._coarse is None or self._stale):
             self._build(level, tangent, positions)
         if self._coarse is None:
-            raise SingularMatrixError("the matrix is not positive on the directions of a single node")
+            raise SingularMatrixError("a diagonal block of the matrix is not positive definite")
         turns = np.empty(matrix.data[: len(positions)].shape)
         around = (matrix.indptr, matrix.indices, writable(self._built_at), writable(positions), self._held)
         run(multigrid.rotations, len(positions), *around, turns, (0.0,) * positions.shape[1])
         return Preconditioned(self, level, self._coarse, turns, self._scale, positive)
 
     def _room(self, matrix: SparseMatrix) -> Level:
-        """The level that tangents are written to, made for their sparsity."""
+        """Return the finest level, allocated for the sparsity of a tangent."""
         columns: ShortInts = matrix.indices
         if self._level is None or (columns is not self._columns and not np.array_equal(columns, self._columns)):
             self._level = empty_level(matrix.indptr, columns, matrix.blocksize[0], np.float32)
@@ -63,6 +66,7 @@ class Multigrid:
         return self._level
 
     def _build(self, level: Level, tangent: Matrix, positions: Floats) -> None:
+        """Build the coarse levels for a tangent at positions [m]."""
         modes = rigid_body_modes(positions).reshape(*positions.shape, -1)
         modes = np.where(self._held[:, :, None], 0.0, modes)
         self._coarse = build(level, tangent, self._scale, modes)
@@ -71,14 +75,23 @@ class Multigrid:
         self.memory = max(self.memory, self._coarse.n_bytes + level.n_bytes)
 
     def spent(self, iterations: int, digits: float) -> None:
-        """Count iterations, and mark the coarse levels as stale where they were many for so many digits."""
+        """Count iterations; mark the coarse levels as stale if they were many for this number of digits."""
         self.cg_iterations += iterations
         self._stale = self._stale or iterations > _STALE * max(digits, 2.0) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class Preconditioned:
-    """A tangent with its multigrid; good until the solver is given the next one."""
+    """A tangent with its multigrid preconditioner, valid until the solver prepares the next one.
+
+    Attributes:
+        solver: solver that counts the iterations.
+        level: finest level, the tangent times `scale`.
+        coarse: coarse levels.
+        turns: rotation of each node since they were built, shape (n_nodes, dim, dim).
+        scale: factor of the tangent.
+        positive: whether all diagonal blocks are positive definite.
+    """
 
     solver: Multigrid
     level: Level
@@ -90,20 +103,22 @@ class Preconditioned:
     lasting: ClassVar[bool] = False
 
     def _precondition(self, r: Floats) -> Floats:
+        """Return an approximate solution for a residual, shape (n_nodes, dim)."""
         return self.coarse.cycle(self.level, self.turns, r)
 
     def solve(self, right: Floats, accuracy: float = 1e-10) -> Floats:
-        """Return the solution of matrix x = right; raise IndefiniteError where a negative direction is met.
+        """Return x of tangent x = right, shape (n_nodes, dim), with a relative residual of at most `accuracy`.
 
-        SlowError where the accuracy is not reached: the next tangent gets new coarse levels.
+        Raises IndefiniteError if a direction of negative curvature is found, SlowError if the accuracy is not reached;
+        the coarse levels are then rebuilt for the next tangent.
         """
         if not self.positive:
-            raise IndefiniteError("a block of the diagonal is not positive")
+            raise IndefiniteError("a diagonal block is not positive definite")
         if not right.any():
             return np.zeros(right.shape)
-        wanted = (self.scale * right, accuracy, _MAX_ITERATIONS)
+        system = (self.scale * right, accuracy, _MAX_ITERATIONS)
         try:
-            found = conjugate_gradients(self.level.product, self._precondition, *wanted)
+            found = conjugate_gradients(self.level.product, self._precondition, *system)
         except SlowError:
             self.solver.spent(_MAX_ITERATIONS, 0.0)
             raise
@@ -112,7 +127,7 @@ class Preconditioned:
 
     @cached_property
     def negative_eigenvalues(self) -> int | None:
-        """0 or 1, that is any, by the sign of the lowest eigenvalue; None where that did not settle."""
+        """1 if the lowest eigenvalue is negative, else 0; None if it did not converge."""
         if not self.positive:
             return 1
         start = np.random.default_rng(5).normal(size=self.turns.shape[:2])
@@ -121,5 +136,5 @@ class Preconditioned:
         return None if found.eigenvalue is None else int(found.eigenvalue < 0)
 
     def lowest_mode(self) -> None:
-        """There is no way to it here: branching asks a factorisation."""
+        """Return None: modes need a factorisation."""
         return

@@ -1,10 +1,10 @@
-"""Algebraic multigrid whose coarse levels are built once and turn with the body.
+"""Algebraic multigrid whose coarse levels are built once and rotate with the body.
 
-Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the rigid-body modes of the nodes, built for the
-tangent of one state. At another state the coarse levels are asked through the rotations Q of the nodes
-since then, P -> Q P, while the finest level, where the body is smoothed, is that of the state itself.
-One V-cycle is symmetric: a forward sweep of Gauss and Seidel down, a backward one up. The blocks of the finest
-level are in single precision, half the memory to move.
+Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the rigid-body modes of the nodes, built for the tangent of one
+state. At another state the prolongation P becomes Q P with the rotations Q of the nodes since then; the finest level,
+with the smoother, is always that of the current state. The V-cycle is symmetric: a forward Gauss-Seidel sweep on the
+way down, a backward sweep on the way up. Blocks of the finest level are in single precision, which halves the memory
+traffic.
 """
 
 from dataclasses import dataclass
@@ -20,27 +20,27 @@ from truespring.linear.gradients import norm, scalar_product
 
 Real = Floats | Singles
 
-# A level of no more unknowns than this is solved with by its inverse.
+# Largest number of unknowns of the coarsest level, which is inverted.
 _COARSEST = 200
 _MAX_LEVELS = 20
-# Nodes are joined to one aggregate over blocks of at least this size beside those of the diagonal.
+# Smallest size of an off-diagonal block, relative to the diagonal blocks, that joins two nodes in one aggregate.
 _STRONG = 0.04
 _POWER_ITERATIONS = 10
-# Rows of a product of matrices are made so many at a time; threads share them from so many on.
+# Number of rows of a matrix product that are computed at a time, and the smallest number that is worth a thread.
 _SLICE, _SMALLEST_SLAB = 16_384, 64
-# So many numbers of a matrix are worth another thread.
+# Smallest number of matrix entries that is worth another thread.
 _SMALLEST_PIECE = 80_000
-# The largest eigenvalue of D^-1 A is estimated from below.
+# Factor of the largest eigenvalue of D^-1 A, which power iteration underestimates.
 _SAFETY = 1.1
 
 
 class Matrix(NamedTuple):
-    """A symmetric matrix of node blocks as it was assembled, and the directions that are kept out of it.
+    """A symmetric matrix of node blocks in compressed rows, and its held directions.
 
     Attributes:
-        starts, columns: of its rows, columns ascending.
-        data: the blocks, shape (n_blocks, k, k).
-        held: shape (n_nodes, k).
+        starts, columns: row starts and ascending columns, shape (n_nodes + 1,) and (n_blocks,).
+        data: blocks, shape (n_blocks, k, k).
+        held: true for directions that are excluded, shape (n_nodes, k).
     """
 
     starts: ShortInts
@@ -51,7 +51,16 @@ class Matrix(NamedTuple):
 
 @dataclass(eq=False)
 class Level:
-    """A matrix in the form in which it is iterated with: see `kernels.blocks`."""
+    """A matrix in the form of `kernels.blocks`.
+
+    Attributes:
+        starts, columns: row starts and columns of the blocks left of the diagonal, shape (n + 1,) and (n_lower,).
+        lower: these blocks, shape (n_lower, k, k).
+        rest: sum of the blocks of each row, shape (n, k, k).
+        inverse: inverse of each diagonal block with `added`, shape (n, k, k).
+        added: added to the diagonal for the smoother, shape (n, k).
+        pieces: range of rows of each thread.
+    """
 
     starts: ShortInts
     columns: ShortInts
@@ -63,21 +72,21 @@ class Level:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The number of nodes, and of unknowns of each."""
+        """The number of nodes, and of unknowns per node."""
         return self.rest.shape[0], self.rest.shape[1]
 
     @property
     def n_bytes(self) -> int:
-        """Memory taken [bytes]."""
+        """Memory of the arrays [bytes]."""
         return sum(array.nbytes for array in (self.columns, self.lower, self.rest, self.inverse))
 
     @cached_property
     def bounds(self) -> ShortInts:
-        """Where the rows of each thread begin, and their number."""
+        """First row of each thread, and the number of rows, shape (n_threads + 1,)."""
         return np.array([0, *(last for _, last in self.pieces)], dtype=np.int32)
 
     def product(self, x: Floats, result: Floats) -> float:
-        """Write A x to `result`, shape (n, k) both, and return x . A x."""
+        """Write A x to `result` and return x . A x; `x` and `result` have shape (n, k)."""
         from truespring.kernels import blocks
         from truespring.kernels.threads import run_on
 
@@ -88,12 +97,15 @@ class Level:
 
 
 def _worth(n: int, size: int) -> int:
-    """How many of n rows have the fewest numbers of a matrix of this size that are worth another thread."""
+    """Return the smallest number of rows that is worth another thread, of n rows with `size` entries together."""
     return max(1, n * _SMALLEST_PIECE // max(size, 1))
 
 
 def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: type[np.floating[Any]]) -> Level:
-    """Return room for a matrix of this sparsity, with blocks of `size` rows."""
+    """Return an uninitialised level for a matrix with the sparsity `starts`, `columns` and blocks of `size` rows.
+
+    Raises SingularMatrixError if a diagonal block is missing.
+    """
     from truespring.kernels import blocks
     from truespring.kernels.threads import pieces, run
 
@@ -101,7 +113,7 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     counts = np.empty(n, np.int32)
     run(blocks.count_lower, n, starts, columns, counts)
     if (counts < 0).any():
-        raise SingularMatrixError(f"the matrix has nothing on the diagonal of node {int(counts.argmin())}")
+        raise SingularMatrixError(f"the matrix has no diagonal block for node {int(counts.argmin())}")
     lower_starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     lower_columns = np.empty(lower_starts[-1], np.int32)
     run(blocks.take_lower, n, starts, columns, lower_starts, lower_columns)
@@ -112,7 +124,7 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
 
 
 def condense(level: Level, matrix: Matrix, scale: float) -> bool:
-    """Fill a level with a matrix times `scale`; tell whether every block of the diagonal is positive."""
+    """Fill a level with a matrix times `scale`; return whether all diagonal blocks are positive definite."""
     from truespring.kernels import blocks
     from truespring.kernels.threads import run
 
@@ -122,7 +134,14 @@ def condense(level: Level, matrix: Matrix, scale: float) -> bool:
 
 @dataclass(eq=False)
 class Transfer:
-    """The prolongation from a coarser level, by rows and, for the restriction, by columns."""
+    """Prolongation from a coarser level, in compressed rows, and in compressed columns for the restriction.
+
+    Attributes:
+        starts, columns: row starts and columns (aggregates), shape (n + 1,) and (n_blocks,).
+        data: blocks, shape (n_blocks, k, n_modes).
+        column_starts, node: column starts and rows (nodes), shape (n_coarse + 1,) and (n_blocks,).
+        column_data: transposed blocks by column, shape (n_blocks, n_modes, k).
+    """
 
     starts: ShortInts
     columns: ShortInts
@@ -133,18 +152,18 @@ class Transfer:
 
     @property
     def n_bytes(self) -> int:
-        """Memory taken [bytes]."""
+        """Memory of the arrays [bytes]."""
         return sum(array.nbytes for array in (self.columns, self.data, self.node, self.column_data))
 
 
 @dataclass(eq=False)
 class Hierarchy:
-    """The coarser levels, frozen.
+    """The coarser levels, fixed after they are built.
 
     Attributes:
-        transfers: to the finest level, then between the coarser ones.
-        levels: the coarser levels, the finest not among them; the last is given by `inverse` alone.
-        inverse: of the coarsest matrix.
+        transfers: prolongation to the finest level, then to each coarser one.
+        levels: levels between the finest and the coarsest one.
+        inverse: inverse of the coarsest matrix, shape (n, n).
     """
 
     transfers: list[Transfer]
@@ -153,24 +172,25 @@ class Hierarchy:
 
     @cached_property
     def _room(self) -> list[tuple[Floats, Floats]]:
-        """For two vectors of each level: to get it anew for every cycle takes longer than many a loop."""
+        """Two vectors for each level, shape (n, k) each, allocated once: allocation is slow."""
         shapes = [(len(transfer.starts) - 1, transfer.data.shape[1]) for transfer in self.transfers]
         return [(np.empty(shape), np.empty(shape)) for shape in shapes]
 
     @property
     def n_bytes(self) -> int:
-        """Memory taken [bytes]."""
+        """Memory of all levels [bytes]."""
         transfers = sum(transfer.n_bytes for transfer in self.transfers)
         return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
 
     def cycle(self, finest: Level, turns: Floats, residual: Floats) -> Floats:
-        """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim).
+        """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim), until the next cycle.
 
-        It is good until the next cycle.
+        `turns` are the rotations of the nodes, shape (n_nodes, dim, dim).
         """
         return self._cycle(0, finest, residual, turns)
 
     def _cycle(self, depth: int, level: Level, r: Floats, turns: Floats | None) -> Floats:
+        """Return an approximate solution on the level `depth`; only the finest has `turns`."""
         from truespring.kernels import blocks, multigrid
         from truespring.kernels.threads import run, run_on
 
@@ -208,9 +228,9 @@ class Hierarchy:
 
 
 def build(finest: Level, matrix: Matrix, scale: float, modes: Floats) -> Hierarchy:
-    """Return the coarser levels of a matrix times `scale` with near-kernel `modes` of shape (n, k, n_modes).
+    """Return the coarser levels of a matrix times `scale`.
 
-    `finest` is that matrix, condensed; modes are zero in directions that are held.
+    `finest` is the level of that matrix. `modes` span its near-kernel, shape (n, k, n_modes), zero in held directions.
     """
     transfers: list[Transfer] = []
     levels: list[Level] = []
@@ -228,7 +248,7 @@ def build(finest: Level, matrix: Matrix, scale: float, modes: Floats) -> Hierarc
 
 
 def _inverse(level: Level) -> Floats:
-    """The inverse of the coarsest matrix; of directions that it does not know, zero."""
+    """Return the inverse of a level's matrix, shape (n k, n k), zero on its kernel."""
     n, size = level.shape
     matrix = np.empty((n * size, n * size))
     unit = np.zeros((n, size))
@@ -243,7 +263,7 @@ def _inverse(level: Level) -> Floats:
 
 
 def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple[Transfer, Floats, Matrix] | None:
-    """Return the prolongation, the coarse modes and the coarse matrix; None where nothing is gained."""
+    """Return the prolongation, the coarse modes and the coarse matrix; None if they are no smaller."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
@@ -259,7 +279,7 @@ def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple
 
     omega = scale * 4 / 3 / _largest_eigenvalue(level)
     transfer = _smoothed(level, matrix, aggregate, basis, n_coarse, omega)
-    # Modes that an aggregate does not know leave rows of zeros: they are held.
+    # Modes that an aggregate does not represent give rows of zeros: they are held.
     unknown = coarse_modes[:, np.arange(n_modes), np.arange(n_modes)] == 0
     starts, columns, data = _galerkin(matrix, transfer, n_coarse)
     data *= scale
@@ -267,7 +287,7 @@ def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple
 
 
 def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:
-    """The aggregate of each node, -1 where it stands alone, and their number."""
+    """Return the aggregate of each node, shape (n_nodes,), -1 for none, and the number of aggregates."""
     from pyamg.aggregation import standard_aggregation
 
     from truespring.kernels import multigrid
@@ -287,7 +307,7 @@ def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:
 
 
 def _largest_eigenvalue(level: Level) -> float:
-    """Estimate that of D^-1 A by power iteration."""
+    """Return an estimate of the largest eigenvalue of D^-1 A, by power iteration."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
@@ -305,6 +325,7 @@ def _largest_eigenvalue(level: Level) -> float:
 def _smoothed(
     level: Level, matrix: Matrix, aggregate: ShortInts, basis: Floats, n_coarse: int, omega: float
 ) -> Transfer:
+    """Return the smoothed prolongation (I - omega D^-1 A) T of the tentative one T, given by `basis`."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
@@ -320,7 +341,7 @@ def _smoothed(
 
 
 def _galerkin(matrix: Matrix, transfer: Transfer, n_coarse: int) -> tuple[ShortInts, ShortInts, Floats]:
-    """P^T A P: starts, columns, values of shape (n_blocks, modes, modes)."""
+    """Return P^T A P: row starts, columns, blocks of shape (n_blocks, n_modes, n_modes)."""
     from truespring.kernels import multigrid
     from truespring.kernels.threads import run
 
@@ -328,6 +349,7 @@ def _galerkin(matrix: Matrix, transfer: Transfer, n_coarse: int) -> tuple[ShortI
     n_modes = transfer.data.shape[2]
 
     def pattern(n_rows: int, *factors: ShortInts) -> tuple[ShortInts, ShortInts]:
+        """Return row starts and columns of the product of two sparse matrices."""
         counts = np.zeros(n_rows, np.int32)
         run(multigrid.count_product, n_rows, *factors, n_coarse, counts)
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
@@ -340,7 +362,7 @@ def _galerkin(matrix: Matrix, transfer: Transfer, n_coarse: int) -> tuple[ShortI
     data = np.zeros((len(columns), n_modes, n_modes))
     a, p = (matrix.starts, matrix.columns, matrix.data), (transfer.starts, transfer.columns, transfer.data)
     modes = (0.0,) * n_modes
-    for begin in range(0, n, _SLICE):  # A P is larger than A itself: a slice of it at a time
+    for begin in range(0, n, _SLICE):  # A P is larger than A: compute it in slices
         end = min(begin + _SLICE, n)
         ap = (ap_starts, ap_columns, np.empty((ap_starts[end] - ap_starts[begin], size, n_modes)))
         run(multigrid.multiply, end - begin, begin, *a, *p, n_coarse, *ap, modes, smallest=_SMALLEST_SLAB)

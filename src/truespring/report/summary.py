@@ -6,11 +6,12 @@ from importlib.metadata import version
 from typing import Any
 
 from truespring.arrays import Floats
-from truespring.comparison import Comparison, SupportError
+from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 from truespring.models import Moduli
 from truespring.reactions import moved_supports
 from truespring.report.result import Result
+from truespring.support_errors import SupportError
 
 
 def summary(result: Result) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.comparison import Comparison, SupportError, decisive
+from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, State, Status
 from truespring.mesh.selections import AXES
 from truespring.models import Fem, moduli_findings
@@ -14,6 +14,7 @@ from truespring.reactions import SupportForce, leading_support, moved_supports
 from truespring.report.quantity import percent, quantity, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.standing import equally_wrong_sentence, own_error_sentence
+from truespring.support_errors import SupportError, decisive
 
 
 def verdict(result: Result) -> str:

@@ -1,4 +1,4 @@
-"""Solvers: how equilibrium is found. They see potentials and loadings only."""
+"""Solvers: compute equilibria of a potential under a loading."""
 
 from truespring.solvers.balance import Equilibrium as Equilibrium
 from truespring.solvers.balance import Reporter as Reporter

@@ -1,4 +1,4 @@
-"""The balance of forces at one load level: what is asked of a state, and how good it is."""
+"""Balance of forces at one load level: residuals, tangents, and the criteria of convergence."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -20,36 +20,38 @@ from truespring.solvers.cost import Cost
 Reporter = Callable[[float, int, float], None]
 
 _EPS = float(np.finfo(float).eps)
-# A state whose residual is within this factor of the best one's counts as it.
+# A residual within this factor of the best one counts as equally good.
 _NEAR_BEST = 10.0
-# Rounding is estimated for bodies up to so many times their rest size.
+# Rounding errors are estimated for bodies up to this multiple of their undeformed size.
 _LARGEST_STRETCH = 100.0
-# An iteration that is so many times the body's size away from rest will not come back, and its energies overflow.
+# An iterate that moved by more than this multiple of the body's size has diverged: its energies overflow.
 _LOST = 1e8
-# Linear systems are solved to this share of their right side, and to less only where that ends the iteration.
+# Relative accuracy of linear systems: usual, and finest, used only if it ends the iteration.
 _ACCURACY, _FINEST_ACCURACY = 2e-3, 1e-5
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A state at one load level; an equilibrium where `converged`, else the best that was reached.
+    """A state at one load level: an equilibrium if `converged`, else the state of least residual.
 
     Attributes:
         load_factor: share of the full load [-].
         positions: [m], shape (n_nodes, dim).
         internal_force: gradient of the potential [N], shape (n_nodes, dim).
+        external_force: force of the loads at the state [N], shape (n_nodes, dim).
         energy: stored elastic energy [J].
-        iterations: Newton iterations spent, those of attempts that were cut back included.
-        external_force: of the loads at the state [N], shape (n_nodes, dim).
-        residual: unbalanced force over the largest of applied, reaction and internal force [-].
-        negative_eigenvalues: of the tangent on the free directions: 0 if stable, None if not known.
-        branched: true where an unstable equilibrium was left for a stable one nearby.
-        snapped: true where the body moved much further than the step before lets expect.
-        critical: "limit point" or "bifurcation" where stability changes there, else None.
-        mode: the way in which a body gives way at a critical point, largest component 1, shape (n_nodes, dim).
-        level: the share of what the solver controls, 0 to 1, where that is not the load factor.
-        reason: why no balance was looked for, in words, where it was not.
-        cost: of the path up to here.
+        iterations: number of Newton iterations, including attempts with larger steps that failed.
+        residual: unbalanced force over the larger of external and internal force [-].
+        converged: whether it is an equilibrium.
+        negative_eigenvalues: number of negative eigenvalues of the tangent on the free directions: 0 if stable, None if
+            not known.
+        branched: true if the solver left an unstable equilibrium for a stable one nearby.
+        snapped: true if the body moved much further than the previous step suggests.
+        critical: "limit point" or "bifurcation" if stability changes at this state, else None.
+        mode: buckling mode of a critical point, largest component 1 [-], shape (n_nodes, dim); None of other states.
+        level: share of the controlled quantity, 0 to 1; None if that is the load factor.
+        reason: why the solver did not look for an equilibrium, else empty.
+        cost: methods and costs up to this state.
     """
 
     load_factor: float
@@ -71,7 +73,7 @@ class Equilibrium:
 
 
 class Found(NamedTuple):
-    """A state, and the factorised tangent there, None where there is none or the state is no equilibrium."""
+    """A state and its factorised tangent, None if it was not factorised or the state is no equilibrium."""
 
     state: Equilibrium
     tangent: Tangent | None = None
@@ -79,15 +81,20 @@ class Found(NamedTuple):
 
 @dataclass(eq=False)
 class Balance:
-    """The balance of forces of one potential under one loading.
+    """Balance of forces of a potential under a loading.
 
-    Forces and steps have the shape of the positions, and are zero in the directions that are held.
+    Forces and steps have the shape of the positions, (n_nodes, dim), and are zero in held directions.
 
     Attributes:
-        tolerance: the relative residual at which a state counts as balanced.
-        max_iterations: of Newton's method at one level.
-        linear: what solves the linear systems.
-        notes: where a first choice was given up, and for what.
+        potential, loading: the potential and its loading.
+        tolerance: relative residual below which a state is in equilibrium [-].
+        max_iterations: largest number of Newton iterations at one level.
+        linear: solver of the linear systems.
+        report: called after each iteration.
+        notes: changes of method, and their reasons.
+        spent: number of Newton iterations at all levels.
+        free: true for free directions, shape (n_nodes, dim).
+        size: diagonal of the undeformed body's bounding box [m].
     """
 
     potential: Potential
@@ -104,7 +111,7 @@ class Balance:
         self.size = float(np.linalg.norm(np.ptp(self.potential.nodes, axis=0)))
 
     def total_energy(self, positions: Floats, load_factor: float) -> tuple[float, float]:
-        """Return stored energy less the work of the loads, and the size of these two together [J]."""
+        """Return stored energy minus the work of the loads, and the sum of their sizes [J]."""
         with np.errstate(over="ignore", invalid="ignore"):
             stored = self.potential.energy(positions)
         work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
@@ -113,24 +120,27 @@ class Balance:
         return total, abs(stored) + float(np.abs(work).sum()) + sum(map(abs, following))
 
     def force(self, positions: Floats, load_factor: float) -> Floats:
-        """Return the unbalanced force on the free directions [N]."""
+        """Return the unbalanced force [N], zero in held directions, shape (n_nodes, dim)."""
         applied = self.loading.force(positions, load_factor)
         return self.unbalanced(self.potential.gradient(positions), applied)[0]
 
     def unbalanced(self, internal: Floats, applied: Floats) -> tuple[Floats, float]:
-        """Return the unbalanced force on the free directions [N], and the force scale it is relative to [N]."""
+        """Return the unbalanced force [N], zero in held directions, shape (n_nodes, dim), and its scale [N]."""
         scale = max(norm(applied), norm(internal))
         return np.where(self.free, internal - applied, 0.0), scale
 
     def hessian(self, positions: Floats, load_factor: float, *stress: Floats) -> SparseMatrix:
-        """Return the tangent in blocks of one row a direction, loads that follow the body included."""
+        """Return the tangent [N/m] with that of following loads, shape (n_dof, n_dof), in blocks of shape (dim, dim).
+
+        `stress` is passed on to the potential, see Stressed.hessian.
+        """
         tangent = self.in_blocks(self.potential.hessian(positions, *stress))
         for load in self.loading.following if load_factor else ():
             tangent = self.in_blocks(tangent + load_factor * load.hessian(positions))
         return tangent
 
     def in_blocks(self, matrix: SparseMatrix) -> SparseMatrix:
-        """Return a matrix in blocks of one row a direction."""
+        """Return a matrix of shape (n_dof, n_dof) in blocks of shape (dim, dim), columns ascending."""
         dim = self.free.shape[1]
         if matrix.format == "bsr" and matrix.blocksize == (dim, dim):
             return matrix
@@ -139,14 +149,14 @@ class Balance:
         return blocks
 
     def accuracy(self, residual: float) -> float:
-        """Return the relative accuracy that a linear system deserves at a relative residual."""
+        """Return the relative accuracy for a linear system at a relative residual of the balance."""
         last = self.tolerance / residual / 3 if residual else 1.0
         return last if _FINEST_ACCURACY <= last <= _ACCURACY else _ACCURACY
 
     def rounding(self, tangent: SparseMatrix, positions: Floats) -> float:
-        """Return the unbalanced force that rounding of the positions alone makes [N]: no residual can go below.
+        """Return the unbalanced force due to rounding errors of the positions [N], a lower bound of the residual.
 
-        A body that runs away without bound is not excused by its own size.
+        Positions beyond _LARGEST_STRETCH times the undeformed size do not increase it: they come from divergence.
         """
         from truespring.kernels import blocks
         from truespring.kernels.threads import run
@@ -166,7 +176,7 @@ class Balance:
         )
 
     def judged(self, state: Equilibrium) -> Found:
-        """Add the stability of the tangent to an equilibrium."""
+        """Return an equilibrium with its stability, and the tangent if it was factorised."""
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
         try:
@@ -174,15 +184,15 @@ class Balance:
         except SingularMatrixError:
             return Found(replace(state, negative_eigenvalues=None))
         negative = tangent.negative_eigenvalues
-        if negative is None and not tangent.lasting and self.go_direct("stability could not be told"):
+        if negative is None and not tangent.lasting and self.go_direct("stability was not determined"):
             return self.judged(state)
         judged = replace(state, negative_eigenvalues=negative)
         return Found(judged, tangent if tangent.lasting else None)
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
-        """Make a tangent ready; where there are no coarse levels for it, by a factorisation.
+        """Return a tangent prepared for solving, factorised if multigrid has no coarse levels for it.
 
-        Raises SingularMatrixError where it has no inverse.
+        Raises SingularMatrixError if the tangent has no inverse.
         """
         try:
             return self.linear.ready(matrix, positions)
@@ -192,19 +202,19 @@ class Balance:
             return self.linear.ready(matrix, positions)
 
     def factorised(self, found: Found) -> Found:
-        """Return an equilibrium with its tangent factorised, as far as memory allows."""
+        """Return an equilibrium with its tangent factorised, if that fits in memory."""
         if found.tangent is not None:
             return found
-        return self.judged(found.state) if self.go_direct("an unstable state was met") else found
+        return self.judged(found.state) if self.go_direct("an unstable state was found") else found
 
     def go_direct(self, reason: str) -> bool:
-        """Take a factorisation from here on; tell whether that fits in memory."""
+        """Use factorisations from now on; return whether they fit in memory."""
         try:
             directly = choose("direct", self.potential.nodes, self.loading.held)
         except ProblemError:
-            self.note(f"{reason}: a factorisation, which would help, does not fit in memory")
+            self.note(f"{reason}: a factorisation would help, but does not fit in memory")
             return False
-        self.note(f"{reason}: {directly.name} from there on instead of {self.linear.name}")
+        self.note(f"{reason}: {directly.name} from then on instead of {self.linear.name}")
         before = self.linear
         directly.cg_iterations, directly.lanczos_iterations = before.cg_iterations, before.lanczos_iterations
         directly.factorisations, directly.memory = before.factorisations, before.memory
@@ -212,29 +222,30 @@ class Balance:
         return True
 
     def note(self, text: str) -> None:
-        """Keep in words, once, that a first choice was given up."""
+        """Add a note, unless it is there already."""
         if text not in self.notes:
             self.notes.append(text)
 
 
 class Watch:
-    """Keeps the best state of an iteration at one level, and tells when it is balanced."""
+    """Monitor an iteration at one level: keep the state of least residual, decide on convergence."""
 
     def __init__(self, balance: Balance, load_factor: float, positions: Floats) -> None:
+        """Begin at a load factor and positions [m], shape (n_nodes, dim)."""
         self._balance, self.load_factor = balance, load_factor
         nowhere = np.full_like(positions, np.nan)
         self.best = Equilibrium(load_factor, positions, nowhere, nowhere, np.inf, 0, np.inf, converged=False)
         self.force: Floats = nowhere
         self.residual = np.inf
-        #: Whether the unbalanced force is below what rounding makes.
-        self.drowned = False
-        self._size, self._scale, self._drowned_before = np.inf, 0.0, np.inf
+        #: Whether the unbalanced force is below rounding errors.
+        self.below_rounding = False
+        self._size, self._scale, self._size_before = np.inf, 0.0, np.inf
         self._here, self._best_size = self.best, np.inf
 
     def at(self, positions: Floats, iteration: int, held_moved: bool = True) -> bool:
-        """Look at a state; tell whether it is one: an iteration that ran away is over.
+        """Evaluate a state; return False if the iteration has diverged.
 
-        A state whose held nodes have not made their motion yet is none to return.
+        `held_moved` is false as long as held nodes lack their prescribed motion: such a state is never the best one.
         """
         if not np.abs(positions - self._balance.potential.nodes).max() <= _LOST * self._balance.size:
             return False
@@ -260,21 +271,21 @@ class Watch:
         return bool(np.isfinite(self.residual))
 
     def balanced(self, tangent: SparseMatrix, positions: Floats) -> bool:
-        """Tell whether the state looked at is balanced.
+        """Return whether the last state evaluated is in equilibrium.
 
-        The rounding of a body that has run away excuses nothing: the best state is what is returned. A force
-        below rounding may still be that of a small load: only where steps no longer help is it noise.
+        A force below rounding errors ends the iteration only if the residual is near the best one (else it has
+        diverged), and if another step does not reduce it (else it may be the force of a small load).
         """
         below = self._size <= self._balance.rounding(tangent, positions)
-        self.drowned = below and self.residual <= _NEAR_BEST * self.best.residual
-        helpless = self.drowned and (self.load_factor == 0 or self._size > self._drowned_before / 2)
-        self._drowned_before = self._size if self.drowned else np.inf
-        return helpless or self._size <= self._balance.tolerance * self._scale
+        self.below_rounding = below and self.residual <= _NEAR_BEST * self.best.residual
+        noise = self.below_rounding and (self.load_factor == 0 or self._size > self._size_before / 2)
+        self._size_before = self._size if self.below_rounding else np.inf
+        return noise or self._size <= self._balance.tolerance * self._scale
 
     def equilibrium(self) -> Found:
-        """Return the state looked at as the equilibrium that it is, or a former one that is better balanced.
+        """Return the last state evaluated, or an earlier one of less unbalanced force, as converged.
 
-        By the force itself: where all forces vanish, as in a body moved as a whole, their ratio tells nothing.
+        Compares forces, not residuals: if all forces vanish, as in a body moved as a whole, their ratio is noise.
         """
         state = self.best if self._best_size < self._size else self._here
         energy = self._balance.potential.energy(state.positions)
@@ -282,7 +293,7 @@ class Watch:
         return self._balance.judged(replace(state, energy=energy, converged=True))
 
     def failure(self) -> Found:
-        """Return the best state as no equilibrium."""
+        """Return the state of least residual, as not converged."""
         self._balance.spent += self.best.iterations
         with np.errstate(over="ignore", invalid="ignore"):
             return Found(replace(self.best, energy=self._balance.potential.energy(self.best.positions)))
@@ -291,7 +302,7 @@ class Watch:
 def stepped(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
 ) -> Floats | None:
-    """Return the solution of a tangent that is positive; None where it is not."""
+    """Return the solution of tangent x = right, shape (n_nodes, dim); None if the tangent is not positive definite."""
     if not np.isfinite(tangent.data.sum()):
         return None
     try:
@@ -304,7 +315,10 @@ def stepped(
 def _solved(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
 ) -> Floats | None:
-    """Solve; where that is slow even on coarse levels of the state itself, by a factorisation if that fits."""
+    """Solve a linear system; if multigrid is slow even with new coarse levels, by a factorisation.
+
+    Returns None if the tangent is not positive definite, the last iterate if a factorisation does not fit in memory.
+    """
     for attempt in range(3):
         ready = balance.ready(tangent, positions)
         if ready.lasting and ready.negative_eigenvalues != 0:

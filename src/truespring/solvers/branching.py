@@ -7,14 +7,15 @@ import numpy as np
 from truespring.solvers.balance import Balance, Found
 from truespring.solvers.line_search import descend
 
-# Leaps along the mode by these shares of the body's size are tried, each with so many undamped iterations;
-# then a descent from nearby.
+# Large steps along the mode as shares of the body's size, each followed by this number of undamped iterations; a small
+# step, followed by a descent.
 _LEAPS, _UNDAMPED_ITERATIONS, _NUDGE = (0.03, 0.1, 0.2, 0.3), 25, 1e-3
+# Largest number of equilibria to leave one after the other.
 _MAX_ESCAPES = 3
 
 
 def stabilised(balance: Balance, found: Found) -> Found:
-    """Return a stable equilibrium of lower energy reached from an unstable one; `found` where there is none."""
+    """Return a stable equilibrium of lower energy near an unstable one; `found` if it is stable or none is found."""
     for _ in range(_MAX_ESCAPES):
         if not found.state.converged or not found.state.negative_eigenvalues:
             break
@@ -29,18 +30,18 @@ def stabilised(balance: Balance, found: Found) -> Found:
 
 
 def _escaped(balance: Balance, unstable: Found) -> Found:
-    """Leave an unstable equilibrium along its mode, to the side of lower energy; stay there where that fails.
+    """Return an equilibrium of lower energy along the mode of an unstable one, or `unstable` if there is none.
 
-    Undamped Newton is tried from states x + a v + w far along the mode v, where w takes the stretch out
-    that a v makes in a slender body: H w = -(g(x + a v) + g(x - a v) - 2 g(x)) / 2, the second order of
-    Koiter's expansion. A descent with line search from nearby follows where none leads to a stable
-    state of lower energy.
+    Undamped Newton iterations start from x + a v + w far along the mode v, on the side of lower energy. The correction
+    w removes the stretch that a v causes in a slender body, H w = -(g(x + a v) + g(x - a v) - 2 g(x)) / 2, the second
+    order of Koiter's expansion. If none leads to a stable state of lower energy, a descent with line search starts from
+    a small step along v.
     """
     state, tangent = unstable.state, unstable.tangent
-    assert tangent is not None  # it was found negative by factorising
+    assert tangent is not None  # a factorisation found the negative eigenvalue
     level, spent = state.load_factor, state.iterations
     lowest = tangent.lowest_mode()
-    assert lowest is not None  # so can any factorisation
+    assert lowest is not None  # every factorisation returns one
     mode = balance.size * lowest
     unit = mode / np.linalg.norm(mode)
     energy, _ = balance.total_energy(state.positions, level)

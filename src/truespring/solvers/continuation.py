@@ -1,9 +1,9 @@
-"""Paths past limit points: the load factor is an unknown, and a displacement, or the way gone, is prescribed.
+"""Path following past limit points: displacement control and arc length, with the load factor as an unknown.
 
-One more equation w . u = c stands beside the balance of forces (Riks 1979; Batoz and Dhatt 1979): of displacement
-control w picks what is controlled, of arc length it is the direction of the path (Crisfield's cylinder, linearised).
-Where the number of negative eigenvalues changes from one state to the next, the point where it does is found, and is a
-limit point if the load has a part along the mode there, a bifurcation if it has none (Wriggers and Simo 1990).
+The constraint w . u = c is added to the balance of forces (Riks 1979; Batoz and Dhatt 1979). For displacement control w
+selects the controlled displacement, for arc length it is the tangent of the path (Crisfield's cylinder, linearised).
+If the number of negative eigenvalues changes between two states, the critical point between them is computed: a limit
+point if the load has a component along the mode, else a bifurcation (Wriggers and Simo 1990).
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from truespring.arrays import Floats
 from truespring.conditions import Loading
 from truespring.errors import ProblemError
 from truespring.linear import check_linear, choose
-from truespring.linear.direct import Factorisation, SingularMatrixError
+from truespring.linear.direct import FACTORISERS, Factorisation, SingularMatrixError
 from truespring.linear.gradients import norm
 from truespring.potential import Potential, SparseMatrix
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter, Watch
@@ -27,35 +27,38 @@ from truespring.solvers.line_search import descend
 from truespring.solvers.solver import Geometry, Solver
 
 _AXES = "xyz"
-# A step that takes so many iterations keeps its length; one of fewer is followed by a longer one, of more by a shorter.
-_WANTED_ITERATIONS = 4
-# Turns of the path by more than this, as a cosine, are not taken for the same path: the step is cut.
+# Target number of iterations of a step: after fewer the next step is longer, after more it is shorter.
+_TARGET_ITERATIONS = 4
+# Smallest cosine of the angle between the tangents of the path before and after a step; else the step is cut.
 _STRAIGHT = 0.5
-# A step is cut back to this share of the first one at least.
+# Shortest step as a share of the first one.
 _SHORTEST = 2.0**-12
-_NO_WAY = (
-    "the path has no direction at rest: the load moves nothing, or a part of the body gives way without resistance"
+_NO_DIRECTION = (
+    "the path has no initial direction: the load moves no node, or a part of the body has no stiffness against it"
 )
-# Where the first step would take a body so many times its size away, the load does not move what is controlled.
+# The load does not move the controlled displacement if the first step would move the body by this multiple of its size.
 _FAR = 100.0
-# A critical point where no balance is found is taken for a known state this near, as a share of the step.
+# If no equilibrium is found at a critical point, a state this near stands for it, as a share of the step.
 _NEAR = 1e-6
 
-# Along the step between two states a critical point is found to this share of it.
+# Accuracy of the position of a critical point, as a share of the step.
 _PLACE = 1e-12
-# A load whose part along the mode is below this share of it leaves a point a bifurcation.
+# A critical point is a bifurcation if the component of the load along the mode is below this share of the load.
 _NO_PART = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class DisplacementControl(Solver):
-    """The displacement `to` [m] of what is selected `on`, the mean along a `direction` "x", "y" or "z", in equal steps.
+    """Prescribe the mean displacement of a selection of nodes along an axis, in equal steps.
 
     Attributes:
-        steps: as many states are reached, and recorded.
-        tolerance: relative residual at which a state counts as balanced [-].
-        max_iterations: Newton iterations for one state before its step is cut back.
-        linear: a library for factorisations by name, or "direct": "scipy", "rslab", "pardiso".
+        on: selection, as of supports and loads.
+        direction: "x", "y" or "z".
+        to: displacement at the last step [m].
+        steps: number of steps; the state after each is recorded.
+        tolerance: relative residual below which a state is in equilibrium [-].
+        max_iterations: Newton iterations for one state before its step is halved.
+        linear: library of factorisations, "scipy", "rslab" or "pardiso", or "direct" for the first that is installed.
     """
 
     on: object
@@ -72,7 +75,7 @@ class DisplacementControl(Solver):
     def __post_init__(self) -> None:
         _check(self.steps, self.max_iterations, self.tolerance, self.linear)
         if not (np.isfinite(self.to) and self.to):
-            raise ProblemError(f"to = {self.to!r} m: the displacement to reach must be finite and not zero")
+            raise ProblemError(f"to = {self.to!r} m: the displacement must be finite and not zero")
 
     @property
     def load_steps(self) -> int:  # type: ignore[override]
@@ -80,24 +83,24 @@ class DisplacementControl(Solver):
         return self.steps
 
     def check(self, loading: Loading, geometry: Geometry) -> None:
-        """Raise ProblemError where a support holds the controlled displacement, or the body has no such direction."""
+        """Raise ProblemError if a support holds the controlled displacement, or the body has no such direction."""
         axes = _AXES[: loading.held.shape[1]]
         if self.direction not in axes:
-            raise ProblemError(f"direction = {self.direction!r}: allowed are {', '.join(axes)}")
+            raise ProblemError(f"direction = {self.direction!r}: allowed: {', '.join(axes)}")
         if loading.held[geometry.select(self.on), axes.index(self.direction)].any():
-            raise ProblemError("the displacement that is controlled is held by a support: choose another")
+            raise ProblemError("a support holds the controlled displacement: choose another selection or direction")
 
     def follow(
         self, potential: Potential, loading: Loading, report: Reporter | None = None, geometry: Geometry | None = None
     ) -> Iterator[Equilibrium]:
         """Yield the equilibria in the order of the path.
 
-        Where a state cannot be reached the last one yielded is not converged: the best one there.
+        If a state cannot be reached, the last one yielded is that of least residual there, not converged.
         """
         geometry = geometry or Geometry()
         self.check(loading, geometry)
         nodes = geometry.select(self.on)
-        weights = np.zeros(potential.nodes.shape)  # of a mean
+        weights = np.zeros(potential.nodes.shape)  # of the mean
         weights[nodes, _AXES.index(self.direction)] = 1.0 / len(nodes)
         balance = _balance(potential, loading, self, report)
         yield from _controlled(balance, weights, self.to, self.steps)
@@ -105,15 +108,15 @@ class DisplacementControl(Solver):
 
 @dataclass(frozen=True, slots=True)
 class ArcLength(Solver):
-    """Along the path from no load to the full one, through every limit point on the way.
+    """Follow the path from no load to the full load through all limit points, by arc length.
 
     Attributes:
-        load_steps: the first step is what the body at rest would need for this part of the load.
-        max_steps: states at most; a path that has not come to the full load by then ends where it is.
-        longest: steps are no longer than so many times the first.
-        tolerance: relative residual at which a state counts as balanced [-].
-        max_iterations: Newton iterations for one state before its step is cut back.
-        linear: a library for factorisations by name, or "direct": "scipy", "rslab", "pardiso".
+        load_steps: the first step has the length of the initial response to 1 / load_steps of the load.
+        max_steps: largest number of states; the path ends there even if the full load was not reached.
+        longest: largest length of a step over the first one.
+        tolerance: relative residual below which a state is in equilibrium [-].
+        max_iterations: Newton iterations for one state before its step is halved.
+        linear: library of factorisations, "scipy", "rslab" or "pardiso", or "direct" for the first that is installed.
     """
 
     load_steps: int = 10
@@ -136,32 +139,41 @@ class ArcLength(Solver):
     ) -> Iterator[Equilibrium]:
         """Yield the equilibria in the order of the path.
 
-        Where a state cannot be reached the last one yielded is not converged: the best one there.
+        If a state cannot be reached, the last one yielded is that of least residual there, not converged.
         """
         balance = _balance(potential, loading, self, report)
         yield from _along(balance, 1.0 / self.load_steps, self.max_steps, self.longest)
 
 
 def _check(steps: int, max_iterations: int, tolerance: float, linear: str) -> None:
+    """Raise ProblemError for settings that are not allowed."""
     if steps < 1 or max_iterations < 1:
         raise ProblemError("steps and max_iterations must be at least 1")
     if not 0 < tolerance < 1:
-        raise ProblemError(f"tolerance = {tolerance}: a relative residual between 0 and 1 is wanted")
+        raise ProblemError(f"tolerance = {tolerance}: must be between 0 and 1")
     check_linear(linear)
     if linear in ("auto", "multigrid"):
-        raise ProblemError(f"linear = '{linear}': past a limit point only factorisations serve: direct, or one by name")
+        allowed = ", ".join(("direct", *FACTORISERS))
+        raise ProblemError(f"linear = '{linear}': path following needs factorisations; allowed: {allowed}")
 
 
 def _balance(
     potential: Potential, loading: Loading, control: DisplacementControl | ArcLength, report: Reporter | None
 ) -> Balance:
+    """Return the balance of forces with the settings of a solver."""
     linear = choose(control.linear, potential.nodes, loading.held)
     return Balance(potential, loading, control.tolerance, control.max_iterations, linear, report)
 
 
 @dataclass(frozen=True, eq=False)
 class _Constraint:
-    """The equation w . (x - X) + share lambda = target."""
+    """The constraint w . (x - X) + share lambda = target.
+
+    Attributes:
+        weights: w, shape (n_nodes, dim).
+        share: factor of the load factor lambda.
+        target: right side.
+    """
 
     weights: Floats
     share: float
@@ -169,7 +181,7 @@ class _Constraint:
 
 
 def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Iterator[Equilibrium]:
-    """Follow equal steps of one displacement, halved where they fail."""
+    """Yield the states after equal steps of a displacement; steps that fail are halved."""
     last = _at_rest(balance)
     yield last.state
     if reason := _idle(balance, last.state, weights, to / steps):
@@ -177,8 +189,8 @@ def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Ite
         return
     reached, level, step = 0.0, 1, to / steps
     while last.state.converged and level <= steps:
-        wanted = to * (level / steps)
-        goal = wanted if abs(wanted - reached) <= abs(step) * (1 + 1e-9) else reached + step
+        regular = to * (level / steps)
+        goal = regular if abs(regular - reached) <= abs(step) * (1 + 1e-9) else reached + step
         there = _corrected(balance, last.state, _Constraint(weights, 0.0, goal))
         if not there.state.converged:
             if abs(step) > _SHORTEST * abs(to / steps):
@@ -187,36 +199,36 @@ def _controlled(balance: Balance, weights: Floats, to: float, steps: int) -> Ite
             yield _with_cost(balance, there.state)
             return
         yield from _critical(balance, last, there, weights)
-        there = there._replace(state=replace(there.state, level=level / steps if goal == wanted else goal / to))
+        there = there._replace(state=replace(there.state, level=level / steps if goal == regular else goal / to))
         yield _with_cost(balance, there.state)
         last, reached = there, goal
-        if goal == wanted:
+        if goal == regular:
             level += 1
         step = np.sign(to) * min(2 * abs(step), abs(to / steps))
 
 
 def _idle(balance: Balance, rest: Equilibrium, weights: Floats, step: float) -> str:
-    """Say that the load does not move what is controlled, where the body at rest answers so; else nothing."""
+    """Return why the load cannot be controlled by this displacement, empty if it can; judged without load."""
     tangent = _tangent(balance, rest, None)
     if tangent is None:
         return ""
-    own = abs(float((weights * tangent[0]).sum()))
+    controlled = abs(float((weights * tangent[0]).sum()))
     moved = float(np.abs(tangent[0]).max())
-    if abs(step) * moved <= _FAR * balance.size * own:
+    if abs(step) * moved <= _FAR * balance.size * controlled:
         return ""
     return (
-        f"the load does not move what is controlled: at rest it moves {own / moved:.1e} times as far as the node that "
-        "moves most; control a displacement along the load, or follow the path by its arc length"
+        f"the load does not move the controlled displacement: initially it is {controlled / moved:.1e} times that of "
+        "the node that moves most; control a displacement along the load, or use arc length"
     )
 
 
 def _along(balance: Balance, first: float, max_steps: int, longest: float) -> Iterator[Equilibrium]:
-    """Follow the arc length until the load factor is 1, then that state itself."""
+    """Yield the states along the path by arc length, the last one at load factor 1."""
     last = _at_rest(balance)
     yield last.state
     tangent = _tangent(balance, last.state, None)
     if tangent is None:
-        yield _with_cost(balance, replace(last.state, converged=False, residual=np.inf, reason=_NO_WAY))
+        yield _with_cost(balance, replace(last.state, converged=False, residual=np.inf, reason=_NO_DIRECTION))
         return
     direction, slope = tangent
     begin = step = first / slope if slope else first
@@ -238,17 +250,21 @@ def _along(balance: Balance, first: float, max_steps: int, longest: float) -> It
             return
         yield from _critical(balance, last, there, direction)
         yield _with_cost(balance, there.state)
-        step = min(step * np.clip(_WANTED_ITERATIONS / max(there.state.iterations, 1), 0.5, 2.0), longest * begin)
+        step = min(step * np.clip(_TARGET_ITERATIONS / max(there.state.iterations, 1), 0.5, 2.0), longest * begin)
         last, (direction, slope) = there, turned
 
 
 def _at_rest(balance: Balance) -> Found:
+    """Return the equilibrium without load."""
     found = descend(balance, 0.0, balance.potential.nodes)
     return found._replace(state=_with_cost(balance, found.state))
 
 
 def _push(balance: Balance, positions: Floats, factor: float) -> Floats:
-    """The derivative of the unbalanced force by the load factor, its sign turned: applied forces and moved supports."""
+    """Return minus the derivative of the unbalanced force by the load factor [N], shape (n_nodes, dim).
+
+    The sum of the loads and of the forces that moved supports cause at fixed positions of the other nodes.
+    """
     loading, step = balance.loading, 1e-6
     push = loading.force(positions)
     motion = (loading.motion(factor + step) - loading.motion(factor - step)) / (2 * step)
@@ -258,9 +274,10 @@ def _push(balance: Balance, positions: Floats, factor: float) -> Floats:
 
 
 def _tangent(balance: Balance, state: Equilibrium, before: Floats | None) -> tuple[Floats, float] | None:
-    """The direction of the path, of size 1 in the free positions, and the load factor's part; None where there is none.
+    """Return the tangent of the path: direction of the positions (norm 1), and change of the load factor [1/m].
 
-    It goes on as `before` did, at first with the load.
+    The direction has shape (n_nodes, dim). Its sign continues that of `before`; without one, the load increases. None
+    if there is no direction.
     """
     push = _push(balance, state.positions, state.load_factor)
     weights, still = push if before is None else before, np.zeros_like(push)
@@ -276,9 +293,10 @@ def _tangent(balance: Balance, state: Equilibrium, before: Floats | None) -> tup
 def _bordered(
     balance: Balance, matrix: SparseMatrix, push: Floats, constraint: _Constraint, force: Floats, gap: float
 ) -> tuple[Floats, float]:
-    """Solve for a step and a change of the load factor that take away an unbalanced force and the gap of the equation.
+    """Return the Newton step of positions [m], shape (n_nodes, dim), and of the load factor, under a constraint.
 
-    The bordered matrix is regular at limit points, where the tangent is not.
+    `force` is the unbalanced force, `gap` the residual of the constraint. The bordered matrix is regular at limit
+    points, where the tangent is singular. NaN if the matrix is singular.
     """
     free = np.flatnonzero(balance.free.ravel())
     tangent = sparse.csr_array(matrix)[free][:, free]
@@ -286,7 +304,7 @@ def _bordered(
     size = float(np.abs(tangent.data).max(initial=0.0))
     if not along.any() or not np.isfinite(size):  # nothing changes with the load factor
         return np.full_like(push, np.nan), np.nan
-    unit = size / max(norm(along), np.finfo(float).tiny)  # of the load factor: its column then is as large as others
+    unit = size / max(norm(along), np.finfo(float).tiny)  # scale of the load factor, for a well-conditioned matrix
     row = np.append(weights, constraint.share * unit)
     large = size / max(norm(row), np.finfo(float).tiny)
     parts: Any = [[tangent, -unit * along[:, None]], [large * row[None, :-1], np.array([[large * row[-1]]])]]
@@ -294,7 +312,7 @@ def _bordered(
     right = np.append(-force.ravel()[free], large * gap)
     try:
         solution = splu(bordered).solve(right)
-    except RuntimeError:  # singular: a bifurcation, or nothing that the equation could hold on to
+    except RuntimeError:  # singular: a bifurcation, or a constraint that does not determine the load factor
         return np.full_like(push, np.nan), np.nan
     step = np.zeros(push.size)
     step[free] = solution[:-1]
@@ -302,7 +320,10 @@ def _bordered(
 
 
 def _corrected(balance: Balance, start: Equilibrium, constraint: _Constraint, ahead: Floats | None = None) -> Found:
-    """Find the state that meets the equation, by Newton's method from a start; the best one where that fails."""
+    """Return the equilibrium that satisfies a constraint, by Newton's method; else the state of least residual.
+
+    The iteration begins at `start`, moved by the step `ahead` [m] if there is one.
+    """
     nodes = balance.potential.nodes
     positions = start.positions if ahead is None else start.positions + ahead
     factor, iteration = start.load_factor, 0
@@ -328,8 +349,8 @@ def _corrected(balance: Balance, start: Equilibrium, constraint: _Constraint, ah
 
 
 def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> Iterator[Equilibrium]:
-    """Yield the point between two states where the number of negative eigenvalues changes, if it does."""
-    from scipy.optimize import brentq  # a quarter of a second
+    """Yield the critical point between two states if the number of negative eigenvalues changes."""
+    from scipy.optimize import brentq  # imported here: it takes a quarter of a second
 
     before, after = last.state.negative_eigenvalues, there.state.negative_eigenvalues
     if before is None or after is None or before == after or not there.state.converged:
@@ -339,7 +360,7 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
     found: dict[float, Found] = {}
 
     def crossing(share: float) -> float:
-        """The size of the eigenvalue nearest to zero, positive as long as their number is that of before."""
+        """Return the eigenvalue nearest to zero at a share of the step, positive before the critical point."""
         if share in (0.0, 1.0):
             one = (last, there)[int(share)]
         else:
@@ -349,10 +370,10 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
             one = _corrected(balance, start, _Constraint(weights, 0.0, (1 - share) * ends[0] + share * ends[1]))
         if not one.state.converged:
             if min(abs(share - known) for known in found) > _NEAR:
-                raise ArithmeticError("the path is lost between two of its states")
-            return 0.0  # so near that the way in which the body gives way drowns in rounding: exactly there
+                raise ArithmeticError("no equilibrium was found between two states of the path")
+            return 0.0  # too near the critical point for the solver: it is the critical point
         found[share] = one
-        if one.state.negative_eigenvalues is None:  # the tangent is singular: exactly there
+        if one.state.negative_eigenvalues is None:  # the tangent is singular: a critical point
             return 0.0
         size = _nearest_to_zero(balance, one.state)[0]
         return size if one.state.negative_eigenvalues == before else -size
@@ -361,7 +382,8 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
         share = brentq(crossing, 0.0, 1.0, xtol=_PLACE, rtol=1e-12)
         crossing(share)
     except (ArithmeticError, SingularMatrixError, ValueError):
-        balance.note(f"between load factors {last.state.load_factor:.6g} and {there.state.load_factor:.6g}: not found")
+        between = f"load factors {last.state.load_factor:.6g} and {there.state.load_factor:.6g}"
+        balance.note(f"the critical point between {between} was not found")
         return
     state = found[min(found, key=lambda known: abs(known - share))].state
     mode = _nearest_to_zero(balance, state)[1]
@@ -373,21 +395,22 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
 
 
 def _nearest_to_zero(balance: Balance, state: Equilibrium) -> tuple[float, Floats]:
-    """The size of the tangent's eigenvalue nearest to zero, and its mode, largest component 1."""
+    """Return the size of the tangent's eigenvalue nearest to zero [N/m], and its mode, largest component 1."""
     matrix = balance.hessian(state.positions, state.load_factor)
     try:
         ready = balance.linear.ready(matrix, state.positions)
-    except SingularMatrixError:  # exactly there
+    except SingularMatrixError:  # the eigenvalue is zero: shift the matrix
         data = matrix.data
         shifted: Any = matrix + 1e-14 * float(np.abs(data).max()) * sparse.eye_array(matrix.shape[0])
         ready = balance.linear.ready(balance.in_blocks(shifted), state.positions)
-    assert isinstance(ready, Factorisation)  # nothing else is allowed
+    assert isinstance(ready, Factorisation)  # `_check` allows no other linear solver
     mode = ready.nearest_mode()
     image = (matrix @ mode.ravel()).reshape(mode.shape)
     return abs(float((mode * np.where(balance.free, image, 0.0)).sum())) / float((mode * mode).sum()), mode
 
 
 def _with_cost(balance: Balance, state: Equilibrium) -> Equilibrium:
+    """Return a state with methods and costs up to now."""
     cost = Cost(
         newton="continuation",
         linear=balance.linear.name,

@@ -1,22 +1,22 @@
-"""What a path cost, and by which choices."""
+"""Methods and costs of a solution."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Cost:
-    """The choices of a solver and what they cost, over all load levels.
+    """Methods and costs of a solver over all load levels.
 
     Attributes:
-        newton: how balance was found, in words.
-        linear: what solved the linear systems, in words.
-        newton_iterations: all of them, those of attempts that were given up included.
-        cg_iterations: of conjugate gradients; 0 for a direct solver.
-        lanczos_iterations: of the search for the lowest eigenvalue, which tells of stability; 0 for a direct solver.
-        factorisations: of tangents, or how often coarse levels were built.
-        memory: the most that factors or coarse levels took [bytes].
-        threads: how many the compiled loops may take.
-        notes: where a first choice was given up, and for what.
+        newton: variant of Newton's method, in words.
+        linear: linear solver, in words.
+        newton_iterations: number of all Newton iterations, including failed attempts.
+        cg_iterations: number of conjugate gradient iterations, 0 for a direct solver.
+        lanczos_iterations: number of iterations for the lowest eigenvalue (stability), 0 for a direct solver.
+        factorisations: number of factorisations of tangents, or of times that coarse levels were built.
+        memory: largest memory of factors or coarse levels [bytes].
+        threads: number of threads of compiled loops.
+        notes: changes of method, and their reasons.
     """
 
     newton: str

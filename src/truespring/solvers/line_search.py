@@ -1,4 +1,4 @@
-"""Newton's method with line search on the total energy: slow and sure."""
+"""Newton's method with line search on the total energy: robust, but slow."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,15 +12,21 @@ from truespring.linear.gradients import IndefiniteError
 from truespring.potential import Projectable, SparseMatrix
 from truespring.solvers.balance import Balance, Found, Watch, stepped
 
-# Energies that differ by less than this share cannot be told apart; see `_search`.
-_DROWNED = 1e-9
-# Armijo's constant, and how far one backtracking step may cut (Nocedal and Wright, 3.1 and 3.5).
+# Relative differences of energy below this are rounding errors; see `_search`.
+_ENERGY_ROUNDING = 1e-9
+# Armijo's constant, and the bounds of a cut in backtracking (Nocedal and Wright, 3.1 and 3.5).
 _ARMIJO, _SHORTEST_CUT, _LONGEST_CUT = 1e-4, 0.1, 0.5
 _MIN_STEP, _LONGEST_STEP = 1e-9, 1024.0
 
 
 class Step(NamedTuple):
-    """A direction [m], the slope of the total energy along it [J], and whether it is Newton's own."""
+    """A search direction.
+
+    Attributes:
+        direction: [m], shape (n_nodes, dim).
+        slope: derivative of the total energy along it [J].
+        newton: whether it is the Newton step of the tangent itself.
+    """
 
     direction: Floats
     slope: float
@@ -28,25 +34,27 @@ class Step(NamedTuple):
 
 
 def descend(balance: Balance, load_factor: float, positions: Floats, undamped_iterations: int | None = None) -> Found:
-    """Find the balance from `positions`; where that fails, return the state with the least residual.
+    """Return the equilibrium found from `positions`, else the state of least residual.
 
-    With `undamped_iterations` Newton's full steps are taken, so many of them, wherever they lead.
+    `positions` [m] has shape (n_nodes, dim). With `undamped_iterations`, at most so many full Newton steps replace the
+    line search.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # of iterates that run away
+    with np.errstate(over="ignore", invalid="ignore"):  # of iterates that diverge
         return _descend(balance, load_factor, positions, undamped_iterations)
 
 
 def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_iterations: int | None) -> Found:
+    """Iterate as `descend` does, with floating point warnings."""
     watch = Watch(balance, load_factor, positions)
     for iteration in range((undamped_iterations or balance.max_iterations) + 1):
         if not watch.at(positions, iteration):
             break
         tangent = balance.hessian(positions, load_factor)
         if watch.balanced(tangent, positions):
-            del tangent  # the next one takes its room
+            del tangent  # its memory is used again
             return watch.equilibrium()
-        if undamped_iterations or watch.drowned:
-            moved = _leap(balance, positions, tangent, watch.force)
+        if undamped_iterations or watch.below_rounding:
+            moved = _full_step(balance, positions, tangent, watch.force)
         else:
             step = _step(balance, positions, tangent, watch.force, watch.residual)
             moved = step and _search(balance, load_factor, positions, step)
@@ -57,8 +65,8 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
     return watch.failure()
 
 
-def _leap(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
-    """Return where Newton's full step leads, None where there is no energy."""
+def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
+    """Return the positions after a full Newton step, None if there is none or its energy is not finite."""
     try:
         moved = positions - balance.ready(tangent, positions).solve(force)
     except (SingularMatrixError, IndefiniteError):
@@ -67,10 +75,10 @@ def _leap(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Flo
 
 
 def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats, residual: float) -> Step | None:
-    """Return a direction of descent: Newton's where the tangent is positive, else that of a positive neighbour."""
+    """Return a descent direction by the tangent if it is positive definite, else by an approximation that is."""
     if not np.isfinite(tangent.data).all():
         return None
-    for candidate in _positive_neighbours(balance, positions, tangent):
+    for candidate in _candidates(balance, positions, tangent):
         direction = stepped(balance, candidate, positions, -force, balance.accuracy(residual))
         if direction is None:
             continue
@@ -80,8 +88,8 @@ def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Flo
     return None
 
 
-def _positive_neighbours(balance: Balance, positions: Floats, tangent: SparseMatrix) -> Iterator[SparseMatrix]:
-    """Yield the tangent, its projection, then the projection with a growing share of its diagonal added."""
+def _candidates(balance: Balance, positions: Floats, tangent: SparseMatrix) -> Iterator[SparseMatrix]:
+    """Yield the tangent, its projection, then the projection plus a growing share of its diagonal."""
     yield tangent
     projected = tangent
     if isinstance(balance.potential, Projectable):
@@ -93,20 +101,21 @@ def _positive_neighbours(balance: Balance, positions: Floats, tangent: SparseMat
 
 
 def _search(balance: Balance, load_factor: float, positions: Floats, step: Step) -> Floats | None:
-    """Backtrack along a step until the total energy falls enough; None where it never does.
+    """Return the positions after a step that reduces the total energy enough, by backtracking; None if there is none.
 
-    Near equilibrium the fall drowns in the rounding of the energy; there the slope decides
-    (the approximate Wolfe condition of Hager and Zhang 2005). A step that is not Newton's own
-    is often too short, as when a straight column begins to buckle: it is doubled while it descends.
+    Near equilibrium the decrease is below the rounding error of the energy; there the slope decides (the approximate
+    Wolfe condition of Hager and Zhang 2005). A step that is not the Newton step of the tangent is often too short, as
+    when a straight column begins to buckle: it is doubled while the energy falls.
     """
     energy, size = balance.total_energy(positions, load_factor)
 
     def descends(moved: Floats, length: float) -> bool:
+        """Return whether a step of this length reduces the energy enough."""
         there, size_there = balance.total_energy(moved, load_factor)
         if not np.isfinite(there) or there <= energy + _ARMIJO * length * step.slope:
             return bool(np.isfinite(there))
-        drowned = there - energy <= _DROWNED * max(size, size_there)
-        return bool(drowned and (step.direction * balance.force(moved, load_factor)).sum() <= -step.slope / 2)
+        equal = there - energy <= _ENERGY_ROUNDING * max(size, size_there)
+        return bool(equal and (step.direction * balance.force(moved, load_factor)).sum() <= -step.slope / 2)
 
     length = 1.0
     while not descends(moved := positions + length * step.direction, length):

@@ -1,9 +1,9 @@
-"""Newton's method with mixed integration points: few iterations, even to large rotations in one step.
+"""Newton's method with mixed integration points: few iterations, even for large rotations in one step.
 
-The stress of each spring or element is an unknown of its own, eliminated on the spot: the geometric part
-of the tangent is built from the stress carried on linearly along the last step, not from that of the
-positions (Magisano, Leonetti, Garcea, CMAME 313, 2017). The balance itself is that of the positions. There
-is no line search: where it does not converge, the caller has another way.
+The stress of each spring or element is an additional unknown, which is eliminated locally: the geometric part of the
+tangent uses the stress extrapolated linearly along the last step, not that of the positions (Magisano, Leonetti,
+Garcea, CMAME 313, 2017). The residual is that of the positions. There is no line search: if the iteration does not
+converge, the caller uses another method.
 """
 
 from typing import NamedTuple
@@ -14,14 +14,20 @@ from truespring.arrays import Floats
 from truespring.potential import Projectable, SparseMatrix, Stressed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Watch, stepped
 
-# It converges in less than ten iterations or hardly ever.
+# Largest number of iterations: it converges in less than ten, or hardly ever.
 _MAX_ITERATIONS = 20
-# Steps into states without energy, an element turned inside out, are halved so often.
+# Largest number of halvings of a step to a state without finite energy (an inverted element).
 _MAX_HALVINGS = 5
 
 
 class Start(NamedTuple):
-    """Where to start: positions [m], the stress there, and a motion of held nodes still to be made [m]."""
+    """Start of an iteration.
+
+    Attributes:
+        positions: [m], shape (n_nodes, dim).
+        stress: stress of the potential, see Stressed.stress.
+        motion: prescribed motion that the first step adds [m], shape (n_nodes, dim); None if there is none.
+    """
 
     positions: Floats
     stress: Floats
@@ -29,7 +35,7 @@ class Start(NamedTuple):
 
 
 def start_from(balance: Balance, level: float, last: Equilibrium, previous: Equilibrium | None) -> Start | None:
-    """Return the start for a load level after one or two former states; None where the potential has no stress."""
+    """Return the start for a load level, extrapolated from one or two previous states; None without a stress."""
     potential, loading = balance.potential, balance.loading
     if not isinstance(potential, Stressed):
         return None
@@ -46,14 +52,15 @@ def start_from(balance: Balance, level: float, last: Equilibrium, previous: Equi
 
 
 def converge(balance: Balance, load_factor: float, start: Start) -> Found:
-    """Find the balance from a start; where that fails, return the state with the least residual."""
-    with np.errstate(over="ignore", invalid="ignore"):  # of iterates that run away
+    """Return the equilibrium found from a start, else the state of least residual."""
+    with np.errstate(over="ignore", invalid="ignore"):  # of iterates that diverge
         return _converge(balance, load_factor, start)
 
 
 def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
+    """Iterate as `converge` does, with floating point warnings."""
     potential = balance.potential
-    assert isinstance(potential, Stressed)  # it gave the start
+    assert isinstance(potential, Stressed)  # `start_from` checked it
     positions, stress, motion = start
     watch = Watch(balance, load_factor, positions)
     for iteration in range(min(_MAX_ITERATIONS, balance.max_iterations) + 1):
@@ -61,7 +68,7 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
             break
         tangent = balance.hessian(positions, load_factor, stress)
         if motion is None and watch.balanced(tangent, positions):
-            del tangent  # the next one takes its room
+            del tangent  # its memory is used again
             return watch.equilibrium()
         step = _step(balance, positions, tangent, watch, motion)
         del tangent
@@ -77,7 +84,10 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
 def _step(
     balance: Balance, positions: Floats, tangent: SparseMatrix, watch: Watch, motion: Floats | None
 ) -> Floats | None:
-    """Return Newton's step, the motion of held nodes in it; None where there is none."""
+    """Return the Newton step with the motion of held nodes [m], shape (n_nodes, dim); None if there is none.
+
+    If the tangent is not positive definite, the projected Hessian replaces it.
+    """
     for candidate in (tangent, None):
         if candidate is None:
             if not isinstance(balance.potential, Projectable):
@@ -93,7 +103,10 @@ def _step(
 
 
 def _moved(balance: Balance, positions: Floats, step: Floats, max_halvings: int) -> tuple[Floats, Floats] | None:
-    """Return positions and the stress carried on; a step to where there is no energy is halved, or None."""
+    """Return positions after a step, and the stress extrapolated along it; None if the energy is not finite.
+
+    A step to a state without finite energy is halved up to `max_halvings` times.
+    """
     potential = balance.potential
     assert isinstance(potential, Stressed)
     for _ in range(max_halvings + 1):

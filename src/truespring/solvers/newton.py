@@ -1,4 +1,4 @@
-"""Newton's method along a load path: load steps, cut back and grown, from no load to the full one."""
+"""Newton's method with load steps of adaptive size, from no load to the full load."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -18,27 +18,26 @@ from truespring.solvers.cost import Cost
 from truespring.solvers.line_search import descend
 from truespring.solvers.solver import Geometry, Solver
 
-#: What `method` may be: how balance is found at a load level.
+#: Allowed values of `method`.
 METHODS = ("auto", "mixed", "line-search")
 
-# A body that moves so many times as far as the step before lets expect may have snapped.
+# A body that moves by more than this multiple of what the previous step suggests may have snapped through.
 _SNAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Newton(Solver):
-    """Full Newton with load steps: cut back where they fail, grown again where they succeed.
+    """Newton's method with load steps, halved if they fail and doubled again if they succeed.
 
     Attributes:
-        load_steps: the levels k / load_steps are all reached and recorded.
-        tolerance: relative residual at which a state counts as balanced [-].
-        max_iterations: Newton iterations at one level before its step is cut back.
-        max_cutbacks: how often a load step may be halved.
-        method: "auto" takes Newton's method with mixed integration points where the potential has a stress
-            and, where that finds no stable state nearby, line search on the energy; "mixed" and
-            "line-search" take nothing else.
-        linear: "auto" by size and dimension; "multigrid"; "direct", the best library there is; or one of
-            them by name: "scipy", "rslab", "pardiso".
+        load_steps: number of load steps; the states at k / load_steps are all computed and recorded.
+        tolerance: relative residual below which a state is in equilibrium [-].
+        max_iterations: Newton iterations at one level before its step is halved.
+        max_cutbacks: largest number of halvings of a load step.
+        method: "auto" uses mixed integration points if the potential has a stress, and line search on the energy if
+            these find no stable state nearby; "mixed" and "line-search" use one of them only.
+        linear: "auto" chooses by size and dimension; "multigrid"; "direct" for the first installed library of
+            factorisations, or one of them: "scipy", "rslab", "pardiso".
     """
 
     load_steps: int = 10
@@ -52,7 +51,7 @@ class Newton(Solver):
         if self.load_steps < 1 or self.max_iterations < 1 or self.max_cutbacks < 0:
             raise ProblemError("load_steps and max_iterations must be at least 1, max_cutbacks at least 0")
         if not 0 < self.tolerance < 1:
-            raise ProblemError(f"tolerance = {self.tolerance}: a relative residual between 0 and 1 is wanted")
+            raise ProblemError(f"tolerance = {self.tolerance}: must be between 0 and 1")
         if self.method not in METHODS:
             raise ProblemError(
                 f"method = '{self.method}' is unknown{nearest(self.method, METHODS)}; allowed: {', '.join(METHODS)}"
@@ -68,9 +67,9 @@ class Newton(Solver):
     ) -> Iterator[Equilibrium]:
         """Yield the equilibria from load factor 0 to 1 in order.
 
-        Where a level cannot be reached the last one yielded is not converged: the best state there.
-        Equilibria whose positions `geometry` does not admit (an inverted element) are taken only from where
-        the smallest load step leads to no other. A body unstable without load ends there.
+        If a level cannot be reached, the last state is that of least residual there, not converged. Equilibria that
+        `geometry` does not admit (an inverted element) are accepted only if the smallest load step leads to no other.
+        If the body is unstable without load, that state is the only one.
         """
         admissible = (geometry or Geometry()).admissible
         linear = choose(self.linear, potential.nodes, loading.held)
@@ -102,11 +101,11 @@ class Newton(Solver):
             yield self._with_cost(state, balance)
 
     def starting_at(self, start: Callable[[Potential], Floats], max_iterations: int) -> "Nearby":
-        """Return Newton's method at full load alone, from the positions that `start` returns."""
+        """Return Newton's method at full load only, from the positions that `start` returns for a potential."""
         return Nearby(1, self.tolerance, max_iterations, method=self.method, linear=self.linear, start=start)
 
     def _with_cost(self, state: Equilibrium, balance: Balance) -> Equilibrium:
-        """Add what was spent so far."""
+        """Return a state with methods and costs up to now."""
         from truespring.kernels.threads import n_threads
 
         return replace(
@@ -125,7 +124,7 @@ class Newton(Solver):
         )
 
     def _searches(self, balance: Balance) -> bool:
-        """Whether line search is the first choice."""
+        """Return whether line search is the first method."""
         return self.method == "line-search" or not isinstance(balance.potential, Stressed)
 
     def _find(
@@ -149,22 +148,26 @@ class Newton(Solver):
         return searched._replace(state=replace(searched.state, iterations=spent))
 
     def _find_mixed(self, balance: Balance, level: float, last: Equilibrium, previous: Equilibrium | None) -> Found:
+        """Return the equilibrium at `level` by mixed integration points."""
         start = mixed.start_from(balance, level, last, previous)
         assert start is not None  # the potential has a stress
         return mixed.converge(balance, level, start)
 
     def _next_level(self, load_factor: float, step: float) -> float:
-        """Return the level a step further, but no further than the next requested one."""
+        """Return the load factor plus a step, at most the next of k / load_steps."""
         requested = (np.floor(load_factor * self.load_steps + 1e-9) + 1) / self.load_steps
         return float(requested if load_factor + step > requested - 1e-9 else load_factor + step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearby(Newton):
-    """Newton's method at full load alone, from the positions that `start` gives for the nodes of the potential [m].
+    """Newton's method at full load only, from given positions.
 
-    The path has this one state, on the same branch as the start. `start` is asked for shape (n_nodes, dim); where
-    motion is prescribed it is made exact here.
+    The path has one state, on the branch of the start.
+
+    Attributes:
+        start: returns the positions of the nodes of a potential [m], shape (n_nodes, dim); prescribed directions are
+            overwritten. None starts from the undeformed body.
     """
 
     start: Callable[[Potential], Floats] | None = None
@@ -176,7 +179,7 @@ class Nearby(Newton):
         report: Reporter | None = None,
         geometry: Geometry | None = None,
     ) -> Iterator[Equilibrium]:
-        """Yield the state at full load; not converged where it was not found from there."""
+        """Yield the state at full load; not converged if no equilibrium was found from the start."""
         admissible = (geometry or Geometry()).admissible
         balance = Balance(
             potential,
@@ -199,18 +202,18 @@ class Nearby(Newton):
 def _doubt(
     state: Equilibrium, last: Equilibrium, previous: Equilibrium | None, admissible: Callable[[Floats], bool]
 ) -> str:
-    """Why a state is not taken without line search, empty where it is: one that is not on the path may be anywhere."""
+    """Return why a state found without line search may not be on the path, empty if it is accepted."""
     if not state.converged:
         return "did not converge"
     if state.negative_eigenvalues:
         return "led to an unstable state"
     if not admissible(state.positions):
-        return "turned an element inside out"
-    return "led far away" if _snapped(state, last, previous) else ""
+        return "inverted an element"
+    return "led to a distant state" if _snapped(state, last, previous) else ""
 
 
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
-    """Return the equilibrium at `level` by line search, from the prediction with the least unbalanced force."""
+    """Return the equilibrium at `level` by line search, from the prediction of least unbalanced force."""
     guesses = [
         guess
         for guess in _predictions(balance, level, last, previous)
@@ -224,7 +227,7 @@ def _find_by_search(balance: Balance, level: float, last: Found, previous: Equil
 
 
 def _predictions(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Iterator[Floats]:
-    """Yield starting points for a level: where the last one ended, along the tangent, and by extrapolation."""
+    """Yield start positions for a level [m]: those of the last state, along the tangent, and by extrapolation."""
     state, loading = last.state, balance.loading
     advance = level - state.load_factor
     motion = loading.motion(level) - loading.motion(state.load_factor)
@@ -242,7 +245,7 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
 
 
 def _snapped(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None) -> bool:
-    """Tell whether a body moved much further in this step than the step before lets expect."""
+    """Return whether a body moved much further in this step than the previous step suggests."""
     if previous is None or state.branched:
         return False
     ratio = (state.load_factor - last.load_factor) / (last.load_factor - previous.load_factor)

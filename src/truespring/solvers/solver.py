@@ -1,4 +1,4 @@
-"""A solver: how equilibria are found, and what the rest of the code asks of it."""
+"""Base class of solvers."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,20 +13,22 @@ from truespring.solvers.balance import Equilibrium, Reporter
 
 
 def _admits_all(positions: Floats) -> bool:
+    """Admit any positions."""
     return True
 
 
 def _selects_none(on: Any) -> Ints:
-    raise ProblemError(f"on = {on!r}: a potential alone has no named places")
+    """Raise ProblemError: without a mesh there is nothing to select on."""
+    raise ProblemError(f"on = {on!r}: a potential without a mesh has no selections")
 
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """The body around a potential: what a solver may ask beside energy and forces.
+    """Functions of the mesh that a solver may use.
 
     Attributes:
-        admissible: whether positions [m], shape (n_nodes, dim), leave every element upright.
-        select: returns the numbers of the nodes at a place of the body, as supports and loads name it, shape (n,).
+        admissible: returns whether positions [m], shape (n_nodes, dim), leave all elements uninverted.
+        select: returns the node numbers of a selection, shape (n,); selections are those of supports and loads.
     """
 
     admissible: Callable[[Floats], bool] = _admits_all
@@ -34,15 +36,15 @@ class Geometry:
 
 
 class Solver:
-    """How equilibria are found. A subclass gives `follow`; the other answers have defaults.
+    """A method to compute equilibria. Subclasses define `follow`; everything else has a default.
 
-    A class of the user's own need not derive from it: `solve` takes any object with a method `follow`. See `as_solver`.
+    A user-defined class need not derive from it: `solve` accepts any object with a method `follow`, see `as_solver`.
 
     Attributes:
-        follows_load: whether the load is applied in steps, and each level k / load_steps is among the equilibria.
-        keeps_to_stable_states: whether an unstable equilibrium is a failure, not a part of the path.
-        load_steps: the number of levels.
-        linear: how linear systems are solved at the equilibria, see Newton.
+        follows_load: whether the load is applied in steps, with equilibria at all levels k / load_steps.
+        keeps_to_stable_states: whether an unstable equilibrium is a failure.
+        load_steps: number of levels.
+        linear: linear solver, see Newton; used where equilibria are analysed further.
     """
 
     __slots__ = ()
@@ -55,29 +57,34 @@ class Solver:
     def follow(
         self, potential: Potential, loading: Loading, report: Reporter | None = None, geometry: Geometry | None = None
     ) -> Iterator[Equilibrium]:
-        """Yield the equilibria in path order, first the body without load.
+        """Yield the equilibria in the order of the path, that without load first.
 
-        `report` is called after each iteration. Where a state cannot be reached the last one yielded has
-        `converged = False`: the best state there.
+        If a state cannot be reached, the last one yielded is that of least residual there, with `converged` false.
+
+        Args:
+            potential: elastic energy.
+            loading: loads and prescribed motion.
+            report: called after each iteration with load factor, iteration and relative residual.
+            geometry: functions of the mesh; None if the potential has no mesh.
         """
         raise NotImplementedError(f"{type(self).__name__} has no method follow(potential, loading, report, geometry)")
 
     def check(self, loading: Loading, geometry: Geometry) -> None:
-        """Raise ProblemError where the solver does not fit the loading or the body; solve nothing."""
+        """Raise ProblemError if the solver does not fit the loading or the mesh; solve nothing."""
 
     def starting_at(self, start: Callable[[Potential], Floats], max_iterations: int) -> "Solver | None":
-        """Return a solver for full load alone that starts at given positions; None where there is none.
+        """Return a solver for full load only that starts at given positions, None if the solver has no such variant.
 
-        `start` returns the positions for the nodes of a potential [m], shape (n_nodes, dim).
+        `start` returns the positions of the nodes of a potential [m], shape (n_nodes, dim).
         """
         return None
 
 
 def as_solver(given: Any) -> Solver:
-    """Return a solver, or a user's object with a method `follow`, as a Solver; raise ProblemError for anything else."""
+    """Return a solver, or any object with a method `follow`, as a Solver; raise ProblemError for other objects."""
     if not callable(getattr(given, "follow", None)):
         raise ProblemError(
-            f"{given!r} is no solver: give Newton(), DisplacementControl(...), ArcLength(...) or an object with a "
-            "method follow(potential, loading, report, geometry)"
+            f"{given!r} is not a solver; allowed: Newton(), DisplacementControl(...), ArcLength(...) or an object with "
+            "a method follow(potential, loading, report, geometry)"
         )
     return completed(given, Solver)

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from truespring.arrays import Floats
-from truespring.comparison import Decisive, SupportError, compare, largest
+from truespring.comparison import compare
+from truespring.support_errors import Decisive, SupportError, largest
 from truespring.validity.reference import Reference
 from truespring.validity.solving import Solved, conjugate_force
 
@@ -130,7 +131,7 @@ def _apart(levels: Sequence[tuple[SupportError, ...]]) -> list[Floats]:
     """How far forces and torques of moved supports are apart, relative, a row a level; zero where they vanish."""
     found = []
     for several in zip(*levels, strict=True):
-        for parts in ([one.force_apart for one in several], [one.torque_apart for one in several]):
+        for parts in ([one.force_difference for one in several], [one.torque_difference for one in several]):
             known = next((part for part in parts if part is not None), None)
             if known is not None:
                 found.append(np.array([np.zeros_like(known) if part is None else part for part in parts]))
