@@ -280,7 +280,7 @@ def test_markers_in_the_body(folder: Path, tmp_path: Path, capsys: pytest.Captur
         ((f"{BENDING}:spring", BENDING), "did you mean 'springs'"),
         ((BENDING, EXAMPLES), "no summary.json"),
         ((BENDING, EXAMPLES / "tissue.geo"), ".frd, .dat, .vtu"),
-        ((BENDING, BENDING, "--unit", "kg"), "no unit of length"),
+        ((BENDING, BENDING, "--unit", "kg"), "unit = 'kg'"),
         ((BENDING, BENDING, "--unit", "other.frd=mm"), "'other.frd' is none of"),
         ((BENDING, BENDING, "--axes", "x,y"), "x, y and z are wanted"),
         ((BENDING, BENDING, "--shift", "1,2,3,4"), "two or three lengths"),

@@ -169,7 +169,7 @@ def test_a_body_that_goes_another_way_under_the_whole_load_at_once_is_told() -> 
     one = solve_springs(ts.Problem(network.mesh, supports=[ts.Fixed([0, 2, 4, 5])], loads=[load]), network, probe=1)
     assert one.state is not None and one.state.positions[1, 1] > 0
     text = text_of(one, "mujoco")
-    assert "did not settle on the equilibrium given here" in text
+    assert "did not settle" in text
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 5000)
@@ -480,7 +480,7 @@ def test_the_finite_element_twin_in_the_sofa_scene(scene_of: Callable[[Exported]
     corners = np.array(strip.one("MeshTopology")["position"])[triangles]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
     assert len(areas) == 2 * 8 * 4 and areas == pytest.approx(np.full(64, 5e-5))
-    centres = corners.mean(axis=1).reshape(-1, 2, 3).mean(axis=1)[:, :2]
+    centres = corners.mean(axis=1).reshape(2, -1, 3).mean(axis=0)[:, :2]
     assert centres == pytest.approx(exported("pressed").problem.mesh.centres)
     elements = strip.one("TriangleFEMForceField")
     assert (elements["youngModulus"], elements["poissonRatio"]) == ([10e3], [0.25])
@@ -517,8 +517,8 @@ def test_files_tell_units_supports_loads_and_what_to_expect(case: str, target: s
     assert vector is not None and int(vector[1]) == one.probe
     for text_, wanted in ((vector[2], one.problem.mesh.nodes), (vector[3], expected(case))):
         assert [float(part) for part in text_.split(",")] == pytest.approx(wanted[one.probe], rel=1e-8, abs=1e-15)
-    assert ("dead force" in head) == (case == "pressed")
-    assert ("turned places" in head) == (case == "turned")
+    assert ("dead forces" in head) == (case == "pressed")
+    assert ("rotated positions" in head) == (case == "turned")
 
 
 # --- the contract of every target ------------------------------------------------------------------------------------
@@ -562,7 +562,7 @@ def test_a_target_takes_what_it_names_and_no_more(
             check_targets([name], problem, model)
             assert target_files(solved, [name])[name]
             continue
-        words = re.escape(f"{target.program} takes no {feature}: ") + f".*; targets that take it: {', '.join(taking)}$"
+        words = re.escape(target.program) + f" .*{feature}: .*targets .*: {', '.join(taking)}$"
         with pytest.raises(ExportError, match=words):
             ts.export(problem, model, name, tmp_path)
         with pytest.raises(ExportError, match=words):
@@ -653,7 +653,7 @@ def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_p
 
 
 def test_models_and_targets_that_are_none_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="no model of springs"):
+    with pytest.raises(ExportError, match=r"Fem.*Springs\(rule"):
         ts.export(_pulled(), ts.Fem("linear"), "npz", tmp_path)  # type: ignore[arg-type]
     with pytest.raises(ExportError, match="did you mean 'mujoco'"):
         ts.export(_pulled(), ts.Springs("isotropic"), "mujocco", tmp_path)
@@ -732,7 +732,7 @@ def test_springs_that_do_not_get_there_are_written_all_the_same(
     assert json.loads(told.out)["mujoco"]["status"] != "converged"
     text = (tmp_path / "study" / "springs.xml").read_text(encoding="utf-8")
     if json.loads(told.out)["mujoco"]["load_factor"] < 1:
-        assert "Expect nothing: full load was not reached here" in text
+        assert "full load was not reached" in text and "Expected at full load" not in text
         assert json.loads(told.out)["mujoco"]["probe"]["displacement"] is None
     assert mujoco.MjModel.from_xml_string(text).ntendon > 0
 

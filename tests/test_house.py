@@ -54,6 +54,7 @@ ALLOWED = {
         "support_errors",
         "equilibrium",
         "converging",
+        "richardson",
         "models",
         "solvers",
         "potential",
@@ -95,6 +96,7 @@ ALLOWED = {
         "units",
     },
     "converging": {
+        "richardson",
         "comparison",
         "equilibrium",
         "mesh",
@@ -138,7 +140,7 @@ ALLOWED = {
     },
     "comparison": {"carrying", "support_errors", "solution", "problem", "mesh"},
     "support_errors": {"reactions", "solution"},
-    "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh"},
+    "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh", "richardson"},
     "carrying": {"solution", "problem", "mesh"},
     "misfit": {"comparison", "solution"},
     "reference": {
@@ -193,6 +195,7 @@ ALLOWED = {
     "mesh": {"units"},
     "material": set(),
     "columns": {"units"},
+    "richardson": set(),
     "units": set(),
     "outputs": set(),
     "kernels": set(),

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from tests.test_calculix_decks import among, model_and_steps
 from truespring.arrays import Bools, Floats
-from truespring.errors import ExportError, ProblemError, TruespringError
+from truespring.errors import ExportError, ProblemError
 from truespring.exports import TARGETS, Exported, check_targets, solve_springs
+from truespring.exports.calculix import fem_deck
+from truespring.exports.features import Feature
 from truespring.loading import LOADS, Body, DeadLoad, Load, LoadKind, Mark, Quantity, Spread, selection_words
 from truespring.mesh import Selection, corner_measures, facets_within, loaded, refined, select
 from truespring.models import Springs
@@ -284,16 +287,38 @@ def solved(key: str) -> Exported:
 
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("key", ALL)
-def test_a_load_is_exported_or_refused_with_a_reason(key: str, target: str) -> None:
+def test_a_target_exports_a_load_or_states_why_not(key: str, target: str) -> None:
     found = solved(key)
-    words = found.problem.loads[0].words()
-    try:
-        check_targets([target], found.problem, found.path.potential)  # type: ignore[arg-type]
-        files = TARGETS[target].files(found)
-    except TruespringError as error:
-        assert isinstance(error, ExportError)
-        if found.problem.loads[0].follows:
-            assert words in str(error) and found.problem.loads[0].instead in str(error)
+    (load,), springs = found.problem.loads, found.path.potential
+    if load.follows and Feature.FOLLOWING not in TARGETS[target].takes:
+        with pytest.raises(ExportError) as raised:
+            check_targets([target], found.problem, springs)  # type: ignore[arg-type]
+        assert load.words() in str(raised.value) and load.instead in str(raised.value)
         return
+    check_targets([target], found.problem, springs)  # type: ignore[arg-type]
+    files = TARGETS[target].files(found)
     texts = [content for content in files.values() if isinstance(content, str)]
-    assert files and all(words in " ".join(text.split()).replace("** ", "") for text in texts if "Load 1" in text)
+    listed = [" ".join(text.split()).replace("** ", "") for text in texts if "Load 1" in text]
+    assert files and all(load.words() in text for text in listed)
+
+
+@pytest.mark.parametrize("law", ["linear", "saint-venant-kirchhoff"])
+@cases
+def test_a_deck_of_finite_elements_has_the_load_or_states_why_not(key: str, dim: int, law: str) -> None:
+    """As *DLOAD if the load has a keyword, else as nodal forces: a moment only under the linear law."""
+    problem, level = problem_of(key, dim), 0.5
+    (load,) = problem.loads
+    by_keyword = load.cards(problem.mesh)
+    if load.follows and not by_keyword and law != "linear":
+        with pytest.raises(ExportError) as raised:
+            fem_deck(problem, [level], law)
+        assert load.words() in str(raised.value) and load.instead in str(raised.value)
+        return
+    _, (step,) = model_and_steps(fem_deck(problem, [level], law))
+    assert bool(among(step, "DLOAD")) == bool(by_keyword) and bool(among(step, "CLOAD")) == (not by_keyword)
+    if not by_keyword:
+        found = np.zeros(problem.mesh.nodes.shape)
+        for node, axis, force in among(step, "CLOAD")[0].rows:
+            found[int(node) - 1, int(axis) - 1] = 1e-6 * float(force)  # in uN
+        expected = level * forces(problem, problem.mesh.nodes)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-12 * np.abs(expected).max())

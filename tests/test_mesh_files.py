@@ -279,7 +279,7 @@ def test_the_scale_is_the_unit(tmp_path: Path) -> None:
     write_inp(file, mesh)
     assert (read_mesh(str(file), unit="mm").nodes == mesh.nodes * 1e-3).all()
     for scale in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(MeshError, match=r"mesh\.inp: unit: "):
+        with pytest.raises(MeshError, match=r"mesh\.inp: unit = "):
             read_mesh(file, scale)
 
 
@@ -296,10 +296,10 @@ SQUARE = """*NODE
 TWO_QUADS = SQUARE + "*ELEMENT, TYPE=CPS4, ELSET=Body\n1, 1, 2, 3, 4\n2, 2, 5, 6, 3\n"
 
 
-def deck(tmp_path: Path, text: str, scale: float = 1.0) -> ts.Mesh:
+def deck(tmp_path: Path, text: str, unit: str | float = "m") -> ts.Mesh:
     file = tmp_path / "deck.inp"
     file.write_text(text)
-    return read_mesh(file, scale)
+    return read_mesh(file, unit)
 
 
 def grid(tmp_path: Path, points: Floats | list[list[float]], cells: list[tuple[str, Ints]], **data: object) -> ts.Mesh:

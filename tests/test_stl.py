@@ -364,7 +364,7 @@ def test_a_missing_file_and_a_folder_are_refused(bent: ts.Solution, tmp_path: Pa
 
 @pytest.mark.parametrize("unit", ["", "metre square", "kPa", "furlongs2", "0 m", "5", "m/s"])
 def test_a_unit_of_no_length_is_refused(bent: ts.Solution, tmp_path: Path, unit: str) -> None:
-    with pytest.raises(ReferenceFileError, match=r"a\.stl: unit = '.*' is no unit of length"):
+    with pytest.raises(ReferenceFileError, match=r"a\.stl: unit = '.*'"):
         read_stl(bent.problem, tmp_path / "a.stl", unit=unit)
 
 

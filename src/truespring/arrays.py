@@ -1,5 +1,7 @@
 """Array types, and read-only copies of arrays."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +38,11 @@ def frozen_ints(values: object, shape: tuple[int | None, ...], name: str) -> Int
     _check_shape(array.shape, shape, name)
     array.setflags(write=False)
     return array
+
+
+def along_axes(vectors: Floats, axes: Sequence[str]) -> Floats:
+    """Return vectors, shape (n, 3), along other axes: component i is that along axes[i], such as "x" or "-z"."""
+    return np.stack([(-1.0 if axis[0] == "-" else 1.0) * vectors[:, "xyz".index(axis[-1])] for axis in axes], axis=1)
 
 
 def in_space(vectors: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints, in_space
+from truespring.arrays import Floats, Ints, along_axes, in_space
 from truespring.comparison import Comparison
 from truespring.solution import Solution
 
@@ -147,20 +147,15 @@ def _fits(mine: _Box, theirs: _Box, tolerance: float) -> bool:
 
 def _moved(box: _Box, misfit: Misfit) -> _Box:
     """Return a box after a change of unit, axes and origin."""
-    ends = np.stack([_turned(corner[None], misfit.axes)[0] for corner in (box.lower, box.upper)])
+    ends = np.stack([along_axes(corner[None], misfit.axes)[0] for corner in (box.lower, box.upper)])
     low, high = misfit.factor * np.fmin(*ends), misfit.factor * np.fmax(*ends)
     return _Box(low + np.array(misfit.shift), high + np.array(misfit.shift), box.filled)
-
-
-def _turned(vectors: Floats, axes: tuple[str, ...]) -> Floats:
-    """Return vectors of shape (n, 3) along other axes, shape (n, 3)."""
-    return np.stack([(-1.0 if axis[0] == "-" else 1.0) * vectors[:, "xyz".index(axis[-1])] for axis in axes], axis=1)
 
 
 def _axes() -> Iterator[tuple[str, ...]]:
     """Yield all axes but ("x", "y", "z"), right-handed ones first."""
     order = [
-        (float(np.linalg.det(_turned(np.eye(3), axes))), axes)
+        (float(np.linalg.det(along_axes(np.eye(3), axes))), axes)
         for letters in itertools.permutations("xyz")
         for signs in itertools.product(("", "-"), repeat=3)
         for axes in [tuple(sign + letter for sign, letter in zip(signs, letters, strict=True))]
@@ -204,8 +199,8 @@ def _sampled_error(path: Solution, reference: Solution, places: Misfit, motion: 
     if state is None or theirs is None or not other.fills:
         return 0.0
     some, change = _some(len(grid.points)), motion or places
-    moved = change.factor * _turned(in_space((state.all_positions - grid.points)[some]), change.axes)
-    rest = places.factor * _turned(in_space(grid.points[some]), places.axes) + np.array(places.shift)
+    moved = change.factor * along_axes(in_space((state.all_positions - grid.points)[some]), change.axes)
+    rest = places.factor * along_axes(in_space(grid.points[some]), places.axes) + np.array(places.shift)
     dim = min(other.dim, grid.dim)
     if other.dim == 3 and grid.dim == 2:
         rest[:, 2] = (other.points[:, 2].min() + other.points[:, 2].max()) / 2

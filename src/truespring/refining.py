@@ -31,6 +31,7 @@ from truespring.models.bending import cell_counts
 from truespring.models.interpolation import SIMPLICES
 from truespring.potential import Potential
 from truespring.problem import Problem, Region
+from truespring.richardson import remaining_error
 from truespring.solvers import Newton, Solver, as_solver
 
 #: Assumed order of convergence: the lowest observed, at clamps and corners. Bodies without these have order 2 or more;
@@ -164,7 +165,8 @@ def _from_coarser(path: Solution, model: Model, solver: Solver, most_work: float
         against = compare(coarse, path)
     except TruespringError as error:
         return OwnError(None, str(error))
-    return OwnError(None if against.error is None else against.error / (2**ORDER - 1), "coarser", work=work_of(coarse))
+    value = None if against.error is None else remaining_error(against.error, ORDER)
+    return OwnError(value, "coarser", work=work_of(coarse))
 
 
 def _whole(distance: float, left: float) -> float:

@@ -89,6 +89,14 @@ def _check_case(text: str, dimension: Dimension) -> None:
         )
 
 
+def unit_of(unit: str | float, dimension: Dimension, key: str, error: type[TruespringError]) -> float:
+    """Return `unit_size`; raise `error`, with the key and the unit, if it is not a unit of the dimension."""
+    try:
+        return unit_size(unit, dimension)
+    except TruespringError as found:
+        raise error(f"{key} = {shown(unit)}: {found}") from None
+
+
 # A decimal number, then a product or quotient of unit names with small powers. pint alone would evaluate any
 # expression, and would read "1,5 N" as 15 N.
 _NAME = r"[^\W\d_]+(?:\s*(?:\^|\*\*)\s*-?\d|[²³])?"

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from truespring.richardson import observed_order, remaining_error
+
 # Orders between these are believed: below nothing settles, above chance has a hand in it.
 _LOWEST_ORDER, _HIGHEST_ORDER = 0.3, 6.0
 # A quantity this much smaller than the largest of its kind is rounding.
@@ -169,13 +171,12 @@ def settle(name: str, quantity: str, unit: str, n_nodes: list[int], values: list
     if len(values) > 1:
         error = abs(values[-1] - values[-2]) / size if size else 0.0
     if len(values) > 2:
-        before, last = values[-3] - values[-2], values[-2] - values[-1]
-        if last and before / last > 0:
-            found = math.log2(before / last)
-            if _LOWEST_ORDER <= found <= _HIGHEST_ORDER:
-                order = found
-                extrapolated = values[-1] - last / (2**found - 1)
-                error = abs(values[-1] - extrapolated) / abs(extrapolated) if extrapolated else None
+        last = values[-2] - values[-1]
+        found = observed_order(values[-3] - values[-2], last)
+        if found is not None and _LOWEST_ORDER <= found <= _HIGHEST_ORDER:
+            order = found
+            extrapolated = values[-1] - remaining_error(last, order)
+            error = abs(values[-1] - extrapolated) / abs(extrapolated) if extrapolated else None
     settled = error is not None and error <= tolerance and len(values) >= _MESHES
     return Settling(name, quantity, unit, tuple(n_nodes), tuple(values), order, extrapolated, error, settled)
 

@@ -1,4 +1,4 @@
-"""Springs for other simulators: a target is one function that returns files, and one line in TARGETS."""
+"""Export of spring models to other programs: each target is a function that returns files, and an entry of TARGETS."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -28,15 +28,15 @@ Files = Mapping[str, str | bytes]
 
 @dataclass(frozen=True)
 class Target:
-    """Where springs are carried to.
+    """A program or format that spring models are exported to.
 
     Attributes:
-        files: writes solved springs, of what the target takes, as files.
-        about: what they are, in a sentence.
-        program: its name in errors.
-        names: the files that it writes; all but the first may be missing where they do not apply.
-        takes: the features of springs and loads that it takes; for all others `check_targets` raises ExportError.
-        unrun: why no test runs the program itself on the files, in a sentence; empty where one does.
+        files: returns the files of solved springs, whose features are all in `takes`.
+        about: one-line description of the files.
+        program: name in error messages.
+        names: names of the files; all but the first are optional.
+        takes: supported features of springs and loads; any other makes `check_targets` raise ExportError.
+        unrun: why no test runs the program on the files; empty if a test does.
     """
 
     files: Callable[[Exported], Files]
@@ -69,7 +69,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
         ),
         "mujoco": Target(
             mujoco,
-            "MuJoCo's MJCF: springs.xml of sliding bodies and tendons",
+            "MuJoCo MJCF: springs.xml of bodies on slide joints and spatial tendons",
             "MuJoCo",
             ("springs.xml",),
             _FOLLOWED,
@@ -80,7 +80,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             "SOFA",
             ("springs_scene.py",),
             _FOLLOWED | {Feature.NEGATIVE},
-            unrun="SOFA was not run; the scene is checked against its sources",
+            unrun="SOFA was not run; the scene is checked against the source code of SOFA",
         ),
         "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL),
         "json": Target(as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL),
@@ -97,11 +97,11 @@ def export(
     title: str = "Springs",
     probe: int | None = None,
 ) -> tuple[Path, ...]:
-    """Solve springs and write them for another simulator into `folder`; return the files written.
+    """Solve a spring model, write it to `folder` for another program, and return the files written.
 
-    `target` is a key of TARGETS. Files tell units, supports, loads, and what our equilibrium is at full load at the
-    node `probe`, by default the one that moves most. Raises ExportError for a target that is unknown or cannot
-    express the model.
+    `target` is a key of TARGETS. Each file states units, supports, loads and the displacement of the node `probe` at
+    full load, by default the free node that moves most. Raises ExportError if the target is unknown or does not
+    support the model.
     """
     known_targets([target])
     check_targets([target], problem, model)
@@ -110,7 +110,7 @@ def export(
 
 
 def known_targets(names: Iterable[str]) -> tuple[str, ...]:
-    """Return each name once; raise ExportError for one that is no target."""
+    """Return the distinct names, in order; raise ExportError for a name that is not in TARGETS."""
     several = tuple(dict.fromkeys(names))
     for name in several:
         if name not in TARGETS:
@@ -119,9 +119,9 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_targets(names: Collection[str], problem: Problem, model: Model) -> None:
-    """Raise ExportError for what a target cannot take, and for two that write one file; solve nothing."""
+    """Raise ExportError for an unsupported feature, and for two targets that write the same file; solve nothing."""
     if not as_model(model).has_springs:
-        raise ExportError(f"{model!r} is no model of springs: give Springs(rule=...) or a SpringNetwork")
+        raise ExportError(f"{model!r} is not a spring model: use Springs(rule=...) or a SpringNetwork")
     springs = spring_data(model.potential(problem))
     written: dict[str, str] = {}
     for name in names:
@@ -130,29 +130,29 @@ def check_targets(names: Collection[str], problem: Problem, model: Model) -> Non
             if file in written:
                 raise ExportError(
                     f"targets {written[file]} and {name} both write {file}: export them one at a time, "
-                    "into folders of their own"
+                    "into different folders"
                 )
             written[file] = name
 
 
 def refuse_untaken(name: str, problem: Problem, springs: SpringData) -> None:
-    """Raise ExportError for springs and loads that a target does not take, with the targets that do."""
+    """Raise ExportError for features of springs and loads that a target does not support, and list those that do."""
     try:
         refuse_others(problem, springs, TARGETS[name].takes, TARGETS[name].program)
     except UntakenError as error:
         others = ", ".join(other for other, target in TARGETS.items() if error.feature in target.takes)
-        raise ExportError(f"{error}; targets that take it: {others}") from None
+        raise ExportError(f"{error}; targets that support it: {others}") from None
 
 
 def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]:
-    """Return the files of each target; raise ExportError for what one cannot express."""
+    """Return the files of each target; raise ExportError for a feature that a target does not support."""
     for name in names:
         refuse_untaken(name, exported.problem, exported.springs)
     return {name: TARGETS[name].files(exported) for name in names}
 
 
 def write_files(files: Files, folder: Path) -> tuple[Path, ...]:
-    """Write files into a folder, which is made where it is not there; return them."""
+    """Write files to a folder, creating it if necessary, and return their paths."""
     with Output(folder, next(iter(files))) as output:
         for file, content in files.items():
             (output.staging / file).write_bytes(content.encode() if isinstance(content, str) else content)

@@ -1,6 +1,6 @@
-"""Abaqus: the same bodies in its own form, in newtons.
+"""Abaqus input decks, in SI units.
 
-Source of the form: its keywords reference. Abaqus was not run on these; CalculiX reads the same keywords, and was.
+Source: Abaqus Keywords Reference. Abaqus was not run on these decks; CalculiX, which reads the same keywords, was.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from truespring.exports.exported import Exported
 
 
 def abaqus(exported: Exported) -> dict[str, str]:
-    """Return `springs.inp`, and `fem.inp` where the problem has a continuum that Abaqus can express."""
+    """Return `springs.inp`, and `fem.inp` if the problem has a continuum that Abaqus supports."""
     return deck_files(_DIALECT, exported)
 
 
@@ -25,17 +25,17 @@ def _explained(name: str) -> tuple[str, ...]:
     return (
         f"Run it by: abaqus job={name} interactive (Abaqus/Standard)",
         "Units are SI: m, N, N/m, Pa, kg/m^3, J.",
-        "Node i of truespring, counted from 0, is node i + 1 here. A step is a load level, time the load factor; it "
-        f"gives loads and motions in full. {name}.dat gets the displacement of all nodes after each, {name}.odb "
-        "fields.",
-        "Abaqus was not run on this file: its form was checked by reading it back and by running it in CalculiX.",
+        "Node i of truespring, counted from 0, is node i + 1. Each step is a load level, time is the load factor; each "
+        f"step gives the total loads and displacements. {name}.dat has the displacement of all nodes at the end of "
+        f"each step, {name}.odb the fields.",
+        "Abaqus was not run on this file; its syntax was checked by reading it back and by running it in CalculiX.",
     )
 
 
 _FEM = (
-    "*ELASTIC with NLGEOM=YES is in Abaqus a law of true stress and logarithmic strain, which at large strain is not "
-    "St. Venant-Kirchhoff's. Gravity and pressure are *DLOAD; pressure follows the faces, other loads are forces on "
-    "nodes.",
+    "In Abaqus, *ELASTIC with NLGEOM=YES relates true stress to logarithmic strain, which differs from St. "
+    "Venant-Kirchhoff at large strain. Gravity and pressure are *DLOAD; pressure follows the faces, other loads are "
+    "nodal forces.",
 )
 
 
@@ -50,7 +50,7 @@ def _start(step: Step, nonlinear: bool) -> list[str]:
         f"*STEP, NAME=LEVEL-{step.number}, NLGEOM={'YES' if nonlinear else 'NO'}, INC=1000000",
         "*STATIC",
         f"{first}, {period}, {real(1e-5 * step.period)}, {first}",
-        "*CONTROLS, PARAMETERS=FIELD",  # by default a residual of 0.5 % of the mean force is taken for balance
+        "*CONTROLS, PARAMETERS=FIELD",  # the default tolerance is 0.5 % of the mean force
         "1.E-6, 1.E-6",
     ]
 

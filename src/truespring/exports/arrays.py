@@ -29,7 +29,7 @@ _UNITS = {
 
 
 def npz(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.npz, which loads without pickle: what is not known is not a number, or an empty text."""
+    """Return springs.npz, which loads without pickle; unknown values are NaN or empty strings."""
     values = _values(exported)
     values["units"] = [f"{name}: {unit}" for name, unit in _units(values).items()]
     arrays: dict[str, Any] = {name: _array(value) for name, value in values.items()}
@@ -39,7 +39,7 @@ def npz(exported: Exported) -> Mapping[str, str | bytes]:
 
 
 def as_json(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.json, a key a line: arrays are lists of lists, what is not known is null."""
+    """Return springs.json, one key per line; arrays are nested lists, unknown values are null."""
     values = _values(exported)
     values["units"] = _units(values)
     lines = (f"{json.dumps(name)}: {json.dumps(_plain(value), allow_nan=False)}" for name, value in values.items())
@@ -47,7 +47,7 @@ def as_json(exported: Exported) -> Mapping[str, str | bytes]:
 
 
 def _values(exported: Exported) -> dict[str, Any]:
-    """What both files hold by name; see docs/export/arrays.md."""
+    """Return the values of both files by key; see docs/export/arrays.md."""
     problem, state = exported.problem, exported.path.states[-1]
     mesh, materials = problem.mesh, problem.materials
     return {
@@ -83,7 +83,7 @@ def _units(values: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _array(value: Any) -> np.ndarray[Any, Any]:
-    """An array without objects: None becomes a number that is none."""
+    """Return a value as an array that is not of objects: None becomes NaN."""
     several = value if isinstance(value, list) else [value]
     if any(one is None for one in several):
         return np.asarray(value, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Decks of keywords: what those for CalculiX and for Abaqus have in common, which read the same ones.
+"""Keyword decks for CalculiX and Abaqus, which read the same keywords; a Dialect holds the differences.
 
-Nodes and elements are counted from 1 there: node i of ours is node i + 1.
-Source: the manual of CalculiX CrunchiX, https://www.dhondt.de, and the keywords reference of Abaqus.
+Decks count nodes and elements from 1: node i of truespring is node i + 1.
+Source: CalculiX CrunchiX User's Manual, https://www.dhondt.de; Abaqus Keywords Reference.
 """
 
 import itertools
@@ -27,38 +27,39 @@ from truespring.models.quadratic import QuadraticPotential
 from truespring.models.spring_data import PlainSprings
 from truespring.problem import Problem
 
-#: Of results of a step: the last increment is always written.
+#: Writes results only of the last increment of a step.
 LAST_ONLY = "FREQUENCY=1000000"
 
-#: What SPRINGA elements take beside springs at rest under dead loads: their length at rest is that of their nodes.
+#: Features that SPRINGA elements support. Their rest length is the distance of their nodes.
 SPRINGA = frozenset({Feature.NEGATIVE})
 
-# The first of several increments is at most this share of the full load: beyond the nearest equilibrium lie others.
+# Limit of the first increment, as a share of the full load: larger ones may converge to another equilibrium.
 _LARGEST_INCREMENT = 0.25
-# How long a step is that is no load level.
+# Period of a step that is not a load level.
 _NO_TIME = 1e-9
-# Nodes are led aside by this share of their longest spring; a stiffness below that share of the largest is none.
+# Offset of unsupported nodes, as a share of their longest spring; stiffness below which a direction is unsupported, as
+# a share of the largest.
 _ASIDE, _LOOSE = 1e-2, 1e-9
-# Numbers in a line.
+# Numbers per line.
 _A_LINE = 16
 
 _SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D8", "hexahedron": "C3D8"}
-# CalculiX has no pyramids, and integrates its wedges C3D6 at two points. As bricks with corners that are one they are
-# the elements that they are here: pyramids to the digit, wedges to the quadrature of large strain.
+# CalculiX has no pyramids, and integrates wedges (C3D6) at two points. Collapsed bricks are equal to truespring's
+# elements: pyramids exactly, wedges up to quadrature at large strain.
 _AS_BRICKS = ("pyramid", "wedge")
-_BRICKS_EXPLAINED = "** Wedges and pyramids are bricks here, some of whose corners are one node."
+_BRICKS_EXPLAINED = "** Wedges and pyramids are written as collapsed bricks: some of their corners are the same node."
 _PLANES = {"triangle": "3", "quadrilateral": "4"}
-# Of elements of second order.
+# Types of second-order elements.
 _SECOND_ORDER = {"triangle": "6", "tetrahedron": "C3D10"}
 
-#: Interpolations that both programs have: full integration of first order, and of second order on simplices.
+#: Interpolations that both programs support: first order, fully integrated, and second order on simplices.
 ELEMENTS = ("linear", "quadratic")
 
 
 class Step(NamedTuple):
-    """A load level: its number from 1, the load factor that it adds, and how much of that its first increment does.
+    """A step: its number from 1, its increase of the load factor, and the first increment of that.
 
-    Time is the load factor in all decks: a result knows its level.
+    Time is the load factor in all decks, so results are labelled with their level.
     """
 
     number: int
@@ -68,17 +69,17 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a program wants otherwise than the others.
+    """The differences between the programs that read keyword decks.
 
     Attributes:
-        program: its name.
-        nonlinear: how it is asked for geometric nonlinearity, for headers.
-        force_unit: of all forces and what is made of them [N].
-        opening: lines before the nodes, made of those of the header.
-        start: lines that start a step, for one with or without geometric nonlinearity.
-        output: lines that ask for results, for a continuum or for springs.
-        explained: how to run a file of a name, its units and results, in sentences.
-        of_elements: what its finite elements are, in sentences.
+        program: name of the program.
+        nonlinear: keyword parameter for geometric nonlinearity, for headers.
+        force_unit: unit of force [N]; stiffness, stress and density are scaled by it.
+        opening: returns the lines before the nodes, given the header.
+        start: returns the lines that start a step; the second argument is True for geometric nonlinearity.
+        output: returns the output requests; the argument is True for a continuum.
+        explained: returns sentences on how to run a file, its units and its results, given its name.
+        of_elements: sentences on the finite elements.
     """
 
     program: str
@@ -92,7 +93,7 @@ class Dialect:
 
 
 class OwnLoad(NamedTuple):
-    """A load that the program spreads itself: on an element or a set, of a type, at full load, and what else it is."""
+    """A *DLOAD: element or set, type, magnitude at full load, and further fields."""
 
     on: str
     type: str
@@ -102,14 +103,14 @@ class OwnLoad(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """A body as the program knows it.
+    """The body of a deck.
 
     Attributes:
-        nodes: [m], shape (n_nodes, dim).
+        nodes: undeformed positions [m], shape (n_nodes, dim).
         model: the lines of elements, materials and springs.
-        loading: what acts on the nodes.
-        own: what the program spreads.
-        aside: how far nodes are led aside before the first level [m], of the shape of `nodes`; empty if they are not.
+        loading: supports and nodal forces.
+        own: loads given as *DLOAD.
+        aside: displacement of unsupported nodes before the first level [m], shape of `nodes`; empty if there are none.
         for_good: boundary lines that hold at all levels.
     """
 
@@ -122,26 +123,26 @@ class Twin:
 
 
 def real(value: float) -> str:
-    """Write a number in at most 19 characters: CalculiX reads twenty and silently drops the rest.
+    """Format a number with at most 19 characters: CalculiX reads twenty and ignores the rest.
 
-    It has a decimal point always: without one a stiffness would be read as a direction.
+    The text always has a decimal point; without one, a stiffness would be read as a direction.
     """
     text = f"{value:.12e}"
     return text if len(text) < 20 else f"{value:.11e}"
 
 
 def joined(values: Iterable[object]) -> str:
-    """Write values in a line."""
+    """Return values as a line, separated by commas."""
     return ", ".join(map(str, values))
 
 
 def deck(
     dialect: Dialect, twin: Twin, levels: Sequence[float], nonlinear: bool, continuum: bool, header: Sequence[str]
 ) -> str:
-    """Write a deck of one step a load level, each with loads and motions in full."""
+    """Return a deck with one step for each load level; each step gives the total loads and displacements."""
     levels = list(levels)
     if not levels or levels[0] <= 0 or levels[-1] > 1 or any(b <= a for a, b in itertools.pairwise(levels)):
-        raise ExportError(f"levels = {levels}: load factors in ascending order are wanted, above 0 and at most 1")
+        raise ExportError(f"levels = {levels}: load factors must be ascending, above 0 and at most 1")
     lines = [
         *dialect.opening(header),
         "*NODE, NSET=NALL",
@@ -157,22 +158,23 @@ def deck(
             f"** Step {number}: load factor {level:.9g}",
             *dialect.start(step, nonlinear),
             *_acting(twin, level, dialect.force_unit, anew=number == 1 and bool(twin.aside.any())),
-            *(dialect.output(continuum) if number == 1 else []),  # goes on in the steps that follow
+            *(dialect.output(continuum) if number == 1 else []),  # also holds for later steps
             "*END STEP",
         ]
     return "\n".join([*lines, ""])
 
 
 def _led_aside(twin: Twin) -> Iterator[str]:
-    """Boundary lines of a step before the first."""
-    yield "** Nodes that no spring holds at rest are led aside, along their load, and let go in the step that follows."
+    """Yield the boundary lines of the step that displaces unsupported nodes."""
+    yield "** Nodes with a direction in which no spring acts at rest are displaced along their load, and released in "
+    yield "** the next step: Newton's method cannot start from a singular matrix."
     yield "*BOUNDARY"
     for node, axis in np.argwhere(twin.loading.held | (twin.aside != 0)).tolist():
         yield f"{node + 1}, {axis + 1}, {axis + 1}, {real(twin.aside[node, axis])}"
 
 
 def _acting(twin: Twin, level: float, force_unit: float, anew: bool) -> Iterator[str]:
-    """Supports and loads at a level: amounts in full, which replace those of the step before; `anew` all of them."""
+    """Yield the supports and loads at a level, as totals; with `anew`, boundary conditions of earlier steps end."""
     motion, force = twin.loading.motion(level), level * twin.loading.external_force / force_unit
     yield "*BOUNDARY, OP=NEW" if anew else "*BOUNDARY"
     yield from twin.for_good if anew else []
@@ -188,7 +190,7 @@ def _acting(twin: Twin, level: float, force_unit: float, anew: bool) -> Iterator
 
 
 def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
-    """Write a set of nodes (NSET) or elements (ELSET), given by our numbers."""
+    """Yield the lines of a set of nodes (NSET) or elements (ELSET); `numbers` count from 0."""
     yield f"*{kind}, {kind}={name}"
     for first in range(0, len(numbers), _A_LINE):
         yield joined(numbers[first : first + _A_LINE] + 1)
@@ -198,10 +200,10 @@ def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
 
 
 def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "linear") -> Twin:
-    """Return the body as finite elements of first order, or of the second ("quadratic") on triangles and tetrahedra.
+    """Return the body as first-order finite elements, or second-order ("quadratic") triangles and tetrahedra.
 
-    Pressure and gravity are the program's own, other loads come as forces on nodes; on quadratic elements gravity too.
-    Raises ExportError for what cannot be said.
+    Pressure and gravity are *DLOAD, other loads are nodal forces; on quadratic elements gravity is nodal forces too.
+    Raises ExportError if the problem is not supported.
     """
     check_fem(problem, law, element)
     nodes, blocks = problem.mesh.nodes, _blocks(problem)
@@ -228,35 +230,35 @@ def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "line
 
 
 def usual_element(problem: Problem) -> str:
-    """Return the interpolation that is the default: that of our own elements, where the programs have it."""
+    """Return the default interpolation: "quadratic" on triangles and tetrahedra, as for Fem, else "linear"."""
     return "quadratic" if problem.mesh.element in _SECOND_ORDER else "linear"
 
 
 def second_order(problem: Problem, element: str) -> QuadraticPotential | None:
-    """Return our own elements of second order, whose nodes the program has too; None where it is of the first."""
+    """Return the potential of second-order elements, whose nodes the deck shares; None for "linear"."""
     finer = Fem("linear", element).potential(problem)
     return finer if isinstance(finer, QuadraticPotential) else None
 
 
 def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
-    """Raise ExportError where a problem has no continuum, a load that none can have, or no such elements."""
+    """Raise ExportError if a problem has no continuum, a load without a keyword, or elements without `element`."""
     if problem.material is None or problem.section is None:
-        raise ExportError("a plain network of springs has no continuum: give its mesh elements and a material")
+        raise ExportError("a spring network has no continuum: finite elements need a mesh of elements and a material")
     for load in problem.loads:
         if law != "linear" and load.follows and not load.cards(problem.mesh):
             raise ExportError(
-                f"{load.words()} follows the body, and no keyword has it: use {load.instead} instead, or the linear "
-                "law, where it is forces on nodes"
+                f"{load.words()} follows the body, and there is no keyword for it: use {load.instead} instead, or the "
+                "linear law, where it is nodal forces"
             )
     if element not in ELEMENTS or (element == "quadratic" and problem.mesh.element not in _SECOND_ORDER):
         raise ExportError(
-            f"element = '{element}' cannot be written for a mesh of {problem.mesh.element} elements: \"linear\" is for "
-            f'all, "quadratic" for {" and ".join(map(plural, _SECOND_ORDER))}'
+            f"element = '{element}' is not available for a mesh of {problem.mesh.element} elements; allowed: "
+            f'"linear" for all, "quadratic" for {" and ".join(map(plural, _SECOND_ORDER))}'
         )
 
 
 def fem_element(problem: Problem, element: str = "linear") -> str:
-    """Return the types of the elements: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; "quadratic" CPS6, CPE6 or C3D10."""
+    """Return the element types: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; for "quadratic" CPS6, CPE6 or C3D10."""
     if element == "linear":
         return " and ".join(dict.fromkeys(kind for kind, _, _ in _blocks(problem)))
     name = _SECOND_ORDER[problem.mesh.element]
@@ -268,7 +270,7 @@ def _plane(problem: Problem) -> str:
 
 
 def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
-    """The elements of first order by their types: their numbers and nodes."""
+    """Return type, numbers and nodes of the first-order elements, for each kind."""
     found = []
     for numbers, part in problem.mesh.blocks:
         kind = _SOLIDS[part.element] if part.element in _SOLIDS else _plane(problem) + _PLANES[part.element]
@@ -278,7 +280,7 @@ def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
 
 
 def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:
-    """The material of a number and the elements that have it."""
+    """Yield the lines of a material and of its elements."""
     material, several = problem.materials[number], len(problem.materials) > 1
     name = f"PART{number + 1}" if several else "BODY"
     if several:
@@ -295,7 +297,7 @@ def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]
 
 
 def _dload(mesh: Mesh, load: Load, force_unit: float) -> Iterator[OwnLoad]:
-    """Yield the *DLOAD of a load: weight, or pressure on faces, which follows them in nonlinear decks."""
+    """Yield the *DLOAD of a load: gravity, or pressure on faces, which follows them in nonlinear decks."""
     for card in load.cards(mesh):
         match card:
             case BodyForce(acceleration):
@@ -308,7 +310,7 @@ def _dload(mesh: Mesh, load: Load, force_unit: float) -> Iterator[OwnLoad]:
 
 
 def _faces(mesh: Mesh, facets: Ints) -> Iterator[tuple[int, int, int]]:
-    """Yield the element, the number of its face from 1, and the facet that this is, for all that are `facets`."""
+    """Yield element, face number from 1 and row in `facets`, for each element face that is one of `facets`."""
     keys = _face_keys(facets)
     for numbers, part in mesh.blocks:
         bricks = part.element in _AS_BRICKS
@@ -320,13 +322,13 @@ def _faces(mesh: Mesh, facets: Ints) -> Iterator[tuple[int, int, int]]:
 
 
 def _face_keys(faces: Ints) -> Ints:
-    """Rows of numbers that are equal for faces of the same corners, as long as those of a face can be."""
+    """Return a row for each face, equal for faces with the same corners."""
     padded = np.concatenate([faces, faces[:, -1:]], axis=1) if faces.shape[1] == len("abc") else faces
     return np.stack(facet_keys(padded.T), axis=1)
 
 
 def _places(rows: Ints, others: Ints) -> Ints:
-    """Return the place of each row of numbers among the others, -1 where it is not there, shape (n_rows,)."""
+    """Return the index of each row in `others`, -1 if it is not there, shape (n_rows,)."""
     both = np.unique(np.concatenate([others, rows]), axis=0, return_inverse=True)[1].ravel()
     place = np.full(len(both), -1)
     place[both[: len(others)]] = np.arange(len(others))
@@ -334,7 +336,7 @@ def _places(rows: Ints, others: Ints) -> Ints:
 
 
 def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats) -> Loading:
-    """Return supports with loads as forces on nodes: those that follow the body act as on the undeformed one."""
+    """Return the supports with `loads` as nodal forces; loads that follow the body act as on the undeformed body."""
     spreads = [load.spread(body) for load in loads]
     potentials = [load.following(body, loading.held) for load in loads]
     return replace(
@@ -348,9 +350,9 @@ def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats
 
 
 def spring_twin(problem: Problem, network: PlainSprings, force_unit: float) -> Twin:
-    """Return every spring as a SPRINGA element, one set of elements for each stiffness as it is written.
+    """Return the springs as SPRINGA elements, one element set for each stiffness.
 
-    Raises ExportError for what such elements are not: see SPRINGA.
+    Raises ExportError for features that are not in SPRINGA.
     """
     refuse_others(problem, network.spring_data(), SPRINGA, "a SPRINGA element")
     members: dict[str, list[int]] = {}
@@ -360,22 +362,22 @@ def spring_twin(problem: Problem, network: PlainSprings, force_unit: float) -> T
     for group, (stiffness, numbers) in enumerate(members.items(), 1):
         lines.append(f"*ELEMENT, TYPE=SPRINGA, ELSET=S{group}")
         lines += (f"{number + 1}, {joined((network.springs[number] + 1).tolist())}" for number in numbers)
-        lines += [f"*SPRING, ELSET=S{group}", "", stiffness]  # the empty line stands for directions
-    plane = ["NALL, 3, 3"] if network.nodes.shape[1] == 2 else []  # these springs are in space: it is held in z
+        lines += [f"*SPRING, ELSET=S{group}", "", stiffness]  # the blank line is for directions
+    plane = ["NALL, 3, 3"] if network.nodes.shape[1] == 2 else []  # SPRINGA acts in 3D: hold z
     lines += ["*BOUNDARY", *plane] if plane else []
     aside = _aside(network, problem.loading)
     return Twin(network.nodes, lines, problem.loading, aside=aside, for_good=plane)
 
 
 def is_led_aside(problem: Problem, network: PlainSprings) -> bool:
-    """Whether a deck of springs has a step before the first level."""
+    """Return whether a deck of springs needs a step that displaces unsupported nodes before the first level."""
     return bool(_aside(network, problem.loading).any())
 
 
 def _aside(network: PlainSprings, loading: Loading) -> Floats:
-    """How far nodes are led aside that springs do not hold at rest in a free direction [m], shape (n_nodes, dim).
+    """Return the offset of nodes with a free direction in which no spring acts at rest [m], shape (n_nodes, dim).
 
-    Such springs stiffen as the node moves, but Newton's method of a program that has no line search cannot begin.
+    The springs stiffen as the node moves, but Newton's method without line search cannot start at zero stiffness.
     """
     n_nodes, dim = network.nodes.shape
     ends = network.springs
@@ -405,11 +407,9 @@ def _aside(network: PlainSprings, loading: Loading) -> Floats:
 
 
 def deck_files(dialect: Dialect, exported: Exported) -> dict[str, str]:
-    """Return `springs.inp`, and `fem.inp` where the problem has a continuum that the program can express."""
+    """Return `springs.inp`, and `fem.inp` if the problem has a continuum that the program supports."""
     problem, levels, files = exported.problem, levels_of(exported), {}
-    notes = [
-        "Prestress, volume terms, coupled springs and loads that follow a face have no place among SPRINGA elements."
-    ]
+    notes = ["SPRINGA elements do not support prestress, volume terms, coupled springs and loads that follow a face."]
     try:
         check_fem(problem, "saint-venant-kirchhoff")
         element = usual_element(problem)
@@ -418,7 +418,7 @@ def deck_files(dialect: Dialect, exported: Exported) -> dict[str, str]:
         header = [*described(exported, what, springs=False), *dialect.explained("fem"), *dialect.of_elements]
         files["fem.inp"] = deck(dialect, twin, levels, nonlinear=True, continuum=True, header=header)
     except ExportError as error:
-        notes.append(f"There is no fem.inp beside this file: {error}.")
+        notes.append(f"fem.inp was not written: {error}.")
     what = f"{dialect.program} SPRINGA elements"
     header = [*described(exported, what, springs=True), *dialect.explained("springs"), *notes]
     twin = spring_twin(problem, exported.network, dialect.force_unit)
@@ -429,24 +429,24 @@ def deck_files(dialect: Dialect, exported: Exported) -> dict[str, str]:
 
 
 def described(exported: Exported, what: str, springs: bool) -> list[str]:
-    """Return what a deck is, and what the problem asks; of springs also what to expect of them."""
+    """Return the header of a deck: title, elements and problem; for springs also the expected result."""
     title, note = printable([exported.title, exported.note])
     if springs:
         return [
             title,
             f"{what}: {exported.written}",
             *([note] if note else []),
-            *exported.asked,
-            *exported.told_of_springs,
+            *exported.stated,
+            *exported.expectations,
         ]
-    return [title, f"{what}, written by truespring {version('truespring')}.", *exported.asked]
+    return [title, f"{what}, written by truespring {version('truespring')}.", *exported.stated]
 
 
 def comments(header: Sequence[str]) -> list[str]:
-    """Write sentences as comment lines, short enough for every program."""
+    """Return sentences as comment lines, wrapped to the line length that both programs accept."""
     return [f"** {part}" for line in header for part in textwrap.wrap(line, 112, subsequent_indent="   ")]
 
 
 def levels_of(exported: Exported) -> list[float]:
-    """Return the load levels that the study asks for."""
+    """Return the load levels of the study."""
     return [(number + 1) / exported.load_steps for number in range(exported.load_steps)]

@@ -1,4 +1,4 @@
-"""What every target is given: the problem, the springs, and the equilibrium that the receiver should find."""
+"""The input of every export target: the problem, the springs, and the expected equilibrium."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from truespring.solvers import Newton, Reporter, Solver, as_solver
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """A spring model that was solved, to be carried to another simulator.
+    """A solved spring model to be exported.
 
     Attributes:
-        title: of the study.
+        title: title of the study.
         problem: mesh, material, supports and loads.
-        path: the springs' equilibria up to full load; `path.potential` is what was solved, and HasSprings.
-        probe: number of the node that is watched.
-        load_steps: load levels that the study asks for.
-        remarks: what else the reader of the file should know, in sentences.
-        note: what the study says of itself at its head, such as how its springs were found; empty for nothing.
+        path: the equilibria up to full load; `path.potential` implements HasSprings.
+        probe: number of the probe node.
+        load_steps: number of load levels.
+        remarks: further sentences for the header of the files.
+        note: the study's note, such as how its springs were calibrated; empty if there is none.
     """
 
     title: str
@@ -42,19 +42,19 @@ class Exported:
 
     @cached_property
     def state(self) -> State | None:
-        """Our equilibrium at full load, None where it was not reached."""
+        """The equilibrium at full load, None if it was not reached."""
         found = self.path.at(1.0)
         return found if found is not None and found.load_factor == 1.0 else None
 
     @cached_property
     def springs(self) -> SpringData:
-        """The springs and what they have beside."""
+        """The springs with their volume term or coupling."""
         return spring_data(self.path.potential)
 
     @property
     def network(self) -> PlainSprings:
-        """The springs alone; of a target that takes no coupled springs."""
-        assert self.springs.network is not None  # refused before
+        """The springs alone; only for targets that do not support coupled springs."""
+        assert self.springs.network is not None  # check_targets raises for these
         return self.springs.network
 
     @property
@@ -69,68 +69,68 @@ class Exported:
 
     @cached_property
     def external_force(self) -> Floats:
-        """Force on the nodes at full load [N], shape (n_nodes, dim), weights and loads that follow the body included.
+        """Nodal forces at full load [N], shape (n_nodes, dim), with gravity and loads that follow the body.
 
-        Loads that follow the body are dead forces here: those on the body at our equilibrium, which is
-        then one of theirs. Raises ExportError where there are such loads and full load was not reached.
+        Loads that follow the body are evaluated at the equilibrium at full load: as dead forces they have the same
+        equilibrium. Raises ExportError if there are such loads and full load was not reached.
         """
         loading = self.problem.loading
         if not loading.following:
             return loading.external_force
         if self.state is None:
             raise ExportError(
-                "a load that follows the body is carried over as its forces at full load, which was not reached "
-                f"(load factor {self.path.load_factor:.6g}): load less, or take more load_steps"
+                "a load that follows the body is exported as its forces at full load, which was not reached "
+                f"(load factor {self.path.load_factor:.6g}): reduce the load or use more load_steps"
             )
         return loading.force(self.state.positions)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a receiver sees otherwise than it was asked here, in sentences."""
+        """Sentences on what differs from the problem in the exported model."""
         return (*self.remarks, *self._notes())
 
     def _notes(self) -> Iterator[str]:
         if self.problem.loading.following:
             yield (
-                "A load that follows the body is a dead force here, as it acts at our equilibrium at full load: "
-                "the equilibrium is the same, its stability and the way there are not."
+                "A load that follows the body is exported as the dead forces that act at the equilibrium at full load: "
+                "the equilibrium is the same, its stability and the path to it are not."
             )
         if self.problem.loading.turns:
-            yield "Nodes that a support turns stand at their turned places."
+            yield "Nodes that a support rotates are at their rotated positions."
 
     @cached_property
     def header(self) -> tuple[str, ...]:
-        """Title, units, material, supports, loads and what to expect, a sentence a line, for the head of a file."""
+        """The header of a file: title, units, material, supports, loads and expected result, one sentence per line."""
         return printable(
             [
                 self.title,
                 self.written,
                 *([self.note] if self.note else []),
                 "Units are SI: m, N, N/m, kg, s.",
-                *self.asked,
-                "Loads and prescribed motions stand at their full values.",
-                *self.told_of_springs,
+                *self.stated,
+                "Loads and prescribed displacements are those at full load.",
+                *self.expectations,
             ]
         )
 
     @property
     def written(self) -> str:
-        """What the springs are, and who wrote them."""
+        """The model and the version that wrote it, as a sentence."""
         return f"{self.path.label}, written by truespring {version('truespring')}."
 
     @property
-    def asked(self) -> tuple[str, ...]:
-        """Mesh, material, section, supports and loads, a sentence a line."""
-        return printable(self._asked())
+    def stated(self) -> tuple[str, ...]:
+        """Mesh, material, section, supports and loads, one sentence each."""
+        return printable(self._stated())
 
     @property
-    def told_of_springs(self) -> tuple[str, ...]:
-        """How springs bear weight, what to expect of them, and what is to be known, a sentence a line."""
+    def expectations(self) -> tuple[str, ...]:
+        """How body loads act on springs, the expected result, and notes, one sentence each."""
         everywhere = [load.words() for load in self.problem.loads if load.on is None]
-        weight = [f"{words[:1].upper()}{words[1:]} acts as forces on nodes." for words in everywhere]
+        weight = [f"{words[:1].upper()}{words[1:]} acts as nodal forces." for words in everywhere]
         return printable([*weight, *self.expected, *self.notes])
 
-    def _asked(self) -> Iterator[str]:
+    def _stated(self) -> Iterator[str]:
         mesh = self.problem.mesh
         yield f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}."
         yield from self._body()
@@ -152,19 +152,19 @@ class Exported:
 
     @property
     def section(self) -> str:
-        """How the body carries the direction that its mesh does not have: "plane stress", "plane strain", or ""."""
+        """The section of a plane body: "plane stress" or "plane strain"; "" in 3D."""
         return "" if self.problem.section is None else self.problem.section.words
 
     @property
     def expected(self) -> tuple[str, ...]:
-        """What our equilibrium at full load is, and what is to be known of it, in sentences."""
+        """Sentences on the equilibrium at full load, and the warnings of the solution."""
         return tuple(self._expected())
 
     def _expected(self) -> Iterator[str]:
         if self.state is None:
             yield (
-                f"Expect nothing: full load was not reached here ({self.path.status}), "
-                f"the last equilibrium has load factor {self.path.load_factor:.6g}."
+                f"No expected result: full load was not reached ({self.path.status}), "
+                f"the last equilibrium is at load factor {self.path.load_factor:.6g}."
             )
         else:
             moved = self.state.displacement
@@ -175,14 +175,14 @@ class Exported:
                 f"{np.linalg.norm(moved, axis=1).max():.9g} m."
             )
             if self.path.status is not Status.CONVERGED:
-                yield f"Another program need not find that state: the path to it is {self.path.status}."
-        yield from (f"Warning of truespring: {warning}." for warning in self.path.warnings)
+                yield f"Another program may find another state: the path to this one is {self.path.status}."
+        yield from (f"Warning by truespring: {warning}." for warning in self.path.warnings)
 
 
 def spring_data(potential: object) -> SpringData:
-    """Return the springs of a potential; raise ExportError where it has none."""
+    """Return the springs of a potential; raise ExportError if it has none."""
     if not isinstance(potential, HasSprings):
-        raise ExportError(f"{type(potential).__name__} is no model of springs: use Springs(rule=...) or SpringNetwork")
+        raise ExportError(f"{type(potential).__name__} is not a spring model: use Springs(rule=...) or SpringNetwork")
     return potential.spring_data()
 
 
@@ -194,25 +194,25 @@ def solve_springs(
     probe: int | None = None,
     report: Reporter | None = None,
 ) -> Exported:
-    """Solve springs up to full load, so that a file can tell what to expect of them.
+    """Solve a spring model up to full load, so that files can state the expected result.
 
-    A solver that follows displacements or the arc's length is replaced by Newton with as many load steps: other
-    programs put the load on. `probe` is by default the free node that moves most.
+    Displacement control and arc length are replaced by Newton with as many load steps, because other programs apply
+    the load in steps. `probe` is by default the free node that moves most.
     """
     chosen, remarks = Newton() if solver is None else as_solver(solver), []
     steps = chosen.load_steps
     if not chosen.follows_load:
         chosen = Newton(load_steps=steps)
-        remarks = ["The load is taken up in steps here, not followed past limit points as it was asked."]
+        remarks = ["The load is applied in steps; the study follows the path beyond limit points instead."]
     path = solve(problem, model, chosen, report)
     if probe is None:
-        told = problem.loading.held.all(axis=1)  # such a node's motion tells nothing of the springs
+        held = problem.loading.held.all(axis=1)  # the displacement of such a node is prescribed
         moved = np.linalg.norm(path.states[-1].displacement, axis=1)
-        probe = int(np.where(told & ~told.all(), -1.0, moved).argmax())
+        probe = int(np.where(held & ~held.all(), -1.0, moved).argmax())
     return Exported(title, problem, path, probe, steps, tuple(remarks))
 
 
 def printable(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Return sentences of a line each: whatever a title holds, it does not end the comment that it stands in."""
+    """Return each sentence as one line of printable characters, so that a title cannot end the comment it is in."""
     signs = ("".join(sign if sign.isprintable() else " " for sign in sentence) for sentence in sentences)
     return tuple(" ".join(sentence.split()) for sentence in signs)

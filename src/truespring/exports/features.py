@@ -1,4 +1,4 @@
-"""Features of springs and loads that not every target takes, and the errors where one does not."""
+"""Features of springs and loads that some targets do not support, and the error for these."""
 
 from collections.abc import Collection, Iterator
 from enum import StrEnum
@@ -9,12 +9,12 @@ from truespring.errors import ExportError
 from truespring.models.spring_data import COUPLING, VOLUME_TERM, SpringData
 from truespring.problem import Problem
 
-# How far rest lengths may be from the distances of the nodes, a share of them: rounding.
+# Relative difference of rest length and distance of the nodes that counts as rounding.
 _AT_REST = 1e-12
 
 
 class Feature(StrEnum):
-    """What a body of springs may have beside springs of positive stiffness, at rest, under dead loads."""
+    """A feature beyond springs of positive stiffness, at rest in the undeformed body, under dead loads."""
 
     VOLUME_TERM = VOLUME_TERM
     COUPLING = COUPLING
@@ -23,14 +23,14 @@ class Feature(StrEnum):
     FOLLOWING = "load that follows a face"
 
 
-#: What a target takes that carries all numbers.
+#: All features.
 ALL = frozenset(Feature)
 
 
 def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, str]]:
-    """Yield the features of springs and loads, each with a sentence: where it is, and how to do without it."""
+    """Yield the features of springs and loads, each with where it occurs and how to avoid it."""
     if springs.beyond == VOLUME_TERM:
-        yield Feature.VOLUME_TERM, "these springs have one: use a model without volume = true"
+        yield Feature.VOLUME_TERM, "use a model without volume = true"
     if springs.beyond == COUPLING:
         yield (
             Feature.COUPLING,
@@ -43,8 +43,8 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
         if below.size:
             yield (
                 Feature.NEGATIVE,
-                f"{below.size} springs have one, the first, number {below[0]}, {network.stiffness[below[0]]:g} N/m: "
-                "use another rule, or elements nearer to squares and cubes",
+                f"{below.size} springs have one; the first is spring {below[0]} with {network.stiffness[below[0]]:g} "
+                "N/m: use another rule, or elements closer to squares and cubes",
             )
         distance = np.linalg.norm(np.diff(network.nodes[network.springs], axis=1)[:, 0], axis=1)
         tensed = np.flatnonzero(np.abs(distance - network.rest_length) > _AT_REST * distance)
@@ -52,8 +52,9 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
             first = int(tensed[0])
             yield (
                 Feature.PRESTRESS,
-                f"the rest lengths of {tensed.size} springs are not the distances of their nodes, the first, number "
-                f"{first}, {network.rest_length[first]:g} m instead of {distance[first]:g} m: use springs at rest",
+                f"the rest lengths of {tensed.size} springs differ from the distances of their nodes; the first is "
+                f"spring {first} with {network.rest_length[first]:g} m instead of {distance[first]:g} m: use springs "
+                "without prestress",
             )
     for load in problem.loads:
         if load.follows:
@@ -61,16 +62,16 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
 
 
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
-    """Raise UntakenError for the first feature of springs or loads that is not among those that a program takes."""
+    """Raise UntakenError for the first feature of springs or loads that is not in `takes`."""
     for feature, where in features(problem, springs):
         if feature not in takes:
-            raise UntakenError(feature, f"{program} takes no {feature}: {where}")
+            raise UntakenError(feature, f"{program} does not support {feature}: {where}")
 
 
 class UntakenError(ExportError):
-    """A feature of springs or loads that a program does not take."""
+    """A feature of springs or loads that a program does not support."""
 
     def __init__(self, feature: Feature, message: str) -> None:
-        """Keep the feature."""
+        """Set `feature` and the message."""
         super().__init__(message)
         self.feature = feature

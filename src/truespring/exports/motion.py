@@ -1,6 +1,6 @@
-"""How a body of springs is let loose in a simulator of motion so that it soon rests on its equilibrium.
+"""Masses, damping and time step with which a dynamic simulation settles quickly at the static equilibrium.
 
-Equilibria depend neither on masses nor on damping nor on where a body starts, as long as it comes to rest there.
+The equilibrium does not depend on masses, damping or initial positions, as long as the motion settles at it.
 """
 
 from dataclasses import dataclass
@@ -13,38 +13,38 @@ from truespring.mesh import element_corner_measures
 from truespring.models.spring_data import PlainSprings
 from truespring.potential import SparseMatrix
 
-# Where the material has no density [kg/m^3], and of each node of a network without material [kg].
+# Default density [kg/m^3], and mass of each node of a network without material [kg].
 _DENSITY, _NODE_MASS = 1000.0, 1.0
-# Simulators take no masses of nothing: MuJoCo none below 1e-15 kg.
+# Smallest mass [kg]; MuJoCo rejects masses below 1e-15 kg.
 _SMALLEST_MASS = 1e-12
-# Semi-implicit Euler is stable up to a time step of 2 over the highest frequency; half of that leaves room.
+# Time step times highest frequency; semi-implicit Euler is stable up to 2.
 _STEP = 1.0
-# Of the highest frequency, where the lowest is not known: no equilibrium was found, or an unstable one.
+# Lowest over highest frequency, if the lowest is unknown: no equilibrium was found, or it is unstable.
 _GUESSED = 1e-3
-# So few unknowns are solved for all their frequencies.
+# Up to this number of unknowns, all frequencies are computed by a dense solver.
 _FEW = 100
-# A body has settled within this share of its largest displacement; the simulation goes on to the second.
+# Distances from equilibrium over the largest displacement: the body has settled; the simulation ends.
 _SETTLED, _SURELY = 1e-3, 1e-5
-# A critically damped oscillation is down to 1e-5 where (1 + w t) exp(-w t) is, at w t = 14.2.
+# w t of a critically damped oscillation, at which (1 + w t) exp(-w t) is below 1e-5.
 _USUAL = 15.0
-# A simulation takes at most so many times as long as that, and so many springs times steps.
+# Limits of a simulation: its duration over the usual one, and springs times steps.
 _LONGEST, _BUDGET = 20, 10**9
-# Nodes that nothing pulls to a support start at rest; the others are pulled so many times more.
+# Relative stiffness that holds nodes without a path to a support at rest.
 _SLACK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a simulator of motion is given, and what it then does.
+    """Parameters of a dynamic simulation, and when it settles.
 
     Attributes:
-        mass: of each node [kg], shape (n_nodes,).
-        damping: force over mass and velocity [1/s], on every node.
-        time_step: of semi-implicit Euler [s].
-        start: where nodes start [m], shape (n_nodes, dim): at rest where no support moves.
-        duration: after which it has settled within 0.1 % of the largest displacement [s].
-        settles: whether it settles on our equilibrium; None where that was not simulated to its end.
-        words: the same in sentences, and what was assumed.
+        mass: mass of each node [kg], shape (n_nodes,).
+        damping: damping force per mass and velocity [1/s], for every node.
+        time_step: time step of semi-implicit Euler [s].
+        start: initial positions [m], shape (n_nodes, dim); undeformed if no support moves.
+        duration: time to settle within 0.1 % of the largest displacement [s].
+        settles: whether it settles at the static equilibrium; None if that was not simulated to its end.
+        words: these values and the assumptions, in sentences.
     """
 
     mass: Floats
@@ -57,18 +57,18 @@ class Motion:
 
 
 def motion_of(exported: Exported, network: PlainSprings) -> Motion:
-    """Return masses of the body's density, damping that is critical for its lowest frequency, and how long it takes.
+    """Return lumped masses, damping that is critical for the lowest frequency, and the time to settle.
 
-    That is found by the motion itself, under the whole load at once, by semi-implicit Euler with implicit damping.
+    The time is found by simulation under the full load from the start: semi-implicit Euler with implicit damping.
     """
     mass, assumed = _masses(exported)
     around = np.bincount(network.springs.ravel(), np.repeat(network.stiffness, 2), len(mass))
     free = ~exported.held.all(axis=1)
-    # Whatever the positions, a spring's tangent is at most k [[I, -I], [-I, I]]: Gershgorin's circles bound the sum.
+    # In any position the tangent of a spring is at most k [[I, -I], [-I, I]]; Gershgorin's circles bound the sum.
     highest = float(np.sqrt((2 * around[free] / mass[free]).max(initial=0.0))) or 1.0
     lowest = _lowest_frequency(exported, network, mass)
     frequency = _GUESSED * highest if lowest is None else lowest
-    told = "a guess, for no stable equilibrium is known" if lowest is None else "that of our equilibrium"
+    source = "a guess, since no stable equilibrium is known" if lowest is None else "that of the equilibrium"
     damping, time_step, start = 2 * frequency, _STEP / highest, _start(exported, network)
     usual = int(np.ceil(_USUAL / (frequency * time_step)))
     steps, settles = _settled(exported, network, (mass, damping, time_step, start), usual)
@@ -81,50 +81,54 @@ def motion_of(exported: Exported, network: PlainSprings) -> Motion:
         settles,
         (
             *assumed,
-            f"Damping is critical for a lowest frequency of {frequency:.6g} rad/s, {told}.",
-            _told(steps, time_step, settles, exported.state is not None),
+            f"Damping is critical for a lowest frequency of {frequency:.6g} rad/s, {source}.",
+            _settling(steps, time_step, settles, exported.state is not None),
         ),
     )
 
 
-def _told(steps: int, time_step: float, settles: bool | None, known: bool) -> str:
-    long = f"{steps} steps, {steps * time_step:.4g} s of its own time"
+def _settling(steps: int, time_step: float, settles: bool | None, known: bool) -> str:
+    """Return the time to settle as a sentence; `known` if the equilibrium is."""
+    long = f"{steps} steps, {steps * time_step:.4g} s of simulated time"
     if settles:
-        return f"It settles within 0.1 % of the largest displacement in {long}."
+        return f"The body settles within 0.1 % of the largest displacement in {long}."
     if not known:
-        return f"How long it takes to settle is not known; {long} are a guess."
+        return f"The time to settle is not known; {long} are a guess."
     if settles is None:
-        return f"It should settle within 0.1 % of the largest displacement in {long}; that was not simulated here."
+        return f"The body should settle within 0.1 % of the largest displacement in {long}; this was not simulated."
     return (
-        f"In {long} it did not settle on the equilibrium given here: under the whole load at once it goes another way. "
-        "Put the load on slowly, or start from the equilibrium."
+        f"In {long} the body did not settle at the equilibrium given above: under the full load from the start it "
+        "moves to another state. Apply the load slowly, or start from the equilibrium."
     )
 
 
 def _masses(exported: Exported) -> tuple[Floats, tuple[str, ...]]:
-    """Lumped mass of each node [kg], and what is assumed."""
+    """Return the lumped mass of each node [kg], shape (n_nodes,), and the assumptions as sentences."""
     problem, mesh = exported.problem, exported.problem.mesh
     words = []
     if not problem.materials:
         mass = np.full(mesh.n_nodes, _NODE_MASS)
-        words.append(f"The network tells no mass: {_NODE_MASS:g} kg a node is assumed; the equilibrium is without it.")
+        words.append(
+            f"The network has no masses: {_NODE_MASS:g} kg per node is assumed; the equilibrium does not depend on it."
+        )
     else:
         if any(material.density is None for material in problem.materials):
             words.append(
-                f"A density of {_DENSITY:g} kg/m^3 is assumed where none is given; the equilibrium is without it."
+                f"A density of {_DENSITY:g} kg/m^3 is assumed where none is given; the equilibrium does not depend on "
+                "it."
             )
         density = problem.of_elements(lambda material: material.density or _DENSITY)
         shares = problem.body.thickness * density[:, None] * element_corner_measures(mesh)
         mass = np.bincount(mesh.elements.ravel(), shares.ravel(), mesh.n_nodes).astype(np.float64)
     if mass.min() < _SMALLEST_MASS:
         factor = _SMALLEST_MASS / mass.min()
-        words.append(f"Masses are multiplied by {factor:.3g}, for simulators take no smaller ones.")
+        words.append(f"Masses are multiplied by {factor:.3g}, because simulators reject smaller ones.")
         mass = mass * factor
     return mass, tuple(words)
 
 
 def _lowest_frequency(exported: Exported, network: PlainSprings, mass: Floats) -> float | None:
-    """The lowest frequency about our equilibrium [rad/s], None where it is not known."""
+    """Return the lowest frequency at the equilibrium [rad/s], None if there is no stable equilibrium."""
     state, free = exported.state, np.flatnonzero(~exported.held.ravel())
     if state is None or state.negative_eigenvalues or not free.size:
         return None
@@ -134,7 +138,7 @@ def _lowest_frequency(exported: Exported, network: PlainSprings, mass: Floats) -
 
 
 def _lowest_eigenvalue(tangent: SparseMatrix, free: Ints, root: Floats) -> float:
-    """Of the tangent of the free directions over the masses whose roots are given [1/s^2]."""
+    """Return the lowest eigenvalue of M^-1/2 K M^-1/2 on the free directions [1/s^2]; `root` is M^1/2."""
     from scipy import sparse
     from scipy.sparse.linalg import eigsh
 
@@ -147,9 +151,9 @@ def _lowest_eigenvalue(tangent: SparseMatrix, free: Ints, root: Floats) -> float
 
 
 def _start(exported: Exported, network: PlainSprings) -> Floats:
-    """Where nodes start [m]: held ones at their places, the others displaced as the mean of their neighbours.
+    """Return the initial positions [m], shape (n_nodes, dim): free nodes move by the mean of their neighbours.
 
-    A body whose supports jump while the rest stands still folds onto itself, and stays so.
+    If supports jumped to their positions while other nodes stood still, the body could fold and stay folded.
     """
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
@@ -171,7 +175,7 @@ def _start(exported: Exported, network: PlainSprings) -> Floats:
 def _settled(
     exported: Exported, network: PlainSprings, motion: tuple[Floats, float, float, Floats], usual: int
 ) -> tuple[int, bool | None]:
-    """The steps to come within 0.1 % of our equilibrium and stay, and whether that is so; by the motion itself."""
+    """Simulate; return the number of steps to settle within 0.1 % of the equilibrium, and whether it settles."""
     longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
     if exported.state is None or longest < usual:
         return usual, None

@@ -1,6 +1,6 @@
-"""Springs for MuJoCo: one MJCF file whose nodes are bodies that slide, its springs spatial tendons.
+"""MuJoCo MJCF files: nodes are bodies on slide joints, springs are spatial tendons.
 
-Source of the form: https://mujoco.readthedocs.io/en/stable/XMLreference.html.
+Source: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
 import re
@@ -16,7 +16,7 @@ from truespring.models.spring_data import PlainSprings
 
 
 def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.xml: MJCF that loads itself and settles on the equilibrium."""
+    """Return springs.xml, an MJCF file with the loads; the simulation settles at the equilibrium."""
     network = exported.network
     return {"springs.xml": "\n".join([*_lines(exported, network, motion_of(exported, network)), ""])}
 
@@ -33,7 +33,7 @@ def _lines(exported: Exported, network: PlainSprings, motion: Motion) -> Iterato
     yield f'<option timestep="{motion.time_step!r}" gravity="0 0 0" integrator="Euler">'
     yield '  <flag contact="disable" energy="enable"/>'
     yield "</option>"
-    # MuJoCo's own guess of the memory that a step takes grows with the square of the nodes; it takes 300 bytes a node.
+    # MuJoCo's default memory grows with the square of the number of nodes; a step needs 300 bytes per node.
     yield f'<size memory="{16 + len(nodes) // 500}M"/>'
     yield f'<statistic extent="{extent!r}" meansize="{length!r}" center="{_numbers(nodes.mean(axis=0))}"/>'
     looked_on = -90 if exported.problem.mesh.dim == 2 else -20
@@ -71,22 +71,22 @@ def _lines(exported: Exported, network: PlainSprings, motion: Motion) -> Iterato
 
 _EXPLAINED = (
     "Node i is body and site n<i>, spring j is tendon s<j>, both counted from 0 as in the study.",
-    "A body slides along x, y, z where its node is free, and stands where a support moves it where it is not.",
-    "Forces on nodes are actuators of constant force; gravity is off, weights are among these forces.",
-    "The whole load acts from the start. Where supports move, they stand at their places then, and other nodes start "
-    "at the mean of their neighbours. The key 'equilibrium' is the state that is given above.",
+    "Each body has slide joints in the free directions of its node; in the others it is fixed at its final position.",
+    "Nodal forces are actuators of constant force; gravity is off, weight is included in these forces.",
+    "The full load acts from the start. Supports that move start at their final positions, other nodes are displaced "
+    "by the mean of their neighbours. The keyframe 'equilibrium' is the state given above.",
 )
 
 
 def _slides(number: int, held: Bools, mass: float, damping: float) -> Iterator[str]:
-    """The directions in which a node is free; a node without any belongs to the world and has no mass."""
+    """Yield the slide joints and mass of a node; a node without free directions is fixed to the world, without mass."""
     if held.all():
         return
     for axis in np.flatnonzero(~held):
         direction = " ".join("1" if other == axis else "0" for other in range(3))
         name = f"n{number}{AXES[axis]}"
         yield f'    <joint name="{name}" type="slide" axis="{direction}" damping="{damping * mass!r}"/>'
-    # A body that only slides does not turn: its moments of inertia are there because MuJoCo asks for them.
+    # A body on slide joints does not rotate; MuJoCo requires moments of inertia nevertheless.
     yield f'    <inertial pos="0 0 0" mass="{mass!r}" diaginertia="{mass!r} {mass!r} {mass!r}"/>'
 
 
@@ -95,5 +95,5 @@ def _numbers(values: Floats) -> str:
 
 
 def _comment(line: str) -> str:
-    """XML's comments hold no two hyphens in a row."""
+    """Return a line with "--" separated, which XML comments must not contain."""
     return re.sub("-(?=-)", "- ", line)

@@ -1,7 +1,7 @@
-"""A Python scene for SOFA: the springs, and their finite element twin beside them. Experimental: SOFA was not run.
+"""Python scenes for SOFA, of springs and finite elements. Experimental: SOFA was not run.
 
-The form was checked against the sources of SOFA (https://github.com/sofa-framework/sofa) and SofaPython3: components,
-the names of their data, and what they compute. StiffSpringForceField has been SpringForceField since v24.06.
+Components, the names of their data and what they compute were checked against the source code of SOFA
+(https://github.com/sofa-framework/sofa) and SofaPython3. StiffSpringForceField is SpringForceField since v24.06.
 """
 
 import textwrap
@@ -12,12 +12,13 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, in_space
 from truespring.exports.exported import Exported
+from truespring.mesh.facets import triangles_of
 from truespring.models.spring_data import PlainSprings
 
-#: What the form was checked against.
+#: The version of SOFA whose source code the scene was checked against.
 CHECKED = "SOFA v26.12 in development, commit 2a278d8 of 2026-08-06; the names are those of v25.06 and v26.06 too"
 
-# SOFA's plugins that hold the components of a scene.
+# SOFA plugins of the components of a scene.
 _PLUGINS = (
     "Sofa.Component.Constraint.Projective",
     "Sofa.Component.LinearSolver.Direct",
@@ -30,10 +31,10 @@ _PLUGINS = (
     "Sofa.Component.Visual",
 )
 
-# Numbers in a line.
+# Numbers per line.
 _A_LINE = 8
 
-# The finite elements by the kind of the mesh: what SOFA calls them in a topology, and the component.
+# Name in a topology, and component, of the finite elements for each kind of element.
 _ELEMENTS = {
     "triangle": ("triangles", "TriangleFEMForceField"),
     "quadrilateral": ("triangles", "TriangleFEMForceField"),
@@ -43,7 +44,7 @@ _ELEMENTS = {
 
 
 def sofa(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs_scene.py, with createScene(root) for runSofa and a main for plain Python."""
+    """Return springs_scene.py, with createScene(root) for runSofa, and main() to run it by Python."""
     network = exported.network
     lines = [
         '"""' + "\n".join(_docstring(exported)),
@@ -61,43 +62,42 @@ def sofa(exported: Exported) -> Mapping[str, str | bytes]:
 
 
 def _docstring(exported: Exported) -> Iterator[str]:
-    told = [*exported.header, *_EXPLAINED, *_of_elements(exported)]
-    for line in told:
+    for line in [*exported.header, *_EXPLAINED, *_of_elements(exported)]:
         safe = line.replace("\\", "/").replace('"', "'")
         yield from textwrap.wrap(safe, 110, subsequent_indent="    ", break_long_words=False) or [""]
 
 
 _EXPLAINED = (
-    "EXPERIMENTAL: SOFA was not run on this file. Its form was checked against the sources of " + CHECKED + ".",
-    "Run it by: runSofa -l SofaPython3 springs_scene.py, or where SofaPython3 is on the path: python springs_scene.py.",
-    "Node i and spring j are counted from 0 as in the study; a plane body lies in z = 0 and is held there.",
-    "Loads and motions grow to their full values in LOAD_STEPS steps of the animation, each solved as a static state; "
-    "nodes that a support turns go straight to their places.",
-    "SOFA leaves out springs shorter than 1e-9 m.",
+    "EXPERIMENTAL: SOFA was not run on this file. It was checked against the source code of " + CHECKED + ".",
+    "Run it by: runSofa -l SofaPython3 springs_scene.py, or if SofaPython3 is on the path: python springs_scene.py.",
+    "Nodes and springs are counted from 0 as in the study; a plane body lies in z = 0 and is held there.",
+    "Loads and prescribed displacements increase to their full values in LOAD_STEPS animation steps, each a static "
+    "solve; nodes that a support rotates move along straight lines.",
+    "SOFA ignores springs shorter than 1e-9 m.",
 )
 
 
 def _of_elements(exported: Exported) -> Iterator[str]:
-    """What the finite elements are there, which is not what they are here."""
+    """Yield sentences on the finite elements of the scene, which differ from those of Fem."""
     element = exported.problem.mesh.element
     if not exported.problem.materials:
-        yield "A network has no finite element twin. It starts from the first load level that truespring reached."
+        yield "A network has no finite elements. It starts from the first load level that truespring reached."
         return
     if element not in _ELEMENTS:
-        yield f"There is no finite element twin: {exported.problem.mesh.kinds} elements are not exported to SOFA."
+        yield f"There are no finite elements: {exported.problem.mesh.kinds} elements are not exported to SOFA."
         return
     yield (
-        f"The twin's elements are SOFA's {_ELEMENTS[element][1]}, method 'large': linear elasticity turned with each "
-        "element, which is no law of truespring's; at small strain all agree."
+        f"The finite elements are SOFA's {_ELEMENTS[element][1]}, method 'large': corotational linear elasticity, "
+        "which is not a law of truespring; at small strain they agree."
     )
     if element == "quadrilateral":
-        yield "Each quadrilateral is two triangles there, which are stiffer in bending."
+        yield "Each quadrilateral is divided into two triangles, which are stiffer in bending."
     if element == "hexahedron":
-        yield "SOFA's hexahedra are exact for bricks along the axes only."
+        yield "SOFA's hexahedra are exact only for axis-aligned bricks."
 
 
 def _data(exported: Exported, network: PlainSprings) -> Iterator[str]:
-    """The numbers of the scene by name."""
+    """Yield the constants of the scene, each with a comment."""
     nodes = in_space(network.nodes)
     held = np.ones(nodes.shape, dtype=bool)
     held[:, : exported.held.shape[1]] = exported.held
@@ -106,24 +106,24 @@ def _data(exported: Exported, network: PlainSprings) -> Iterator[str]:
     loaded = np.flatnonzero(force.any(axis=1))
     moved = np.argwhere(motion != 0)
     probe = [exported.probe, None if exported.state is None else _probed(exported)]
-    yield from _named("PLUGINS", list(_PLUGINS), "SOFA's plugins that hold the components")
-    yield from _named("LOAD_STEPS", exported.load_steps, "steps of the animation up to full load")
-    yield from _named("NODES", nodes, "positions at rest [m]")
-    yield from _named("START", _start(exported), "positions to start from [m], None where that is at rest")
+    yield from _named("PLUGINS", list(_PLUGINS), "SOFA plugins of the components")
+    yield from _named("LOAD_STEPS", exported.load_steps, "animation steps up to full load")
+    yield from _named("NODES", nodes, "undeformed positions [m]")
+    yield from _named("START", _start(exported), "initial positions [m], None if undeformed")
     yield from _named("SPRINGS", network.springs, "the two nodes of each spring")
-    yield from _named("STIFFNESS", network.stiffness, "of each spring [N/m]")
-    yield from _named("REST_LENGTH", network.rest_length, "of each spring [m]")
-    yield from _named("HELD", _held(held), "which of x, y, z are held, of which nodes")
+    yield from _named("STIFFNESS", network.stiffness, "stiffness of each spring [N/m]")
+    yield from _named("REST_LENGTH", network.rest_length, "rest length of each spring [m]")
+    yield from _named("HELD", _held(held), "whether x, y, z are held, and the nodes of which")
     yield from _named("LOADED", loaded, "nodes with a force")
-    yield from _named("FORCES", force[loaded], "on them at full load [N]")
+    yield from _named("FORCES", force[loaded], "force on each of LOADED at full load [N]")
     motions = [(int(node), int(axis), float(motion[node, axis])) for node, axis in moved]
     yield from _named("MOTIONS", motions, "node, direction and prescribed displacement at full load [m]")
-    yield from _named("PROBE", probe, "a node, and its displacement at full load [m]")
-    yield from _named("FEM", _elements(exported), "the finite element twin, None where there is none")
+    yield from _named("PROBE", probe, "probe node and its expected displacement at full load [m]")
+    yield from _named("FEM", _elements(exported), "the finite elements, None if there are none")
 
 
 def _start(exported: Exported) -> Floats | None:
-    """Our first load level, of a network: at rest it may be a mechanism, of which Newton's method knows no way out."""
+    """Return the positions at the first load level, for networks: at rest one may be a mechanism, which is singular."""
     loaded = exported.path.states[1:]
     return in_space(loaded[0].positions) if loaded and not exported.problem.materials else None
 
@@ -147,7 +147,7 @@ def _probed(exported: Exported) -> list[float]:
 
 
 def _held(held: Bools) -> list[tuple[list[int], list[int]]]:
-    """The nodes of each pattern of held directions, those without any left out."""
+    """Return each pattern of held directions and its nodes; nodes without held directions are left out."""
     patterns, which = np.unique(held, axis=0, return_inverse=True)
     return [
         ([int(one) for one in pattern], np.flatnonzero(which.ravel() == number).tolist())
@@ -157,21 +157,20 @@ def _held(held: Bools) -> list[tuple[list[int], list[int]]]:
 
 
 def _elements(exported: Exported) -> dict[str, Any] | None:
-    """Component, topology and material of the finite element twin."""
+    """Return component, topology and material of the finite elements."""
     problem = exported.problem
     if not problem.materials or problem.mesh.element not in _ELEMENTS:
         return None
     topology, component = _ELEMENTS[problem.mesh.element]
-    elements, times = problem.mesh.elements, 1
-    if problem.mesh.element == "quadrilateral":
-        elements, times = elements[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), 2
+    elements = problem.mesh.elements if problem.mesh.dim == 3 else triangles_of(problem.mesh.elements)
+    times = len(elements) // len(problem.mesh.elements)
     plane: dict[str, Any] = {}
     if problem.section is not None and problem.mesh.dim == 2:
         plane = {"thickness": problem.section.thickness, "planeStrain": exported.section == "plane strain"}
 
     def by_element(values: Floats) -> list[float]:
-        """One for all where they are the same."""
-        return [float(values[0])] if (values == values[0]).all() else np.repeat(values, times).tolist()
+        """Return one value if all elements have the same, else one for each element."""
+        return [float(values[0])] if (values == values[0]).all() else np.tile(values, times).tolist()
 
     return {
         "component": component,
@@ -185,13 +184,13 @@ def _elements(exported: Exported) -> dict[str, Any] | None:
     }
 
 
-# What is the same in every scene. Damping is given, for SOFA's own default is not zero; so are the stopping
-# thresholds, of which one is absolute by default. Newton's steps are taken whole: where a slender body turns, the
-# residual grows before it falls, and a line search on it takes three times as many.
+# The part that is the same in every scene. Damping is 0 since SOFA's default is not; of the stopping thresholds one is
+# absolute by default. Full Newton steps, without line search: when a slender body rotates, the residual grows before
+# it falls, and a line search on it needs three times as many steps.
 _SCENE = '''
 
 class Levels(Sofa.Core.Controller):
-    """Takes forces and prescribed motions of a body to their full values, a level a step."""
+    """Increases forces and prescribed displacements of a body to their full values, one level per animation step."""
 
     def __init__(self, dofs, forces, *args, **kwargs):
         Sofa.Core.Controller.__init__(self, *args, **kwargs)
@@ -209,7 +208,7 @@ class Levels(Sofa.Core.Controller):
 
 
 def add_body(root, name):
-    """Add a body with everything but what resists its deformation."""
+    """Add a body with solver, supports and loads, without springs or elements."""
     body = root.addChild(name)
     body.addObject(
         "NewtonRaphsonSolver",
@@ -240,7 +239,7 @@ def add_body(root, name):
 
 
 def createScene(root):
-    root.gravity = [0.0, 0.0, 0.0]  # weights are among the forces
+    root.gravity = [0.0, 0.0, 0.0]  # weight is included in the forces
     root.addObject("RequiredPlugin", pluginName=PLUGINS)
     root.addObject("DefaultAnimationLoop")
     root.addObject("VisualStyle", displayFlags="showBehaviorModels showForceFields showInteractionForceFields")
@@ -275,8 +274,8 @@ def main():
     node, expected = PROBE
     for body in root.children:
         place = body.dofs.position.value[node]
-        print(body.name.value, "node", node, "has moved by", [p - q for p, q in zip(place, NODES[node])], "m")
-    print("truespring expects of the springs", expected, "m")
+        print(body.name.value, "node", node, "displacement", [p - q for p, q in zip(place, NODES[node])], "m")
+    print("expected displacement of the springs", expected, "m")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Facets of elements, each said as an element and the number of its facet in the table of kinds.
+"""Facets of elements, each given by an element and its local facet: a row of `facets` in ELEMENT_KINDS.
 
-Elements are those of a mesh, in one table with their kind; see `Mesh`. Beside quadrilaterals triangles name their last
-corner twice.
+Elements are given as `Mesh` holds them: a table and their kind. In a table with quadrilaterals, a triangle repeats its
+last corner.
 """
 
 from collections.abc import Iterator
@@ -15,11 +15,11 @@ from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, Groups
 from truespring.mesh.merged import kinds_in
 from truespring.mesh.rows import ascending, distinct_rows
 
-_QUADRILATERAL = 4  # corners of the largest facets
+_QUADRILATERAL = 4  # number of corners
 
 
 class _OfKind(NamedTuple):
-    """Elements of one kind: their numbers among all, their nodes, and their facets as long as the longest of all."""
+    """Elements of one kind: numbers, nodes, and the local nodes of their facets, padded to the longest facet."""
 
     numbers: Ints
     nodes: Ints
@@ -35,15 +35,15 @@ def _tables(elements: Ints, kind: str) -> Iterator[_OfKind]:
 
 
 def facet_columns(elements: Ints, kind: str) -> Ints:
-    """Return all facets of elements as columns, those of all elements of a kind by facet, shape (k, n)."""
+    """Return all facets of elements as columns, shape (k, n): kind by kind, facet by facet, element by element."""
     found = [own.nodes.T[own.local.T].reshape(own.local.shape[1], -1) for own in _tables(elements, kind)]
-    if not found:  # no element, of several kinds: facets of these have two corners in the plane, four in space
+    if not found:  # no elements, of a mixed mesh: two corners per facet in 2D, four in 3D
         return np.zeros((2 if elements.shape[1] == _QUADRILATERAL else _QUADRILATERAL, 0), dtype=np.int64)
     return found[0] if len(found) == 1 else np.concatenate(found, axis=1)
 
 
 def facet_keys(facets: Ints) -> list[Ints]:
-    """Return the nodes of facets ascending, from columns to columns; of a corner named twice the largest twice."""
+    """Return the sorted nodes of facets, given and returned as columns; if a corner is repeated, repeat the largest."""
     ordered = ascending(facets)
     if len(ordered) < _QUADRILATERAL:
         return ordered
@@ -62,7 +62,7 @@ def n_facets(elements: Ints, kind: str) -> Ints:
 
 
 def facet_nodes(elements: Ints, kind: str, facets: Ints) -> Ints:
-    """Return the nodes of facets, from outside anticlockwise; `facets` (n, 2) are element and local facet."""
+    """Return the nodes of facets, anticlockwise seen from outside, shape (n, k); `facets` has shape (n, 2)."""
     tables = list(_tables(elements, kind))
     if len(tables) == 1:
         return np.asarray(elements[facets[:, :1], tables[0].local[facets[:, 1]]])
@@ -77,9 +77,9 @@ def facet_nodes(elements: Ints, kind: str, facets: Ints) -> Ints:
 
 
 def find_facets(elements: Ints, kind: str, cells: Ints) -> Ints:
-    """Find the facets that have the nodes of `cells`, in whatever order, shape (n, k); of a node -1 no element has any.
+    """Find the facets with the nodes of `cells`, shape (n, k), in any order; cells with a node -1 match no facet.
 
-    Returns element and local facet of the first element that has it, -1 where none has, shape (n, 2).
+    Returns element and local facet of the first element that has the facet, -1 if none has it, shape (n, 2).
     """
     tables = list(_tables(elements, kind))
     longest = tables[0].local.shape[1]
@@ -96,7 +96,7 @@ def find_facets(elements: Ints, kind: str, cells: Ints) -> Ints:
         there.append(own.nodes[row[:, None], own.local[local]])
     known_facets, n_there = np.concatenate(which), sum(map(len, there))
     distinct = distinct_rows(facet_keys(np.concatenate([*there, cells]).T))
-    # Of equal rows the first comes first, and those of elements stand before all cells.
+    # The sort is stable: the first of equal rows is that of an element, if there is one.
     first = distinct.first[distinct.of[n_there:]]
     known = first < n_there
     found[known] = known_facets[first[known]]
@@ -104,9 +104,9 @@ def find_facets(elements: Ints, kind: str, cells: Ints) -> Ints:
 
 
 def folded(elements: Ints, kind: str) -> Bools:
-    """Tell which elements lie on the same side of a facet as a neighbour of theirs, shape (n_elements,).
+    """Return whether elements lie on the same side of a facet as a neighbour, shape (n_elements,).
 
-    Two elements that share a facet go round it in opposite ways, unless one of them is folded over the other.
+    Two elements that share a facet traverse it in opposite directions, unless one is folded over the other.
     """
     tables = list(_tables(elements, kind))
     nodes = np.concatenate([own.nodes[:, own.local].reshape(-1, own.local.shape[1]) for own in tables])
@@ -118,7 +118,7 @@ def folded(elements: Ints, kind: str) -> Bools:
 
 
 def _way(nodes: Ints) -> Bools:
-    """Which way round facets go: of those with the same corners those of one way are alike, shape (n,)."""
+    """Return the sense in which facets are traversed, comparable between facets with the same corners, shape (n,)."""
     if nodes.shape[1] == len("ab"):
         return np.asarray(nodes[:, 0] < nodes[:, 1])
     if nodes.shape[1] == _QUADRILATERAL:
@@ -133,9 +133,9 @@ def _way(nodes: Ints) -> Bools:
 
 
 def halved(facets: Ints) -> Bools:
-    """Tell which facets in space are quadrilaterals on which two triangles of the others lie, or these triangles.
+    """Return whether a facet is a quadrilateral covered by two other triangles, or one of these triangles.
 
-    Facets of shape (n, 3 or 4), the result (n,).
+    Facets of a 3D mesh have shape (n, 3 or 4), the result has shape (n,).
     """
     inside = np.zeros(len(facets), dtype=bool)
     if facets.shape[1] < _QUADRILATERAL or not len(facets):
@@ -155,7 +155,7 @@ def halved(facets: Ints) -> Bools:
 
 
 def mirrored_facets(kind: str) -> Ints:
-    """Return what each local facet is called once its element is mirrored, shape (facets,)."""
+    """Return the number of each local facet after its element is mirrored, shape (n_facets,)."""
     facets = ELEMENT_KINDS[kind].facets
     after = [{MIRRORED[kind][node] for node in facet} for facet in facets]
     return np.array([after.index(set(facet)) for facet in facets])
@@ -165,12 +165,12 @@ def mirrored_facets(kind: str) -> Ints:
 def children_of_facet(
     facets: Groups, parents: Groups, children: tuple[tuple[tuple[int, ...], Groups], ...]
 ) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Return, for each facet of an element that is divided, its parts: child and the child's local facet.
+    """Return, for each facet of a divided element, its parts, each as a child and a local facet of the child.
 
     Args:
-        facets: of the element.
-        parents: of each local node, the corners of the element that it is the middle of.
-        children: local nodes of each child, and its own facets.
+        facets: facets of the element.
+        parents: for each local node, the corners whose midpoint it is.
+        children: for each child, its local nodes and its facets.
     """
     return tuple(
         tuple(
@@ -183,10 +183,24 @@ def children_of_facet(
     )
 
 
-def triangles_of(facets: Ints) -> Ints:
-    """Return triangles as they are and quadrilaterals each as two, the first halves first, shape (m, 3).
+def fanned(facets: Ints) -> list[Ints]:
+    """Divide facets, shape (n, k), into edges or triangles: fans from the node with the smallest number.
 
-    Triangles among quadrilaterals, whose last two corners are one, have no second half.
+    Neighbouring elements thus divide a shared facet alike. A facet with its last corner repeated is a triangle.
+    """
+    if facets.shape[1] < _QUADRILATERAL:
+        return [facets]
+    if (twice := facets[:, 2] == facets[:, 3]).any():
+        return [facets[twice][:, :3], *(fanned(facets[~twice]) if not twice.all() else [])]
+    around = (facets.argmin(axis=1)[:, None] + np.arange(_QUADRILATERAL)) % _QUADRILATERAL
+    turned = np.take_along_axis(facets, around, axis=1)
+    return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+
+
+def triangles_of(facets: Ints) -> Ints:
+    """Divide quadrilaterals into two triangles, all first halves first; return triangles, shape (m, 3).
+
+    A quadrilateral with its last corner repeated is one triangle.
     """
     if facets.shape[1] < 4:
         return facets

@@ -5,7 +5,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 
 
-def merged(places: Floats, near: float) -> tuple[Ints, Ints]:
+def distinct_points(places: Floats, near: float) -> tuple[Ints, Ints]:
     """Number the distinct places, those nearer than `near` once, chains of them too.
 
     Args:

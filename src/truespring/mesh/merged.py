@@ -20,7 +20,7 @@ def width(dim: int) -> int:
     return ELEMENT_KINDS[_WHOLE[dim]].n_nodes
 
 
-def merged(cells: Mapping[str, Ints]) -> Ints:
+def mixed_table(cells: Mapping[str, Ints]) -> Ints:
     """Return elements of several kinds in one table, shape (n_elements, 4 or 8), kind after kind."""
     tables = []
     for kind, elements in cells.items():

@@ -18,7 +18,7 @@ from truespring.mesh.corners import Corners, corners_in_slices, determinants, sq
 from truespring.mesh.facets import facet_columns, facet_keys, facet_nodes, halved, n_facets
 from truespring.mesh.forms import Forms, find_forms
 from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links
-from truespring.mesh.merged import merged, unmerged, width
+from truespring.mesh.merged import mixed_table, unmerged, width
 from truespring.mesh.rows import ascending, distinct_rows
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
@@ -105,7 +105,7 @@ class Mesh:
             return cls(nodes, elements, kind, node_groups, element_groups, facet_groups, notes)
         if not there:
             raise MeshError("a mesh without elements is empty")
-        return cls(nodes, merged(there), MIXED, node_groups, element_groups, facet_groups, notes)
+        return cls(nodes, mixed_table(there), MIXED, node_groups, element_groups, facet_groups, notes)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

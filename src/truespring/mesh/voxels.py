@@ -11,9 +11,9 @@ from truespring.deprecation import renamed_argument
 from truespring.errors import MeshError
 from truespring.mesh.files.images import read_labels
 from truespring.mesh.files.labels import Labels
-from truespring.mesh.files.unit import length_unit
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.shapes import refuse_too_large
+from truespring.units import unit_of
 
 # The image is looked at in so many places along each edge of a cube: it is part of the body where more than
 # half of them are.
@@ -36,7 +36,7 @@ def read_voxels(file: str | Path, label: int | str, edge: float | None = None, u
     (LPS, as in DICOM and ITK). Raises MeshError, with the file, where the image cannot be read
     or has no such label, or nothing is left of it.
     """
-    scale = length_unit(unit, file)
+    scale = unit_of(unit, "length", f"{file}: unit", MeshError)
     if edge is not None and not (math.isfinite(edge) and edge > 0):
         raise MeshError(f"{file}: edge = {edge:g} m: the edge of the cubes must be above 0")
     labels = read_labels(file)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from truespring.mesh.joining import merged
+from truespring.mesh.joining import distinct_points
 from truespring.reference.record import Record
 
 # Shares of the body's diameter and of the largest displacement: a vertex as several cells compute it in float32.
@@ -21,7 +21,7 @@ def joined(record: Record) -> Record:
     if not len(used) or not np.isfinite(record.points[used]).all():
         return record
     points = record.points[used]
-    first, number = merged(points, _SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    first, number = distinct_points(points, _SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0))))
     n_twins = len(used) - len(first)
     if not n_twins:
         return record

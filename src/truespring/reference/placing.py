@@ -3,18 +3,17 @@
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, along_axes
 from truespring.equilibrium import Solution, State, Status
-from truespring.errors import MeshError, ReferenceFileError, TruespringError
+from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, corner_mesh
 from truespring.mesh.selections import AXES
 from truespring.problem import Problem
 from truespring.reference.record import Record
-from truespring.units import unit_size
+from truespring.units import unit_of
 
 # A body this thin lies in a plane, a share of its diameter; displacements out of it are as small beside the others.
 _FLAT = 1e-6
@@ -55,46 +54,22 @@ class Placing:
     @property
     def scale(self) -> float:
         """The file's unit of length [m]."""
-        size = _unit(self.unit, "length")
-        if size is None:
-            raise ReferenceFileError(
-                f"unit = '{self.unit}' is no unit of length; allowed are m, cm, mm, inch and others"
-            )
-        return size
+        return unit_of(self.unit, "length", "unit", ReferenceFileError)
 
     @property
     def joules(self) -> float:
-        """The file's unit of energy [J], not a number where that of force is not told."""
+        """The file's unit of energy [J], NaN if the unit of force is not given."""
         if self.force_unit is None:
             return math.nan
-        size = _unit(self.force_unit, "force")
-        if size is None:
-            raise ReferenceFileError(
-                f"force_unit = '{self.force_unit}' is no unit of force; allowed are N, kN, uN and others"
-            )
-        return size * self.scale
+        return self.scale * unit_of(self.force_unit, "force", "force_unit", ReferenceFileError)
 
-    def turned(self, vectors: Floats) -> Floats:
-        """Return vectors of the file, shape (n, 3), along our axes, in the file's unit."""
-        return np.stack(
-            [(-1.0 if axis[0] == "-" else 1.0) * vectors[:, AXES.index(axis[-1])] for axis in self.axes], axis=1
-        )
-
-    def places(self, points: Floats) -> Floats:
-        """Return points of the file, shape (n, 3), where they lie [m]."""
-        return np.asarray(self.scale * self.turned(points) + np.array(self.shift))
+    def positions(self, points: Floats) -> Floats:
+        """Convert points of the file, shape (n, 3), to positions along the axes of the study [m], shape (n, 3)."""
+        return np.asarray(self.scale * along_axes(points, self.axes) + np.array(self.shift))
 
     def displacement(self, vectors: Floats) -> Floats:
-        """Return displacements of the file, shape (n, 3), along our axes [m]."""
-        return self.scale * self.turned(vectors)
-
-
-def _unit(text: str, dimension: Literal["length", "force"]) -> float | None:
-    """The size of a unit in SI, None where it is none of the dimension."""
-    try:
-        return unit_size(text, dimension)
-    except TruespringError:
-        return None
+        """Convert displacements of the file, shape (n, 3), to the axes of the study [m], shape (n, 3)."""
+        return self.scale * along_axes(vectors, self.axes)
 
 
 def placed(record: Record, placing: Placing, label: str) -> Solution:
@@ -104,7 +79,7 @@ def placed(record: Record, placing: Placing, label: str) -> Solution:
     mesh, or its levels no load levels.
     """
     record, left_out = _without_unknown(record)
-    points = placing.places(record.points)
+    points = placing.positions(record.points)
     factors, notes = _load_factors(record, placing)
     moves = [placing.displacement(level.displacement) for level in record.levels]
     dim = _dim(record, points, moves)

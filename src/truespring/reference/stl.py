@@ -9,7 +9,7 @@ from truespring.equilibrium import Solution, State, Status
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh import Grid, Mesh, Shell, Surface, corner_mesh
 from truespring.mesh.files.stl import parse_stl
-from truespring.mesh.joining import merged as merged_within
+from truespring.mesh.joining import distinct_points
 from truespring.mesh.selections import AXES
 from truespring.opening import read_file
 from truespring.problem import Problem
@@ -91,7 +91,7 @@ def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution
     Raises ReferenceFileError where the file cannot be read.
     """
     facets = read_facets(file, placing)
-    first, numbers = merged(facets.reshape(-1, 3))
+    first, numbers = distinct_vertices(facets.reshape(-1, 3))
     points, triangles = facets.reshape(-1, 3)[first], numbers.reshape(-1, 3)
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)]
@@ -117,7 +117,7 @@ def read_facets(file: Path, placing: Placing) -> Floats:
         read = parse_stl(_bytes(file))
     except MeshError as error:
         raise ReferenceFileError(f"{file}: {error}: {_EXPORT_AGAIN}") from None
-    facets = placing.places(read.reshape(-1, 3)).reshape(-1, 3, 3)
+    facets = placing.positions(read.reshape(-1, 3)).reshape(-1, 3, 3)
     bad = np.flatnonzero(~np.isfinite(facets).all(axis=(1, 2)))
     if bad.size:
         raise ReferenceFileError(
@@ -178,7 +178,7 @@ def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: Path) -> N
 
 def _surface(facets: Floats, load_factor: float, file: Path) -> Surface:
     """Join the facets, shape (n_facets, 3, 2), at their common vertices."""
-    first, numbers = merged(facets.reshape(-1, 2))
+    first, numbers = distinct_vertices(facets.reshape(-1, 2))
     return _triangulated(facets.reshape(-1, 2)[first], numbers.reshape(-1, 3), load_factor, file)
 
 
@@ -195,7 +195,7 @@ def _matched(
         raise ReferenceFileError(f"{file} and {rest_file} hold the same shape: export one with, one without the load")
     face = _face(rest, rest_file)
     before, after = rest[face, :, :2].reshape(-1, 2), deformed[face, :, :2].reshape(-1, 2)
-    first, numbers = merged(before)
+    first, numbers = distinct_vertices(before)
     spread = np.linalg.norm(after - after[first][numbers], axis=1)
     worst = int(spread.argmax())
     if spread[worst] > 10 * _SAME_POINT * np.linalg.norm(np.ptp(after, axis=0)):
@@ -211,9 +211,9 @@ def _matched(
     )
 
 
-def merged(places: Floats) -> tuple[Ints, Ints]:
+def distinct_vertices(places: Floats) -> tuple[Ints, Ints]:
     """Number the distinct places, nearly equal ones once; return a row of each, and the number of each row."""
-    return merged_within(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
+    return distinct_points(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
 
 
 def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: Path) -> Surface:

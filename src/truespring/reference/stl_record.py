@@ -9,7 +9,7 @@ from truespring.errors import ReferenceFileError
 from truespring.reference.checks import checked, refuse_unreadable
 from truespring.reference.placing import Placing
 from truespring.reference.record import Level, Reading, Record
-from truespring.reference.stl import merged, read_facets
+from truespring.reference.stl import distinct_vertices, read_facets
 
 # A share of the body's diameter: facets that meet at rest still meet when deformed.
 _APART = 1e-5
@@ -47,7 +47,7 @@ def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path |
             f"{file} has {len(deformed)} facets, {undeformed} has {len(rest)}: export both from one mesh"
         )
     before, after = rest.reshape(-1, 3), deformed.reshape(-1, 3)
-    first, numbers = merged(before)
+    first, numbers = distinct_vertices(before)
     spread = np.linalg.norm(after - after[first][numbers], axis=1)
     worst = int(spread.argmax())
     if spread[worst] > _APART * np.linalg.norm(np.ptp(after, axis=0)):

@@ -10,6 +10,7 @@ from truespring.arrays import Floats
 from truespring.comparison import compare
 from truespring.converging.settling import Settling, settle
 from truespring.errors import MeshError, StudyError
+from truespring.richardson import observed_order, remaining_error
 from truespring.validity.bodies import Body
 from truespring.validity.loads import Course, LoadType
 from truespring.validity.solving import Solved, Task, conjugate_force, run_task
@@ -236,8 +237,8 @@ def _by_richardson(changes: list[float]) -> tuple[float, float | None]:
     """
     if not changes:
         return math.inf, None
-    orders = [math.log2(before / one) if before and one else 0.0 for before, one in pairwise(changes)]
+    orders = [observed_order(before, one) or 0.0 for before, one in pairwise(changes)]
     low, high = (min(orders[-2:]), max(orders[-2:])) if orders else (0.0, 0.0)
     shown = len(orders) > 1 and low >= _LOWEST and high - low <= _ASYMPTOTIC * high
     order = min(low, _HIGHEST) if shown else _CAUTIOUS if not orders else min(max(orders[-1], _LOWEST), _CAUTIOUS)
-    return _SAFETY * changes[-1] / (2**order - 1), order if shown else None
+    return remaining_error(_SAFETY * changes[-1], order), order if shown else None

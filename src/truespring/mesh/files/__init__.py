@@ -19,10 +19,10 @@ from truespring.mesh.files.contents import Contents
 from truespring.mesh.files.gmsh import read_msh
 from truespring.mesh.files.heads import Recognises, foreign, format_by_head, is_inp, is_msh, listed_keys, read_as
 from truespring.mesh.files.inp import read_inp
-from truespring.mesh.files.unit import length_unit
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
+from truespring.units import unit_of
 
 Reader = Callable[[bytes, Path], Contents]
 
@@ -99,7 +99,7 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
     mostly with a note on nodes that no element has.
     """
     file = Path(file)
-    scale = length_unit(unit, file)
+    scale = unit_of(unit, "length", f"{file}: unit", MeshError)
     data = _bytes(file)
     key = format_by_head(file.suffix, data, {suffix: form.recognises for suffix, form in FORMATS.items()})
     if key is None:

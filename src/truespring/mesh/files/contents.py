@@ -17,7 +17,7 @@ from truespring.mesh.facets import (
     halved,
     mirrored_facets,
 )
-from truespring.mesh.joining import merged
+from truespring.mesh.joining import distinct_points
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED, counted
 from truespring.mesh.merged import kinds_in, mirrored, repeats, turned
 from truespring.mesh.mesh import Mesh
@@ -220,7 +220,7 @@ class Contents:
         if not always and len(np.unique(used)) < len(used):
             return self
         near = _SAME_PLACE * float(np.linalg.norm(np.ptp(self.points[used], axis=0)))
-        first, place = merged(self.points, near)
+        first, place = distinct_points(self.points, near)
         n_before, n_after = len(np.unique(used)), len(np.unique(place[used]))
         if n_after == n_before:
             return self
