@@ -1,6 +1,7 @@
 """The command line and what it leaves behind: the contract that other programs rely on."""
 
 import csv
+import html
 import json
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import trimesh
 
 from tests.studies import changed, written
 from truespring.cli import main
+from truespring.study import read_study
 
 MODELS = ["springs", "linear"]
 MOVED = (
@@ -44,7 +46,11 @@ def test_verify_writes_every_file_of_the_contract(out: Path) -> None:
         expected |= {f"{model}.pvd", model, f"deformed_{model}.stl"}
     # A hidden list of them all is for the next run.
     assert {path.name for path in (out / "study").iterdir()} == {*expected, ".truespring.json"}
-    assert (out / "report.html").read_bytes() == (out / "study" / "report.html").read_bytes()
+    page = (out / "report.html").read_bytes()
+    assert page == (out / "study" / "report.html").read_bytes()
+    problem = read_study(out.parent / "study.toml").problem
+    for words in (problem.loads[0].words(), problem.supports[0].words(2)):
+        assert words in html.unescape(page.decode())
     figures = {path.name for path in (out / "study" / "figures").iterdir()}
     for name in ("undeformed", "curves", "springs_over_linear"):
         assert {f"{name}.png", f"{name}.svg"} <= figures
@@ -173,6 +179,10 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     plan = json.loads(capsys.readouterr().out)
     assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
     assert plan["total_force"] == pytest.approx([0, -0.01])
+    problem = read_study(file).problem
+    stated = {"supports": [one.words(2) for one in problem.supports], "loads": [one.words() for one in problem.loads]}
+    assert {key: plan[key] for key in stated} == stated
+    assert all(words in shown for several in stated.values() for words in several)
     assert plan["models"]["springs"]["n_springs"] == 8 * 3 + 2 * 9 + 2 * 16
     assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "out"}
 

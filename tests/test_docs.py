@@ -112,3 +112,36 @@ def test_links_of_the_pages_lead_somewhere() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def named(row: str) -> tuple[set[Path], list[str]]:
+    """Return the files and folders of a row of CONTRIBUTING, and the names in its backticks that none of them is."""
+    roots = [ROOT, ROOT / "src" / "truespring"]
+    found: set[Path] = set()
+    left = []
+    for token in re.findall(r"`([^`]+)`", row):
+        if token.startswith("out") or "SUFFIX" in token or not re.fullmatch(r"[\w./]+(/|\.(py|md|toml))", token):
+            left.append(token)
+            continue
+        here = next((root / token for root in (*sorted(found), *roots) if (root / token).exists()), None)
+        assert here is not None or token == "figures/", f"CONTRIBUTING.md: {token} does not exist"
+        found |= {here} if here else set()
+    return found, left
+
+
+def test_files_tables_and_classes_of_contributing_exist() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = [row for row in text.splitlines() if row.startswith("| a")]
+    code = "\n".join(file.read_text(encoding="utf-8") for file in (ROOT / "src").rglob("*.py"))
+    assert len(rows) > 20
+    for row in rows:
+        files, names = named(row)
+        assert files, row
+        lines = "\n".join(one.read_text(encoding="utf-8") for one in files if one.is_file())
+        for name in names:
+            if re.fullmatch(r"_?[A-Z][A-Z_]+", name) and name not in ("KIND", "HEML"):
+                assert re.search(rf"^{name}\b.*=", lines, re.MULTILINE), f"no {name} in a file of: {row}"
+            elif re.fullmatch(r"([A-Z][a-z]+)+", name):
+                assert re.search(rf"^class {name}\b", code, re.MULTILINE), f"no class {name}: {row}"
+    makes = set(re.findall(r"`make (\w+)`", text))
+    assert makes <= set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))

@@ -215,7 +215,7 @@ class Problem:
             body = "the body"
             if len(several) > 1:
                 place = ", ".join(f"{coordinate:.6g}" for coordinate in self.mesh.nodes[nodes].mean(axis=0))
-                body = f"one of {len(several)} disconnected parts ({len(nodes)} nodes about ({place}) m),"
+                body = f"one of {len(several)} disconnected parts ({len(nodes)} nodes about ({place}) m)"
             raise ProblemError(
                 f"the supports leave {body} free to move {free} as a rigid body: hold more directions or more nodes"
             )

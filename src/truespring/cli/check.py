@@ -47,6 +47,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
+    """Print the plan of a study as lines of text."""
     held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
     material, section = plan["material"], plan["section"]
     size = " by ".join(f"{extent:g} m" for extent in plan["size"])
@@ -59,7 +60,11 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
     screen.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
     for note in plan["mesh_notes"]:
         screen.print(f"note on the mesh: {note}")
+    for support in plan["supports"]:
+        screen.print(f"support: {support}", soft_wrap=True)
     screen.print(f"held nodes: {held}")
+    for load in plan["loads"]:
+        screen.print(f"load: {load}", soft_wrap=True)
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
     motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
     screen.print(f"total force ({force}) N{motion}, in {plan['load_steps']} load steps")

@@ -163,9 +163,11 @@ def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
 
 
 def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
+    """Return each support and load, the total force, and the largest prescribed motion."""
     if not problem.stated:
-        return [("loads and supports", "not told by the file")]
-    facts = []
+        return [("loads and supports", "not stated in the file")]
+    facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
+    facts += [("load", load.words()) for load in problem.loads]
     total = problem.loading.force(problem.mesh.nodes).sum(axis=0)
     if not problem.loading.driven_by_motion:
         facts.append(("total force", f"({', '.join(given(float(value), 'N') for value in total)})"))
