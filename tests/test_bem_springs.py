@@ -139,7 +139,7 @@ def test_only_panels_finer_than_the_facets_see_a_sawtooth(monkeypatch: pytest.Mo
     problem = body(ts.rectangle((8.0, 4.0), (8, 4)))
     whole(problem)
     monkeypatch.setattr(Panels, "_pieces", np.array([[[0.0], [1.0]]]))
-    with pytest.raises(ts.TruespringError, match="boundary elements of the block are not stable"):
+    with pytest.raises(ts.TruespringError, match=r"block .*(unstable|not stable)"):
         whole(problem)
 
 
@@ -371,12 +371,12 @@ HALF = ts.Box((0.0, 0.0), (2.0, 1.0))
         (lambda: ts.BemSprings("liver"), "'liver' is no group of elements"),
         (
             lambda: ts.BemSprings(ts.Box((0.0, 0.0), (4.0, 1.0))),
-            "all elements are in it, and none are left for springs",
+            "block: .*all elements",
         ),
-        (lambda: ts.BemSprings([0, 15]), "it is in 2 parts that do not touch each other"),
+        (lambda: ts.BemSprings([0, 15]), "block: .* 2 .*parts"),
         (lambda: ts.BemSprings(HALF, "lloid"), r"rule = 'lloid' is unknown \(did you mean 'lloyd'\?\)"),
-        (lambda: ts.BemSprings(HALF, "biquadratic"), "couples its springs"),
-        (lambda: ts.BemSprings(HALF, "van-gelder"), "rule = 'van-gelder' is for triangle, tetrahedron"),
+        (lambda: ts.BemSprings(HALF, "biquadratic"), "'biquadratic' .*allowed: lloyd"),
+        (lambda: ts.BemSprings(HALF, "van-gelder"), "rule = 'van-gelder' .*triangle, tetrahedron"),
         (lambda: ts.BemSprings("left"), "'left' is no group of elements"),
     ],
 )
@@ -400,7 +400,7 @@ def test_a_block_that_nothing_is_joined_to_is_refused() -> None:
             [ts.Fixed([0, 2, 4, 6])],
             [ts.Force([5], (0.0, 1.0))],
         )
-        with pytest.raises(ts.TruespringError, match="no facet in common with the elements beside it"):
+        with pytest.raises(ts.TruespringError, match=r"block: .*no facet"):
             ts.BemSprings([0]).potential(problem)
 
 
@@ -410,19 +410,19 @@ def test_what_acts_inside_a_block_is_refused() -> None:
     model = ts.BemSprings(HALF)
     model.check(problem)
     loaded = replace(problem, loads=[ts.Force([inner], (0.0, 1e-4))])
-    with pytest.raises(ts.TruespringError, match=f"a load acts at 1 nodes, first node {inner}, within it"):
+    with pytest.raises(ts.TruespringError, match=f"block: a load .* 1 nodes.* {inner}"):
         model.check(loaded)
     heavy = replace(problem, material=ts.Material(1.0, 0.3, 1000.0), loads=[ts.Gravity((0.0, -1e-6))])
-    with pytest.raises(ts.TruespringError, match=r"gravity .* acts within it"):
+    with pytest.raises(ts.TruespringError, match=r"block: gravity .* acts"):
         model.check(heavy)
     held = replace(problem, supports=[ts.Fixed("left"), ts.Fixed([inner], ["y"])])
-    with pytest.raises(ts.TruespringError, match=f"a support holds 1 of its nodes inside, the first node {inner}"):
+    with pytest.raises(ts.TruespringError, match=f"block: a support .* 1 .*nodes.* {inner}"):
         model.check(held)
 
 
 def test_a_block_is_of_one_material_and_springs_of_any() -> None:
     problem = replace(cantilever((8, 2), 1e-4), regions=[ts.Region([0], ts.Material(2.0, 0.3))])
-    with pytest.raises(ts.TruespringError, match="its elements are of 2 materials"):
+    with pytest.raises(ts.TruespringError, match=r"block: .* 2 materials"):
         ts.BemSprings(HALF).check(problem)
     stiff = replace(problem, regions=[ts.Region([7, 15], ts.Material(2.0, 0.3))])
     soft = cantilever((8, 2), 1e-4)
@@ -434,7 +434,7 @@ def test_a_block_is_of_one_material_and_springs_of_any() -> None:
 
 def test_dense_matrices_that_do_not_fit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("truespring.models.block.available_memory", lambda: 1e4)
-    with pytest.raises(ts.TruespringError, match="boundary elements of the block, 12 facets, need about"):
+    with pytest.raises(ts.TruespringError, match=r"block.* 12 facets.* GiB"):
         ts.BemSprings(HALF).potential(cantilever((8, 2), 1e-4))
 
 
@@ -473,9 +473,9 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
         (("corotated = true", "turning = true"), "turning = True: unknown key; allowed: kind, block, rule, corotated"),
         (("corotated = true", 'rule = "biquadratic"'), "'biquadratic' is unknown; allowed: lloyd"),
         (('["20 mm"', '["1 mm"'), "models.springs: no element with its centre in the box"),
-        (('["20 mm"', '["40 mm"'), "none are left for springs"),
+        (('["20 mm"', '["40 mm"'), "block: .*all elements"),
         (('block = { box = [["0 mm", "0 mm"], ["20 mm", "10 mm"]] }\n', ""), "block: is required and missing"),
-        (("poisson = 0.3", "poisson = 0.5"), "must lie between -1 and 0.5, both excluded"),
+        (("poisson = 0.3", "poisson = 0.5"), "between -1 and 0.5, both excluded"),
     ],
 )
 def test_a_faulty_study_is_refused(change: tuple[str, str], said: str, tmp_path: Path) -> None:

@@ -579,7 +579,7 @@ def test_the_default_and_the_warning(
     others = [element for element in ELEMENTS if element not in ("linear", usual, tight)]
     assert others
     for other in others:
-        with pytest.raises(ts.TruespringError, match=f"element = '{other}' is not for a mesh of {mesh.element}"):
+        with pytest.raises(ts.TruespringError, match=f"element = '{other}' .*{mesh.element}"):
             ts.Fem("linear", other).potential(plain)
 
 

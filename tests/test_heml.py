@@ -230,9 +230,9 @@ def test_a_neo_hookean_strip_is_pulled_as_the_closed_form() -> None:
 
 
 REFUSED = {
-    "links of the linear law": (lambda: ts.Heml("linear"), "no linear strain.*mass-tensor"),
+    "links of the linear law": (lambda: ts.Heml("linear"), "law = 'linear'.*mass-tensor"),
     "an unknown law of links": (lambda: ts.Heml("neo-hokean"), "did you mean 'neo-hookean'"),
-    "tensors of a logarithm": (lambda: ts.MassTensor("hencky"), "no polynomial.*fem and heml"),
+    "tensors of a logarithm": (lambda: ts.MassTensor("hencky"), "law = 'hencky'.*polynomial.*fem .*heml"),
     "an unknown law of tensors": (lambda: ts.MassTensor("liner"), "did you mean 'linear'"),
 }
 
@@ -250,9 +250,9 @@ def test_elements_that_do_not_go_are_refused(element: str) -> None:
     problem = body(random_mesh(element, np.random.default_rng(3)), section, 0.3)
     simplex = SIMPLICES[problem.mesh.dim - 2]
     for law in ("neo-hookean", "hencky"):
-        with pytest.raises(ts.TruespringError, match=f"mesh has {element} .*'{SAME}'.*kind = 'fem'.*mesh of {simplex}"):
+        with pytest.raises(ts.TruespringError, match=f"{element} .*'{SAME}'.*kind = 'fem'.*{simplex}"):
             ts.Heml(law).potential(problem)
-    with pytest.raises(ts.TruespringError, match=f"mesh has {element} .*kind = 'heml'.*mesh of {simplex}"):
+    with pytest.raises(ts.TruespringError, match=f"{element} .*kind = 'heml'.*{simplex}"):
         ts.MassTensor(SAME).potential(problem)
 
 
@@ -260,7 +260,7 @@ def test_elements_that_do_not_go_are_refused(element: str) -> None:
 def test_a_plain_network_is_refused(model: ts.Heml | ts.MassTensor) -> None:
     network = ts.SpringNetwork([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1], [1, 2]], [1.0, 1.0])
     problem = ts.Problem(network.mesh, supports=[ts.Fixed([0, 2])], loads=[ts.Force([1], (0.0, -0.1))])
-    with pytest.raises(ts.TruespringError, match="need a material, a section and elements of a kind"):
+    with pytest.raises(ts.TruespringError, match=r"material, a section and elements of .*triangle"):
         model.potential(problem)
 
 

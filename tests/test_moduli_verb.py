@@ -308,8 +308,9 @@ def test_every_material_of_a_body_is_judged() -> None:
     problem = body(ts.rectangle((4.0, 2.0), (8, 4)), THIRD, regions=[ts.Region(range(8), soft)])
     found = judge(problem, ts.Springs("isotropic"))
     assert not found.fit and found.better == ts.Springs("isotropic", volume=True)
-    assert len(found.reasons) == 1 and found.reasons[0].startswith("where E is 0.1 Pa and nu 0.45, Poisson's ratio")
-    assert "where E is 1 Pa and nu 0.333333, they are fit" in found.sentence
+    (reason,) = found.reasons
+    assert all(word in reason for word in ("0.1 Pa", "0.45", "Poisson's ratio"))
+    assert "1 Pa and nu 0.333333" in found.sentence
     assert [one.numbers["material"] for one in found.findings if one.code == "poisson"] == [THIRD, 0.45]
     assert judge(problem, found.better).fit
 
@@ -331,8 +332,8 @@ def said_of(problem: ts.Problem, springs: ts.Springs) -> str:
 
 def test_moduli_in_words() -> None:
     """The sentence of a path has the numbers of the findings."""
-    assert "1.000 times the material's (1 Pa) in every direction" in said_of(CUBES, ts.Springs("isotropic"))
-    assert "finite elements on this mesh" in said_of(CUBES, ts.Springs("isotropic"))
+    exact = said_of(CUBES, ts.Springs("isotropic"))
+    assert "1.000 times" in exact and " to " not in exact and "(1 Pa)" in exact and "finite elements" in exact
     six = said_of(SIX, ts.Springs("lloyd"))
     assert "0.390 to 2.857" in six and "0.067 to 0.875" in six and "bent" not in six
     regions = body(SQUARES.mesh, THIRD, regions=[ts.Region([0], ts.Material(2.0, 0.3))])

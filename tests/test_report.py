@@ -327,7 +327,7 @@ def test_moduli_are_said_beside_the_material() -> None:
     # One square under u = -x y stores E/(1 - nu^2) y^2 and G x^2: 9/8 and 3/8 of what the material would.
     assert "1.875" in text and "1.500" in text
     isotropic = moduli_sentence(ts.solve(problem, ts.Springs("isotropic")))
-    assert isotropic is not None and "1.000 times the material's (1e+04 Pa) in every direction" in isotropic
+    assert isotropic is not None and "1.000 times" in isotropic and "1e+04 Pa" in isotropic
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from truespring.arrays import Floats
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.models import RULES
 from truespring.models.lattices import LATTICES
-from truespring.models.rules import ANY_MESH, Realised, Rule
+from truespring.models.rules import ANY_MESH, LatticeModuli, Rule
 
 THIRD = 1 / 3
 
@@ -306,8 +306,10 @@ def test_a_rule_takes_the_elements_that_it_declares(rule: str, element: str) -> 
     """It works on elements of its shape, on any where it names none, and refuses other kinds and shapes."""
     entry, problem = RULES[rule], REGULAR[element]
     if element not in entry.elements:
-        with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' is for .*{element} elements there are"):
+        with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' .*{element} elements") as error:
             ts.Springs(rule).element_stiffness(problem)
+        named = words(str(error.value).partition("elements")[2]) & RULES.keys()
+        assert named == {name for name, other in RULES.items() if element in other.elements}
         return
     shape = entry.shapes.get(element)
     taken = [problem, random_element(element, 5) if shape is None else SHAPES[shape]]
@@ -318,7 +320,7 @@ def test_a_rule_takes_the_elements_that_it_declares(rule: str, element: str) -> 
     if shape is not None:
         others = [random_element(element, 5), *([SHAPES["rectangle"]] if shape == "square" else [])]
         for other in others:
-            with pytest.raises(ts.TruespringError, match=f"rule = '{rule}' is made for") as error:
+            with pytest.raises(ts.TruespringError, match=f"rule = '{rule}'") as error:
                 ts.Springs(rule).element_stiffness(other)
             named = words(str(error.value)) & RULES.keys()
             assert named > {rule}, "the rules that take such elements are named"
@@ -333,7 +335,7 @@ def test_a_rule_declares_elements_and_shapes_that_there_are() -> None:
         assert entry.shapes.keys() <= set(entry.elements)
 
 
-def realised(entry: Rule, element: str) -> list[tuple[str, Realised]]:
+def realised(entry: Rule, element: str) -> list[tuple[str, LatticeModuli]]:
     """The lattices of a kind of element for which a rule states its moduli."""
     of_element = [name for name, make in LATTICES.items() if make().element == element]
     return [(name, one) for one in entry.moduli for name in of_element if one.lattice in (name, ANY_MESH)]
@@ -368,7 +370,7 @@ def test_stated_moduli_are_the_computed_ones(rule: str, element: str) -> None:
 
 
 def test_wrong_statements_fail() -> None:
-    squares = Realised("squares", (0.9, 21 / 19), (5 / 19, 7 / 17))
+    squares = LatticeModuli("squares", (0.9, 21 / 19), (5 / 19, 7 / 17))
     with pytest.raises(AssertionError, match="E of lloyd on squares"):
         check_moduli("lloyd", replace(RULES["lloyd"], moduli=(squares,)), "quadrilateral")
     with pytest.raises(AssertionError, match="states no moduli"):
@@ -376,10 +378,10 @@ def test_wrong_statements_fail() -> None:
 
 
 def test_stated_moduli_in_words() -> None:
-    squares = Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17))
+    squares = LatticeModuli("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17))
     assert str(squares) == "squares: 0.882 to 1.105 E, Poisson's ratio 0.263 to 0.412"
-    assert str(Realised("cubes", poisson=(0.25, 0.25), at=1 / 3)) == "cubes (nu = 1/3): E, Poisson's ratio 1/4"
-    assert str(Realised(ANY_MESH)) == "any mesh: E, the material's Poisson's ratio"
+    assert str(LatticeModuli("cubes", poisson=(0.25, 0.25), at=1 / 3)) == "cubes (nu = 1/3): E, Poisson's ratio 1/4"
+    assert str(LatticeModuli(ANY_MESH)) == "any mesh: E, Poisson's ratio of the material"
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
@@ -400,12 +402,12 @@ def test_rules_for_bricks_refuse_other_shapes() -> None:
     for corners in (skewed, open_shape):
         problem = one_element(corners, "quadrilateral", THIRD)
         for rule in ("lloyd", "isotropic"):
-            with pytest.raises(ts.TruespringError, match="made for rectangles, 1 elements"):
+            with pytest.raises(ts.TruespringError, match=r"rectangles.* 1 elements"):
                 ts.Springs(rule).element_stiffness(problem)
-    with pytest.raises(ts.TruespringError, match="made for squares"):
+    with pytest.raises(ts.TruespringError, match=r"squares.*1 m by 1\.1 m"):
         ts.Springs("lloyd").element_stiffness(brick(1.0, 1.1, poisson=THIRD))
     twisted = ts.box((1.0, 1.0, 1.0), (1, 1, 1)).nodes[[0, 1, 3, 2, 4, 5, 7, 6]] + np.eye(8)[:, 6:7] * 0.1
-    with pytest.raises(ts.TruespringError, match="made for bricks"):
+    with pytest.raises(ts.TruespringError, match="bricks"):
         ts.Springs("isotropic").element_stiffness(one_element(twisted, "hexahedron", 0.25))
 
 
@@ -421,7 +423,7 @@ def test_turned_bricks_are_bricks() -> None:
 
 def test_parameters_go_with_the_rule_that_has_them() -> None:
     cube = brick(1.0, 1.0, 1.0, poisson=0.25)
-    with pytest.raises(ts.TruespringError, match="takes no k_body; that is for isotropic"):
+    with pytest.raises(ts.TruespringError, match=r"'projected' .*k_body.* isotropic"):
         ts.Springs("projected", k_body=0.1).element_stiffness(cube)
     with pytest.raises(ts.TruespringError, match="must be finite"):
         ts.Springs("isotropic", k_body=math.nan)
@@ -457,10 +459,10 @@ def test_each_element_has_springs_of_its_own_material() -> None:
 @pytest.mark.parametrize(
     ("mesh", "springs", "said"),
     [
-        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("isotropic", k_body=0.2), "k_body is for cubes"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("isotropic", k_body=0.2), "k_body .*bricks"),
         (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs(stiffness=ts.UserStiffness(0.4, 0.4, 0.1)), "body = 0.1"),
         (ts.rectangle((2.0, 1.0), (2, 1), "triangle"), ts.Springs(stiffness=ts.UserStiffness(0.4, 0.4)), "diagonal"),
-        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("lloyd", k_body=0.2), "takes no k_body; that is for isotropic"),
+        (ts.rectangle((2.0, 1.0), (2, 1)), ts.Springs("lloyd", k_body=0.2), "'lloyd' .*k_body.* isotropic"),
     ],
 )
 def test_what_a_mesh_has_no_use_for_is_refused(mesh: ts.Mesh, springs: ts.Springs, said: str) -> None:

@@ -279,19 +279,19 @@ def test_regions_and_single_springs_go_over_kinds() -> None:
 
 def test_what_is_for_one_kind_says_so() -> None:
     wedges, plane = body(BODIES["wedges"]()), body(PLANE())
-    with pytest.raises(ModelError, match=r"rule = 'lloyd' is for .*; for this mesh of wedge elements there are least"):
+    with pytest.raises(ModelError, match=r"rule = 'lloyd' .* wedge elements.* least-squares"):
         ts.Springs("lloyd").potential(wedges)
-    with pytest.raises(ModelError, match="mesh of 16 triangle and 16 quadrilateral elements there are lloyd, least"):
+    with pytest.raises(ModelError, match=r"16 triangle and 16 quadrilateral elements.* lloyd, least"):
         ts.Springs("van-gelder").potential(plane)
-    with pytest.raises(ModelError, match=r"element = 'quadratic' is not for a mesh of 16 triangle.*: linear, mean"):
+    with pytest.raises(ModelError, match=r"element = 'quadratic' .*16 triangle.*: linear, mean"):
         ts.Fem("linear", "quadratic").potential(plane)
-    with pytest.raises(ModelError, match="a wedge has both: take springs, or fem"):
+    with pytest.raises(ModelError, match=r"wedge .*springs.* fem"):
         ts.BemSprings([0, 1], "projected").potential(wedges)
-    with pytest.raises(ts.TruespringError, match="mixed elements have none"):
+    with pytest.raises(ts.TruespringError, match="mixed elements"):
         ts.Terzopoulos().potential(plane)
     with pytest.raises(MeshError, match="for elements of one kind, the mesh has 16 triangle and 16 quadrilateral"):
         _ = plane.mesh.kind
-    assert any("16 triangles beside other kinds" in text for text in ts.Fem("linear").warnings(plane))
+    assert any("16 triangles" in text for text in ts.Fem("linear").warnings(plane))
     assert ts.Fem("linear").chosen_element(body(PLANE(), 0.45)) == "mean-dilatation"
 
 

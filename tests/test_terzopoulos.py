@@ -151,9 +151,9 @@ def bent_grid() -> ts.Mesh:
 @pytest.mark.parametrize(
     ("mesh", "said"),
     [
-        (ts.rectangle((3.0, 2.0), (3, 2), "triangle"), "triangle elements have none"),
-        (ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron"), "tetrahedron elements have none"),
-        (bent_grid(), "4 of 6 elements are no rectangle along the axes, of the size 1 x 1 m"),
+        (ts.rectangle((3.0, 2.0), (3, 2), "triangle"), "regular grid.*triangle elements"),
+        (ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron"), "regular grid.*tetrahedron elements"),
+        (bent_grid(), "4 of 6 elements .*rectangle.* 1 x 1 m"),
     ],
 )
 def test_meshes_that_are_no_grid_are_refused(mesh: ts.Mesh, said: str) -> None:
@@ -186,7 +186,7 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
     [
         (('"trapezoid"', '"midpoint"'), "boundary = 'midpoint': allowed: 'paper' or 'trapezoid'"),
         (('boundary = "trapezoid"', 'rule = "lloyd"'), "unknown key; allowed: kind, boundary"),
-        (("elements = [8, 2]", 'elements = [8, 2]\nelement = "triangle"'), "triangle elements have none"),
+        (("elements = [8, 2]", 'elements = [8, 2]\nelement = "triangle"'), "regular grid.*triangle elements"),
     ],
 )
 def test_a_faulty_study_is_refused(change: tuple[str, str], said: str, tmp_path: Path) -> None:

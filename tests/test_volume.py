@@ -183,7 +183,7 @@ def test_springs_and_term_are_on_the_same_elements() -> None:
     fewer = ts.SpringNetwork(SQUARES.nodes, network.springs[1:], network.stiffness[1:])
     wrong = VolumeSprings(fewer, VolumeTerm(problem, right.kappa(problem)))
     for hessian in (wrong.hessian, wrong.projected_hessian):
-        with pytest.raises(ts.TruespringError, match="the very nodes that share an element"):
+        with pytest.raises(ts.TruespringError, match="volume term"):
             hessian(SQUARES.nodes)
 
 
@@ -206,12 +206,12 @@ JITTERED = ts.Mesh(SQUARES.nodes + np.random.default_rng(1).uniform(-1e-3, 1e-3,
 @pytest.mark.parametrize(
     ("mesh", "springs", "said"),
     [
-        (SQUARES, ts.Springs("lloyd", volume=True), "anisotropic: take the rule isotropic"),
+        (SQUARES, ts.Springs("lloyd", volume=True), "anisotropic.*rule isotropic"),
         (SQUARES, ts.Springs("projected", volume=True), "anisotropic"),
         (SQUARES, ts.Springs(stiffness=ts.UserStiffness(0.4, 0.3), volume=True), "anisotropic"),
-        (JITTERED, ts.Springs("projected", volume=True), "is for isotropic lattices"),
+        (JITTERED, ts.Springs("projected", volume=True), "isotropic lattices, this .*irregular"),
         (CUBES, ts.Springs("least-squares", volume=True), "anisotropic"),
-        (BODY_CENTRED, ts.Springs("van-gelder", volume=True), "anisotropic: take the rule lloyd on body-centred"),
+        (BODY_CENTRED, ts.Springs("van-gelder", volume=True), "anisotropic.*rule lloyd on body-centred"),
         (ts.box((2.0, 2.0, 2.0), (2, 2, 2), "tetrahedron"), ts.Springs("lloyd", volume=True), "anisotropic"),
     ],
 )
@@ -235,11 +235,11 @@ def test_your_own_isotropic_numbers_are_welcome() -> None:
 
 
 def test_what_does_not_go_with_a_volume_term() -> None:
-    with pytest.raises(ts.TruespringError, match="sharing = 'single' does not go"):
+    with pytest.raises(ts.TruespringError, match=r"volume = true .*sharing = 'single'"):
         ts.Springs("isotropic", sharing="single", volume=True)
-    with pytest.raises(ts.TruespringError, match="leave volume out"):
+    with pytest.raises(ts.TruespringError, match=r"rule = 'biquadratic'.* volume"):
         ts.Springs("biquadratic", volume=True)
-    with pytest.raises(ts.TruespringError, match=r"poisson = -0\.1 is below 0"):
+    with pytest.raises(ts.TruespringError, match=r"volume = true: poisson = -0\.1 "):
         ts.Springs("isotropic", volume=True).potential(pulled(SQUARES, -0.1, ts.PlaneStress(1.0), 1.0))
 
 

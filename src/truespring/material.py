@@ -1,4 +1,4 @@
-"""Material and section: what a body is made of and how its third direction behaves."""
+"""Material and section of a body: its elastic constants, and plane stress, plane strain or a solid."""
 
 import math
 from abc import ABC, abstractmethod
@@ -24,9 +24,9 @@ class Material:
     Attributes:
         young: Young's modulus [Pa], positive.
         poisson: Poisson's ratio [-], between -1 and 0.5, both excluded.
-        density: [kg/m^3], positive; None where not known.
-        constants: further constants of constitutive laws by name [SI], as a mapping or pairs, kept as sorted pairs.
-            Which there are is said by the entries of LAWS; a law ignores those of others.
+        density: [kg/m^3], positive; None if unknown.
+        constants: further constants of constitutive laws by name [SI], as a mapping or pairs, stored as sorted pairs.
+            The entries of LAWS define them; a law ignores the constants of other laws.
     """
 
     young: float
@@ -38,34 +38,34 @@ class Material:
         object.__setattr__(self, "constants", tuple(sorted(dict(self.constants).items())))
         for name, value in dict(self.constants).items():
             if not math.isfinite(value):
-                raise ProblemError(f"{name} = {value!r}: a constant of a material must be finite")
+                raise ProblemError(f"{name} = {value!r}: must be finite")
         if not (math.isfinite(self.young) and self.young > 0):
             raise ProblemError(f"young = {self.young!r} Pa: Young's modulus must be positive and finite")
         if not -1 < self.poisson < 0.5:
             raise ProblemError(
-                f"poisson = {self.poisson!r}: Poisson's ratio must lie between -1 and 0.5, both excluded; "
-                "take 0.49 for a nearly incompressible material"
+                f"poisson = {self.poisson!r}: Poisson's ratio must be between -1 and 0.5, both excluded; "
+                "use 0.49 for a nearly incompressible material"
             )
         if self.density is not None and not (math.isfinite(self.density) and self.density > 0):
-            raise ProblemError(f"density = {self.density!r} kg/m^3: a density must be positive and finite")
+            raise ProblemError(f"density = {self.density!r} kg/m^3: the density must be positive and finite")
 
     @property
     def lame(self) -> Lame:
-        """Lamé constants of the three-dimensional material [Pa]."""
+        """Lamé constants of the material in 3D [Pa]."""
         young, poisson = self.young, self.poisson
         return Lame(young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson)))
 
 
 @dataclass(frozen=True, slots=True)
 class Section(ABC):
-    """How a body carries the direction that its mesh does not have; `thickness` [m], 1 for a solid.
+    """The assumption about the third direction of a plane body; `thickness` [m], 1 for a solid.
 
     Attributes:
-        key: its kind in `[section]`, empty for a body in space.
-        dim: number of dimensions of the bodies that it is for.
-        free_thickness: whether the thickness changes freely, so that there is no stress across the plane.
-        moduli_words: how its apparent moduli follow from the material's, empty where they are the same.
-        elements: the letters before the number of nodes in the names of its elements in CalculiX and Abaqus.
+        key: value of `kind` in `[section]`; empty for a body in 3D.
+        dim: dimension of the bodies.
+        free_thickness: whether the thickness changes freely, so that the stress across the plane is zero.
+        moduli_words: formulas of the apparent moduli; empty if they are those of the material.
+        elements: prefix of the element names in CalculiX and Abaqus, before the number of nodes.
     """
 
     thickness: float
@@ -77,70 +77,70 @@ class Section(ABC):
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.thickness) and self.thickness > 0):
-            raise ProblemError(f"thickness = {self.thickness!r} m: a thickness must be positive and finite")
+            raise ProblemError(f"thickness = {self.thickness!r} m: the thickness must be positive and finite")
 
     @abstractmethod
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Return Young's modulus [Pa] and Poisson's ratio [-] as seen by a test within the mesh's directions."""
+        """Return Young's modulus [Pa] and Poisson's ratio [-] measured in a tension test in the plane of the mesh."""
 
     def lame_within(self, material: Material) -> Lame:
-        """Return the Lamé constants of Hooke's law within the mesh's directions [Pa]."""
+        """Return the Lamé constants of Hooke's law in the plane of the mesh [Pa]."""
         return material.lame
 
     @property
     def words(self) -> str:
-        """The section in a sentence: "plane stress"; empty for a body in space."""
+        """Name in sentences: "plane stress"; empty for a body in 3D."""
         return self.key.replace("-", " ")
 
     @property
     def within(self) -> str:
-        """The words " in plane strain" where the apparent moduli are not the material's, else "", to follow a noun."""
+        """The words " in plane strain" if the apparent moduli differ from those of the material, else ""."""
         return f" in {self.words}" if self.moduli_words else ""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Section):
-    """A thin body, free to change its thickness."""
+    """A thin body that changes its thickness freely."""
 
     key: ClassVar[str] = "plane-stress"
     free_thickness: ClassVar[bool] = True
     elements: ClassVar[str] = "CPS"
 
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Return those of the material itself."""
+        """Return the moduli of the material [Pa], [-]."""
         return material.young, material.poisson
 
     def lame_within(self, material: Material) -> Lame:
-        """Return 2 lam mu / (lam + 2 mu) and mu."""
+        """Return 2 lam mu / (lam + 2 mu) and mu [Pa]."""
         lam, mu = material.lame
         return Lame(2 * lam * mu / (lam + 2 * mu), mu)
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneStrain(Section):
-    """A slice of a long body, held at its thickness."""
+    """A slice of a long body, of constant thickness."""
 
     key: ClassVar[str] = "plane-strain"
     moduli_words: ClassVar[str] = "E / (1 - nu^2) and nu / (1 - nu)"
     elements: ClassVar[str] = "CPE"
 
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Return E / (1 - nu^2) and nu / (1 - nu)."""
+        """Return E / (1 - nu^2) [Pa] and nu / (1 - nu) [-]."""
         return material.young / (1 - material.poisson**2), material.poisson / (1 - material.poisson)
 
 
 @dataclass(frozen=True, slots=True)
 class Solid(Section):
-    """A body in three dimensions: the section that a Problem in 3D has by default."""
+    """A body in 3D: the default section of a Problem in 3D."""
 
     thickness: float = 1.0
     dim: ClassVar[int] = 3
     elements: ClassVar[str] = "C3D"
 
     def apparent_moduli(self, material: Material) -> tuple[float, float]:
-        """Return those of the material itself."""
+        """Return the moduli of the material [Pa], [-]."""
         return material.young, material.poisson
 
 
-#: The sections of plane bodies by their kind in `[section]`.
+#: Sections of plane bodies by `kind` in `[section]`.
 SECTIONS: Mapping[str, type[Section]] = MappingProxyType({one.key: one for one in (PlaneStress, PlaneStrain)})

@@ -1,4 +1,4 @@
-"""Models: a problem becomes a potential. Springs, FEM, and the moduli that springs realise."""
+"""Models, which make the potential of a problem: springs, finite elements and others; effective moduli of springs."""
 
 from truespring.models.bem_springs import BemSprings as BemSprings
 from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprings

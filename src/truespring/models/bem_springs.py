@@ -1,4 +1,4 @@
-"""Boundary elements and springs: a block that is known by its surface, and springs everywhere else."""
+"""A block of boundary elements, coupled with springs in the rest of the body."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,18 +21,18 @@ from truespring.problem import Problem
 
 @dataclass(frozen=True)
 class BemSprings(Model):
-    """A block of boundary elements beside springs, coupled at the nodes that they share.
+    """A block of boundary elements and springs in all other elements, coupled at shared nodes.
 
-    The block is linear elastic material, known by its surface only (see `make_block`). All other elements carry the
-    springs of a rule; springs on the interface count what those elements give. The idea is that of Zhu and Gu,
-    "A hybrid deformable model for real-time surgical simulation" (2012), whose formulas for the coupling were not to be
-    had: this split in space is a reading of it for equilibrium.
+    The block is linear elastic, modelled by its surface (see `make_block`). Springs on the interface have the stiffness
+    of the elements outside the block. The idea is from Zhu and Gu, "A hybrid deformable model for real-time surgical
+    simulation" (2012). The formulas of their coupling were not available; this division of the body is an
+    interpretation for static equilibrium.
 
     Attributes:
-        block: the elements that are the block: an element group, a Box that holds their centres, or element numbers.
-        rule: of the springs, a key of RULES; none that couples them.
-        corotated: let the block turn as a whole, by the rotation that fits its surface best; else it takes a turn
-            for strain, as linear elasticity does.
+        block: elements of the block: an element group, a Box that contains their centres, or element numbers.
+        rule: rule of the springs, a key of RULES; not a coupled one.
+        corotated: let the block rotate as a whole, by the rotation that fits its surface best. Otherwise rotations
+            cause strain, as in linear elasticity.
     """
 
     block: Selection
@@ -47,77 +47,76 @@ class BemSprings(Model):
             )
         if RULES[self.rule].coupled:
             raise ModelError(
-                f"rule = '{self.rule}' couples its springs, which are then finite elements: beside a block there are "
-                f"plain springs; allowed: {', '.join(plain)}"
+                f"rule = '{self.rule}' has coupled springs, a block requires plain ones; allowed: {', '.join(plain)}"
             )
 
     kind = "bem-springs"
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model."""
+        """Name in figures and tables."""
         return f"BEM + springs ({self.rule}{', corotated' if self.corotated else ''})"
 
     def potential(self, problem: Problem) -> "BlockSprings":
-        """Return the block and the springs on the problem's mesh; raise ModelError where they do not go together."""
+        """Return the potential of block and springs; raise ModelError if the block does not fit the problem."""
         chosen, network = self._parts(problem)
         block = make_block(problem, np.flatnonzero(chosen))
         return BlockSprings(problem.mesh, chosen, network, Turning(block) if self.corotated else AtRest(block))
 
     def check(self, problem: Problem) -> None:
-        """Raise ModelError where block and springs do not go together; quick, for nothing is integrated."""
+        """Raise ModelError if the block does not fit the problem; fast, no integrals are computed."""
         self._parts(problem)
 
     def _parts(self, problem: Problem) -> tuple[Bools, SpringNetwork]:
-        """Which elements are the block, shape (n_elements,), and the springs beside it."""
+        """Return whether each element belongs to the block, shape (n_elements,), and the springs of the others."""
         require_body(problem)
         if any(len(set(facet)) < len(facet) for facet in problem.mesh.kind.facets):
             raise ModelError(
-                f"boundary elements are all triangles or all quadrilaterals, but a {problem.mesh.kinds} has both: take "
-                "springs, or fem"
+                f"boundary elements must be all triangles or all quadrilaterals, but a {problem.mesh.kinds} has both: "
+                "use springs or fem"
             )
         chosen = self._chosen(problem)
         _refuse_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
         return chosen, _springs_beside(problem, self.rule, chosen)
 
     def _chosen(self, problem: Problem) -> Bools:
-        """Which elements are the block, shape (n_elements,)."""
+        """Return whether each element belongs to the block, shape (n_elements,)."""
         mesh = problem.mesh
         chosen = np.zeros(len(mesh.elements), dtype=bool)
         chosen[select_elements(mesh, self.block)] = True
         if chosen.all():
-            raise ModelError("block: all elements are in it, and none are left for springs: choose a part of the body")
+            raise ModelError("block: it contains all elements, none is left for springs: select a part of the body")
         several = np.unique(problem.material_numbers[chosen])
         if len(several) > 1:
             raise ModelError(
-                f"block: its elements are of {len(several)} materials, boundary elements know one: choose others"
+                f"block: its elements have {len(several)} materials, boundary elements require one: select other elements"
             )
         _refuse_apart(mesh, chosen)
         return chosen
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: what its springs do not realise."""
-        return tuple(f"beside the block: {text}" for text in Springs(self.rule).warnings(problem))
+        """Return warnings about the springs, as of `Springs`."""
+        return tuple(f"outside the block: {text}" for text in Springs(self.rule).warnings(problem))
 
 
 def _refuse_apart(mesh: Mesh, chosen: Bools) -> None:
-    """Raise ModelError for a block in several parts, or one that no facet joins to the springs."""
+    """Raise ModelError if a block has several parts, or no facet in common with the other elements."""
     nodes, elements = np.unique(mesh.elements[chosen], return_inverse=True)
     n_parts = int(Mesh(mesh.nodes[nodes], elements.reshape(-1, mesh.kind.n_nodes), mesh.element).parts.max()) + 1
     if n_parts > 1:
-        raise ModelError(f"block: it is in {n_parts} parts that do not touch each other: choose one of them")
+        raise ModelError(f"block: it has {n_parts} separate parts: select one of them")
     facets, alone = mesh.facets_of(mesh.elements[chosen])
     outside, outside_alone = mesh.facets_of(mesh.elements[~chosen])
     mine = {tuple(facet) for facet in np.sort(facets[alone], axis=1).tolist()}
     if mine.isdisjoint(tuple(facet) for facet in np.sort(outside[outside_alone], axis=1).tolist()):
         raise ModelError(
-            "block: it has no facet in common with the elements beside it, so that no springs are joined to it: choose "
-            "elements that border on others"
+            "block: it has no facet in common with other elements, so it is not connected with springs: select other "
+            "elements"
         )
 
 
 def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork:
-    """The springs of the elements that are not `chosen`, on nodes of their own."""
+    """Return the springs of the elements that are not `chosen`."""
     mesh = problem.mesh
     springs = Springs(rule)
     per_element = np.where(chosen[:, None], 0.0, springs.element_stiffness(problem))
@@ -128,7 +127,7 @@ def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork
 
 
 def _refuse_inside(problem: Problem, inside: Ints) -> None:
-    """Raise ModelError where something acts inside the block, which only its surface knows of."""
+    """Raise ModelError if a load or support acts inside the block."""
     everywhere = next((load.words() for load in problem.loads if load.on is None), None)
     loading = problem.loading
     loaded = np.flatnonzero(loading.external_force[inside].any(axis=1))
@@ -137,25 +136,28 @@ def _refuse_inside(problem: Problem, inside: Ints) -> None:
         where = (
             f"{everywhere} acts"
             if everywhere
-            else f"a load acts at {loaded.size} nodes, first node {inside[loaded[0]]},"
+            else f"a load acts on {loaded.size} nodes, the first is node {inside[loaded[0]]},"
         )
         raise ModelError(
-            f"block: {where} within it, and boundary elements know no force but on their surface: load the surface, or "
-            "choose another block"
+            f"block: {where} inside it, but boundary elements are loaded on their surface only: load the surface, or "
+            "select another block"
         )
     if held.size:
         raise ModelError(
-            f"block: a support holds {held.size} of its nodes inside, the first node {inside[held[0]]}: boundary "
-            "elements are held at their surface only; choose another block, or a support on the surface"
+            f"block: a support fixes {held.size} of its inner nodes, the first is node {inside[held[0]]}, but boundary "
+            "elements are supported on their surface only: select another block, or a support on the surface"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class BlockSprings:
-    """A block in its frame and the springs beside it, on the nodes of the mesh.
+    """The potential of a block and the springs of the other elements, on the nodes of the mesh.
 
     Attributes:
-        chosen: which elements are the block, shape (n_elements,).
+        mesh: the mesh of the problem.
+        chosen: whether each element belongs to the block, shape (n_elements,).
+        network: the springs.
+        frame: the block in its frame of reference, at rest or corotated.
     """
 
     mesh: Mesh
@@ -178,11 +180,11 @@ class BlockSprings:
         return _Union(self)
 
     def _local(self, positions: Floats) -> Floats:
-        """Positions of the block's nodes [m], those of its surface first."""
+        """Return the positions of the block's nodes [m], shape (n_block, dim), surface nodes first."""
         return positions[self.frame.block.numbers]
 
     def _force(self, positions: Floats) -> Floats:
-        """Forces on what strains the block [N], shape (n_block, dim)."""
+        """Return the nodal forces of the block in its frame [N], shape (n_block, dim)."""
         return self.frame.block.forces(self.frame.displacement(self._local(positions)))
 
     def energy(self, positions: Floats) -> float:
@@ -190,16 +192,16 @@ class BlockSprings:
         return self.network.energy(positions) + float(self._node_energies(positions).sum())
 
     def _node_energies(self, positions: Floats) -> Floats:
-        """Half the work of the block's forces at each of its nodes [J], shape (n_block,)."""
+        """Return half the work of the block's forces at each of its nodes [J], shape (n_block,)."""
         moved = self.frame.displacement(self._local(positions))
         return np.asarray((moved * self.frame.block.forces(moved)).sum(axis=1) / 2)
 
     def stress(self, positions: Floats) -> Floats:
-        """Tension of the springs [N], then the block's forces in its frame [N], shape (n_springs + n_block * dim,)."""
+        """Return tensions of springs and forces of the block in its frame [N], shape (n_springs + n_block * dim,)."""
         return np.concatenate([self.network.stress(positions), self._force(positions).ravel()])
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """The stress carried on linearly along `step` [m], in N, shape (n_springs + n_block * dim,)."""
+        """Return the stress extrapolated linearly along `step` [m], in N, shape (n_springs + n_block * dim,)."""
         local, frame = self._local(positions), self.frame
         further = frame.displacement(local) + frame.change(local, step[frame.block.numbers])
         tension = self.network.extrapolated_stress(positions, step)
@@ -213,38 +215,38 @@ class BlockSprings:
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
-        given = self.stress(positions) if stress is None else stress
-        tension, force = np.split(given, [len(self.springs)])
+        stress = self.stress(positions) if stress is None else stress
+        tension, force = np.split(stress, [len(self.springs)])
         local = self._local(positions)
         tangent = self.frame.tangent(local, force.reshape(local.shape))
         return self._pattern.sum(self.network.hessian(positions, tension), tangent)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The projected springs, and the block without the geometric part of its frame [N/m]."""
+        """Return the projected Hessian of the springs plus that of the block without its geometric part [N/m]."""
         local = self._local(positions)
         tangent = self.frame.tangent(local, np.zeros_like(local))
         return self._pattern.sum(self.network.projected_hessian(positions), tangent)
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length of the springs, shape (n_springs,)."""
+        """Return length over rest length of the springs [-], shape (n_springs,)."""
         return self.network.stretch(positions)
 
     @cached_property
     def _edges(self) -> Ints:
-        """The edges of the block's elements, which are no springs, shape (n_edges, 2)."""
+        """Edges of the elements of the block, shape (n_edges, 2)."""
         pairs = self.mesh.elements[self.chosen][:, np.array(self.mesh.kind.edges)].reshape(-1, 2)
         return np.unique(np.sort(pairs, axis=1), axis=0)
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The springs as lines, then the edges of the block's elements, shape (n_springs + n_edges, 2)."""
+        """Springs and edges of the elements of the block as lines, shape (n_springs + n_edges, 2)."""
         return {"line": np.concatenate([self.springs, self._edges])}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each line.
+        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each line, shape (n_lines,).
 
-        Edges of the block have no tension and no stiffness; of its energy each takes the part of its two nodes, half
-        the work of the block's forces there, which may be negative and adds up to the whole.
+        Tension and stiffness of the edges of the block are zero. The energy of the block is divided among its edges:
+        half the work of the block's forces at their nodes, which may be negative.
         """
         block, edges = self.frame.block, self._edges
         of_nodes = np.zeros(len(self.nodes))
@@ -263,7 +265,7 @@ class BlockSprings:
 
 
 class _Union:
-    """The sparsity of the springs and the block together, built once."""
+    """The sparsity pattern of springs and block together."""
 
     def __init__(self, potential: BlockSprings) -> None:
         self.n_nodes, self.dim = potential.nodes.shape
@@ -284,10 +286,11 @@ class _Union:
         self._starts = np.searchsorted(keys, np.arange(self.n_nodes + 1) * self.n_nodes).astype(np.int32)
 
     def _keys(self, rows: Ints, columns: Ints) -> Ints:
+        """Return a number for each pair of row and column."""
         return np.asarray(rows * self.n_nodes + columns)
 
     def sum(self, springs: SparseMatrix, block: Tangent) -> SparseMatrix:
-        """Add the matrix of the springs and the tangent of the block."""
+        """Return the sum of the matrix of the springs and the tangent of the block [N/m]."""
         dim, size = self.dim, self.n_nodes * self.dim
         values = np.zeros((len(self._columns), dim, dim))
         within, across = block.surface.transpose(0, 2, 1, 3), block.inside.transpose(0, 2, 1, 3)

@@ -1,4 +1,4 @@
-"""Bending: the stiffness EI of strips of springs, and of finite elements, over that of their material."""
+"""Bending factors: EI of strips of springs and of finite elements over EI of the material."""
 
 import math
 from types import MappingProxyType
@@ -19,7 +19,7 @@ from truespring.remembering import remembered
 
 
 def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:
-    """Return the numbers of cells along the axes where all elements are the same rectangle or brick along them."""
+    """Return the number of cells along each axis; None unless all elements are equal rectangles or bricks on a grid."""
     if mesh.element not in ("quadrilateral", "hexahedron"):
         return None
     if not mesh.forms.single and not all_alike(mesh, 1e-6):
@@ -35,9 +35,9 @@ def cell_counts(mesh: Mesh) -> tuple[int, ...] | None:
 def bending_factors(
     problem: Problem, springs: SpringsByRule | None, sizes: dict[int, tuple[int, ...]]
 ) -> MappingProxyType[int, float]:
-    """Return bending factors by depth, of sections of so many elements through depth (and width).
+    """Return bending factors by depth [-], for sections with the given numbers of elements through depth (and width).
 
-    Of finite elements where there are no springs.
+    Without springs, return those of finite elements.
     """
     if not sizes:
         return MappingProxyType({})
@@ -49,17 +49,17 @@ def bending_factors(
 def fem_bending_factors(
     problem: Problem, sizes: tuple[tuple[int, tuple[int, ...]], ...]
 ) -> MappingProxyType[int, float]:
-    """Return the bending factors of the elements that are the default; the same for all springs on a body."""
+    """Return the bending factors of the default finite elements by depth [-]."""
     return bending_factors(problem, None, dict(sizes))
 
 
 @remembered
 def bending_excess(problem: Problem) -> float:
-    """Return by what share linear elements of the whole body are too stiff when its longest side is bent.
+    """Return the relative excess stiffness of linear simplices in pure bending of the longest side of the body [-].
 
-    The energy of the nodes of the mesh in pure bending of unit curvature about the body's middle,
-    u = (-x y, (x^2 + nu (y^2 - z^2)) / 2, nu y z), over the exact E / 2 times the integral of y^2, less 1; the larger
-    of both directions in space. For simplices; springs along their edges strain as they do.
+    This is the energy of the nodal displacements of pure bending with unit curvature about the centre of the body,
+    u = (-x y, (x^2 + nu (y^2 - z^2)) / 2, nu y z), divided by the exact one, E / 2 times the integral of y^2, minus 1;
+    in 3D the larger of both directions. Springs on the edges of simplices have the same strains.
     """
     material, section = require_body(problem)
     mesh = problem.mesh
@@ -123,12 +123,15 @@ def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tup
 
 
 def _element_matrix(problem: Problem, springs: SpringsByRule | None, share: Floats | None = None) -> Floats:
-    """The linear matrix of the mesh's first element [N/m]; with `share`, of so much of each of its springs."""
+    """Return the linear stiffness matrix of the first element [N/m], shape (n_dof, n_dof).
+
+    `share` is a factor for the stiffness of each spring.
+    """
     if springs is None:
         elements = fem_potential(problem, "linear", chosen_interpolation(problem, "linear"))
-        assert isinstance(elements, FemPotential)  # of one kind, as `cell_counts` sees to
+        assert isinstance(elements, FemPotential)  # `cell_counts` is None for several kinds
         return np.asarray(elements.element_hessians(problem.mesh.nodes)[0])
-    if springs.coupled:  # these are FEM
+    if springs.coupled:  # equal to FEM
         return np.asarray(element_matrices(problem)[0])
     mesh = problem.mesh
     links, across = np.array(mesh.kind.links), link_vectors(mesh)[0]
@@ -144,9 +147,9 @@ def _element_matrix(problem: Problem, springs: SpringsByRule | None, share: Floa
 
 
 def _shares_of_links(problem: Problem, cell: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
-    """The part of each link that belongs to a cell of a strip, where one spring stands for all that share it.
+    """Return the share of a cell of a strip in each link [-], for sharing "single".
 
-    Two cells share what lies in the plane between them: always along x, inside the section across it.
+    Cells share the links in the plane between them: always along x, inside the section across it.
     """
     dim = problem.mesh.dim
     links = np.array(problem.mesh.kind.links)

@@ -1,7 +1,7 @@
-"""Biquadratic springs: springs in squared lengths, coupled within an element, that are St. Venant-Kirchhoff FEM.
+"""Biquadratic springs: springs in squared lengths, coupled within an element, equal to St. Venant-Kirchhoff FEM.
 
-Of the rule `biquadratic` and of HEML's St. Venant-Kirchhoff law this is the potential, on any element; on simplices
-the mass-tensor method's is the same function, see `mass_tensor`.
+This is the potential of the rule `biquadratic` and of HEML with the St. Venant-Kirchhoff law. The potential of the
+mass-tensor method on simplices is the same function, see `mass_tensor`.
 """
 
 from functools import cached_property
@@ -16,18 +16,18 @@ from truespring.potential import SparseMatrix
 
 
 class BiquadraticSprings(LinkedElements):
-    """Energy W = q . M q of every element, q = l^2 - L^2 of its links, without a quadrature loop.
+    """The potential with energy W = q . M q of every element, q = l^2 - L^2 of its links; no quadrature loop.
 
     Sources: see `link_coupling`.
     """
 
     @cached_property
     def coupling(self) -> Floats:
-        """M [J/m^4], shape (n_elements, links, links), or one for all elements."""
+        """M of each element [J/m^4], shape (n_elements, links, links), or (1, links, links) if all are equal."""
         return link_coupling(self.problem)
 
     def spring_data(self) -> SpringData:
-        """Return the pairs of nodes, the links of an element, and their coupling [J/m^4] in each element."""
+        """Return the springs, the links of an element, and the coupling of each element [J/m^4]."""
         mesh = self.problem.mesh
         coupling = np.broadcast_to(self.coupling, (len(mesh.elements), *self.coupling.shape[1:]))
         links = list(mesh.kind.links)
@@ -43,11 +43,11 @@ class BiquadraticSprings(LinkedElements):
         return float(sum(run(vectors.scalar_product, change.size, change.ravel(), pull.ravel()))) / 2
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The Hessian without what compressed links add to its geometric part, positive semidefinite [N/m]."""
+        """Return the Hessian without the geometric part of compressed links, positive semidefinite [N/m]."""
         return self.hessian(positions, np.maximum(self.stress(positions), 0.0))
 
     def _pulls(self, change: Floats) -> Floats:
-        """2 M q."""
+        """Return p = 2 M q [N/m], shape (n_elements, links)."""
         from truespring.kernels import links
 
         pull = self._by_link()
@@ -61,5 +61,5 @@ class BiquadraticSprings(LinkedElements):
         return self.coupling[first:last] if len(self.coupling) > 1 else self.coupling
 
     def _link_energies(self, change: Floats) -> Floats:
-        """The part q_s (M q)_s, which may be negative and adds up to the whole."""
+        """Return q_s (M q)_s of each link [J], shape (n_elements, links): may be negative, the sum is the energy."""
         return change * self._pulls(change) / 2

@@ -1,4 +1,4 @@
-"""A block of elastic material known by its surface: boundary elements condensed to a stiffness of its nodes."""
+"""A linear elastic block: boundary elements condensed to a stiffness matrix of the nodes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,18 +19,18 @@ from truespring.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A linear elastic block, in its own frame.
+    """A linear elastic block.
 
-    The energy of a displacement u of its nodes, at the surface u_s and inside u_i, is u_s . S u_s / 2 +
-    kappa/2 |u_i - W u_s|^2: S is the stiffness of the surface, W what Somigliana's identity makes of its displacement
-    at the nodes inside. These bear nothing: they follow the surface exactly, without a part in its balance.
+    The energy of displacements u_s of the surface nodes and u_i of the inner nodes is
+    u_s . S u_s / 2 + kappa/2 |u_i - W u_s|^2: S is the stiffness of the surface; W gives the displacement of the inner
+    nodes by Somigliana's identity. In equilibrium the inner nodes follow the surface exactly and carry no force.
 
     Attributes:
-        surface, inside: numbers of the nodes of the mesh, shapes (n_surface,) and (n_inside,).
-        nodes: reference positions, those of the surface first [m], shape (n_surface + n_inside, dim).
-        stiffness: S [N/m], symmetric, its null space the rigid motions.
-        following: W [-], exact for rigid motions.
-        kappa: the mean of the diagonal of S [N/m].
+        surface, inside: node numbers of the mesh, shapes (n_surface,) and (n_inside,).
+        nodes: undeformed positions, surface nodes first [m], shape (n_surface + n_inside, dim).
+        stiffness: S [N/m], shape (n_surface * dim, n_surface * dim), symmetric; its null space is the rigid motions.
+        following: W [-], shape (n_inside * dim, n_surface * dim), exact for rigid motions.
+        kappa: mean of the diagonal of S [N/m].
     """
 
     surface: Ints
@@ -42,17 +42,17 @@ class Block:
 
     @property
     def numbers(self) -> Ints:
-        """The nodes of the mesh in the order of `nodes`, shape (n,)."""
+        """Node numbers of the mesh in the order of `nodes`, shape (n_surface + n_inside,)."""
         return np.concatenate([self.surface, self.inside])
 
     @cached_property
     def coupled(self) -> tuple[Floats, Floats]:
-        """The parts of the matrix of the energy between nodes of the surface, and from these to those inside [N/m]."""
+        """Blocks of the stiffness matrix: between surface nodes, and from surface to inner nodes [N/m]."""
         W = self.following
         return self.stiffness + self.kappa * (W.T @ W), -self.kappa * W.T
 
     def forces(self, displacement: Floats) -> Floats:
-        """The derivative of the energy by a displacement [N], both of shape (n_nodes, dim, ...)."""
+        """Return the derivative of the energy with respect to a displacement [N], both of shape (n_nodes, dim, ...)."""
         n, dim = len(self.surface), self.nodes.shape[1]
         flat = displacement.reshape(len(displacement) * dim, -1)
         at_surface, at_inside = flat[: n * dim], flat[n * dim :]
@@ -62,17 +62,17 @@ class Block:
 
 
 def inner_nodes(mesh: Mesh, elements: Ints) -> Ints:
-    """Return the nodes of some elements that are not on their surface, ascending."""
+    """Return the nodes of elements that are not on their surface, ascending, shape (n,)."""
     facets, alone = mesh.facets_of(mesh.elements[elements])
     return np.setdiff1d(mesh.elements[elements], facets[alone])
 
 
 def make_block(problem: Problem, elements: Ints) -> Block:
-    """Return the block that some elements of one material are, by boundary elements on their surface.
+    """Return a block of elements of one material, by boundary elements on their surface.
 
-    With G t = H u at the middles of the panels, and M what a traction t on the panels gives to the nodes, the
-    stiffness is K = thickness M G^-1 H. It is symmetric but for the error of its discretisation: (K + K^T) / 2 is
-    taken, without what it does to rigid motions. Raises ModelError where that is not stable or does not fit in memory.
+    With G t = H u at the midpoints of the panels, and M the nodal forces of a traction t on the panels, the stiffness
+    is K = thickness M G^-1 H. Since it is symmetric only up to the discretisation error, (K + K^T) / 2 is used,
+    projected so that rigid motions cause no force. Raises ModelError if it is unstable or does not fit in memory.
     """
     mesh = problem.mesh
     _, section = require_body(problem)
@@ -85,7 +85,7 @@ def make_block(problem: Problem, elements: Ints) -> Block:
     nodes = mesh.nodes[np.concatenate([surface, inside])]
     material = problem.materials[problem.material_numbers[elements[0]]]
     poisson = material.poisson / (1 + material.poisson) if section.free_thickness else material.poisson
-    across = 2 * float(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1).max())  # the same however the body is turned
+    across = 2 * float(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1).max())  # invariant under rotation
     influence = Influence(panels, Kelvin(material.lame.mu, poisson, across))
     G, H = influence.equations()
     traction = np.asarray(np.linalg.solve(G, H), dtype=np.float64)
@@ -102,7 +102,7 @@ def make_block(problem: Problem, elements: Ints) -> Block:
 
 
 def _at_nodes(influence: Influence, traction: Floats) -> Floats:
-    """Forces of the nodes of unit displacements [N/m per thickness] from the traction that each makes on the panels."""
+    """Return the nodal forces of the tractions on the panels that each unit displacement causes [N/m per thickness]."""
     panels, dim = influence.surface, influence.surface.dim
     by_panel = traction.reshape(panels.n_panels, dim, -1)
     force = np.zeros((len(panels.nodes), *by_panel.shape[1:]))
@@ -113,7 +113,7 @@ def _at_nodes(influence: Influence, traction: Floats) -> Floats:
 
 
 def _symmetric(stiffness: Floats, rigid: Floats) -> Floats:
-    """The symmetric part without what it does to rigid motions; raise ModelError where that is not positive."""
+    """Return the symmetric part, projected so that rigid motions cause no force; raise ModelError if indefinite."""
     basis = np.linalg.qr(rigid)[0]
     projector = np.eye(len(basis)) - basis @ basis.T
     projected = projector @ stiffness @ projector
@@ -122,18 +122,18 @@ def _symmetric(stiffness: Floats, rigid: Floats) -> Floats:
         linalg.cholesky(projected + np.trace(projected) / len(projected) * (basis @ basis.T))
     except linalg.LinAlgError:
         raise ModelError(
-            "the boundary elements of the block are not stable: its facets are too coarse or too unequal; take finer "
-            "elements, or elements nearer to squares, cubes or regular simplices"
+            "the boundary elements of the block are unstable: its facets are too coarse or too unequal; use finer "
+            "elements, or elements closer to squares, cubes or regular simplices"
         ) from None
     return np.asarray(projected)
 
 
 def _refuse_too_large(panels: Panels, n_inside: int) -> None:
-    """Raise ModelError for dense matrices that do not fit in memory."""
+    """Raise ModelError if the dense matrices do not fit in memory."""
     n, n_surface = panels.n_panels * panels.dim, panels.nodes.size
     needed = 8 * (2 * n * n + 4 * n * n_surface + 4 * n_surface**2 + n_inside * panels.dim * (n + 3 * n_surface))
     if needed > available_memory():
         raise ModelError(
             f"the boundary elements of the block, {len(panels.facets):,} facets, need about {needed / 2**30:,.0f} GiB, "
-            f"{available_memory() / 2**30:,.1f} GiB are there: choose a smaller block or coarser elements"
+            f"but {available_memory() / 2**30:,.1f} GiB are available: use a smaller block or coarser elements"
         )

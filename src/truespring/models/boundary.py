@@ -1,9 +1,9 @@
-"""Boundary elements of linear elasticity: what Kelvin's solution makes of the surface of a body.
+"""Boundary elements of linear elasticity, by collocation with Kelvin's solution.
 
-The displacement is linear between the nodes of a facet (bilinear on four-sided ones), the traction constant on each of
-the panels into which a facet is halved along its edges, and the integral equation holds at the middle of every panel.
-On panels as large as the facets a sawtooth of the displacement would be unseen at their middles, and the stiffness
-indefinite. The kernels are those of any text on boundary elements, such as Brebbia and Dominguez.
+The displacement is linear between the nodes of a facet (bilinear on quadrilaterals). Each facet is divided into panels
+by halving its edges; the traction is constant on each panel, and the integral equation is collocated at the midpoint of
+each panel. With panels as large as the facets, a sawtooth displacement would vanish at all midpoints and the stiffness
+would be indefinite. Kernels: Brebbia and Dominguez, Boundary Elements: An Introductory Course.
 """
 
 import math
@@ -25,13 +25,13 @@ _ITSELF = 1e-6
 
 
 class Kelvin(NamedTuple):
-    """Displacement and traction of a point force in an unbounded body, in the plane of a unit thickness.
+    """Displacement and traction of a point force in an infinite body, in 2D of unit thickness.
 
     Attributes:
         mu: shear modulus [Pa].
-        poisson: of plane strain or of the solid; plane stress is plane strain with nu / (1 + nu).
-        length: what distances are measured in under the logarithm of the plane [m]: of the size of the body, for at
-            some sizes near one of it a uniform displacement makes any traction.
+        poisson: Poisson's ratio of plane strain or 3D; for plane stress use nu / (1 + nu).
+        length: unit of distances in the logarithm of 2D [m], about the size of the body: for some sizes near the unit
+            the integral equation is singular for uniform displacements.
     """
 
     mu: float
@@ -40,16 +40,17 @@ class Kelvin(NamedTuple):
 
 
 class Influence:
-    """The integrals of Kelvin's solution over a surface: what each panel and each node does at some points."""
+    """Integrals of Kelvin's solution over the panels of a surface."""
 
     def __init__(self, surface: Panels, kelvin: Kelvin) -> None:
         self.surface, self.kelvin = surface, kelvin
         self._levels = [(reach, surface.gauss(n)) for reach, n in _LEVELS[surface.dim]]
 
     def at(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the integrals of U over the panels and of T times the nodes' functions at points [m], shape (n, dim).
+        """Return the integrals of U over the panels and of T times the nodal functions at `points` [m], shape (n, dim).
 
-        Shapes (n * dim, n_panels * dim) and (n * dim, n_nodes * dim). What a panel does at its own middle is left out.
+        Shapes (n * dim, n_panels * dim) and (n * dim, n_nodes * dim). The integrals of a panel at its midpoint are not
+        included.
         """
         surface, dim, n = self.surface, self.surface.dim, len(points)
         U, T = np.zeros((n, dim, surface.n_panels, dim)), np.zeros((n, dim, len(surface.nodes), dim))
@@ -72,10 +73,10 @@ class Influence:
         run(kelvin.integrate, len(points), *known, *map(writable, values), corners, U, T, smallest=1)
 
     def equations(self) -> tuple[Floats, Floats]:
-        """Return G, H of the integral equation H u = G t at the middles of the panels.
+        """Return G [m/Pa] and H [-] of the integral equation H u = G t at the midpoints of the panels.
 
-        Shapes (n_panels * dim, n_panels * dim) and (n_panels * dim, n_nodes * dim). What a uniform displacement does,
-        which is nothing, tells the singular part of H.
+        Shapes (n_panels * dim, n_panels * dim) and (n_panels * dim, n_nodes * dim). The singular part of H follows from
+        the condition that a uniform displacement causes no traction.
         """
         surface, dim, n = self.surface, self.surface.dim, self.surface.n_panels
         G, H = (one.reshape(n, dim, -1, dim) for one in self.at(surface.middles.places[:, 0]))
@@ -88,9 +89,9 @@ class Influence:
         return G.reshape(n * dim, -1), H.reshape(n * dim, -1)
 
     def _add_own(self, G: Floats, H: Floats) -> None:
-        """Add the integrals of each panel at its own middle: U, and T times the functions less their values there.
+        """Add the integrals of each panel at its midpoint: U, and T times the nodal functions minus their values there.
 
-        In the plane in closed form.
+        Closed form in 2D.
         """
         surface, middles = self.surface, self.surface.middles
         if surface.dim == 3:
@@ -113,6 +114,6 @@ class Influence:
             H[panels, :, surface.facets[surface.of, corner]] += sign * linear
 
     def shares(self) -> Floats:
-        """Return what a unit traction on a panel gives to its facet's corners [m, m^2], shape (n_panels, corners)."""
+        """Return the nodal forces of a unit traction on each panel [m] or [m^2], shape (n_panels, corners)."""
         patch = self._levels[0][1]
         return np.asarray((patch.shape * patch.measures[..., None]).sum(axis=1))

@@ -1,4 +1,4 @@
-"""What is asked of springs by rule before they are solved: their stiffness by element, for moduli and warnings."""
+"""Protocol of springs by rule, for effective moduli and findings."""
 
 from typing import Protocol
 
@@ -8,16 +8,16 @@ from truespring.problem import Problem
 
 
 class SpringsByRule(Protocol):
-    """Springs whose stiffness follows from the material, element by element: `Springs`, and what is like them."""
+    """Springs whose stiffness is determined element by element from the material, such as `Springs`."""
 
     @property
     def rule(self) -> str | None:
-        """The rule, a key of RULES; None for a stiffness of the user's own."""
+        """The rule, a key of RULES; None for user-defined stiffness."""
         ...
 
     @property
     def sharing(self) -> str:
-        """Return "summed" or "single": whether elements that share a pair of nodes add their springs."""
+        """Stiffness of a spring that several elements share: "summed" or "single"."""
         ...
 
     @property
@@ -27,11 +27,11 @@ class SpringsByRule(Protocol):
 
     @property
     def coupled(self) -> bool:
-        """Whether the springs of an element are coupled, as those of the rule biquadratic."""
+        """Whether the springs of an element are coupled, as by the rule biquadratic."""
         ...
 
     def element_stiffness(self, problem: Problem) -> Floats:
-        """Return the stiffness of each element's springs [N/m], shape (n_elements, links)."""
+        """Return the stiffness of each element's links [N/m], shape (n_elements, links)."""
         ...
 
     def kappa(self, problem: Problem) -> Floats:
@@ -39,7 +39,7 @@ class SpringsByRule(Protocol):
         ...
 
     def allowing_negative(self) -> "SpringsByRule":
-        """Return the same springs, those of negative stiffness allowed."""
+        """Return a copy that allows negative stiffness."""
         ...
 
     def potential(self, problem: Problem) -> Potential:

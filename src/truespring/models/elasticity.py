@@ -1,4 +1,4 @@
-"""The elasticity that the springs of a mesh have together, before anything moves."""
+"""Elasticity matrix of the undeformed springs of a mesh, and the classes of elements of a lattice."""
 
 import numpy as np
 
@@ -12,20 +12,21 @@ from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 from truespring.remembering import remembered
 
-# A mesh made of so few kinds of elements, up to translation, is a lattice: 12 make the body-centred-cubic one,
-# and divisions about several diagonals some more.
+# Largest number of classes of elements, up to translation, in a lattice: the body-centred-cubic one has 12, divisions
+# about several diagonals have more.
 _MOST_CLASSES = 48
 
 
 @remembered
 def lattice_classes(mesh: Mesh) -> Ints | None:
-    """Return the class of each element, -1 for those at the boundary that the inside does not have; None if no lattice.
+    """Return the class of each element, shape (n_elements,); None if the mesh is not a lattice.
 
-    Two elements are of one class where a translation carries one into the other, whatever the order of
-    their nodes. A lattice has few, each all over the body; at its boundary there may be others.
+    Two elements are of one class if a translation maps one to the other, in any order of their nodes. A lattice has
+    few classes, each distributed over the whole body. Elements at the boundary of other classes than the inner ones
+    have -1.
     """
     classes = _classes(mesh)
-    # Only tetrahedra have lattices that a plane cannot cut without elements of another kind.
+    # Only lattices of tetrahedra have other elements at a plane boundary than inside.
     inner = ~_at_boundary(mesh) if mesh.element == "tetrahedron" else np.ones(len(classes), dtype=bool)
     inner |= not inner.any()
     there = np.bincount(classes[inner], minlength=int(classes.max()) + 1) > 0
@@ -36,7 +37,7 @@ def lattice_classes(mesh: Mesh) -> Ints | None:
 
 
 def _classes(mesh: Mesh) -> Ints:
-    """The class of each element, shape (n_elements,): its form without the order of its nodes."""
+    """Return the class of each element, shape (n_elements,): its form, regardless of the order of its nodes."""
     forms = mesh.forms
     at = mesh.nodes[mesh.elements[forms.first]]
     places = rounded(at - at.mean(axis=1, keepdims=True), forms.size)
@@ -46,14 +47,14 @@ def _classes(mesh: Mesh) -> Ints:
 
 
 def _at_boundary(mesh: Mesh) -> Bools:
-    """Whether each element has a facet that bounds the body, shape (n_elements,)."""
+    """Return whether each element has a boundary facet, shape (n_elements,)."""
     touched = np.zeros(mesh.n_nodes, dtype=bool)
     touched[mesh.boundary] = True
     return np.asarray(touched[mesh.elements].sum(axis=1) >= mesh.boundary.shape[1])
 
 
 def _graded(mesh: Mesh, classes: Ints, there: Bools) -> bool:
-    """Whether a class that is `there` fills a part of the body only."""
+    """Return whether one of the classes `there` occurs only in a part of the body."""
     if len(there) == 1:
         return False
     order = np.argsort(classes, kind="stable")
@@ -67,14 +68,14 @@ def _graded(mesh: Mesh, classes: Ints, there: Bools) -> bool:
 
 
 def lattice_elasticity(problem: Problem, stiffness: Floats, classes: Ints | None) -> Floats:
-    """Return the elasticity [Pa] in Voigt's order, shape (3, 3) or (6, 6), of springs that follow a uniform strain.
+    """Return the elasticity matrix of springs under a uniform strain [Pa], in Voigt's order, shape (3, 3) or (6, 6).
 
-    By C_ijkl V = sum k L^2 n_i n_j n_k n_l, with each element's own `stiffness` [N/m], shape (n_elements, links).
-    Of a lattice the mean over its classes, each counted alike; of other meshes over all elements, a
-    bound from above, since nodes that do not follow a uniform strain relax.
+    C_ijkl V = sum k L^2 n_i n_j n_k n_l (Born and Huang, Dynamical Theory of Crystal Lattices, 1954), with the
+    `stiffness` of each element's links [N/m], shape (n_elements, links). For a lattice, the mean over its classes; for
+    other meshes, the mean over all elements, an upper bound since the nodes do not relax.
     """
     mesh, section = problem.mesh, problem.section
-    assert section is not None  # require_body was asked
+    assert section is not None  # see require_body
     chosen = np.arange(len(mesh.elements))
     if classes is not None:
         chosen = np.unique(classes, return_index=True)[1]
@@ -93,7 +94,7 @@ def lattice_elasticity(problem: Problem, stiffness: Floats, classes: Ints | None
 
 
 def hooke(lam: float, mu: float, dim: int) -> Floats:
-    """Return the isotropic elasticity of Lamé's constants [Pa] in Voigt's order, shape (3, 3) or (6, 6)."""
+    """Return the isotropic elasticity matrix of Lamé constants [Pa], in Voigt's order, shape (3, 3) or (6, 6)."""
     n_shear = dim * (dim - 1) // 2
     elasticity = np.zeros((dim + n_shear, dim + n_shear))
     elasticity[:dim, :dim] = lam

@@ -1,4 +1,4 @@
-"""The potential of finite elements on any mesh: of each interpolation, of one kind of elements or of several."""
+"""The potential of finite elements, for every interpolation and for meshes of one or several kinds of elements."""
 
 from truespring.mesh import MIXED
 from truespring.models.fem_potential import FemPotential, of_one_kind, require_continuum
@@ -15,9 +15,9 @@ _POTENTIALS: dict[str, type[FemPotential]] = {
 
 
 def fem_potential(problem: Problem, law: str, interpolation: str = "linear") -> FemPotential | SummedElements:
-    """Return the potential of a law on the problem's mesh, of several kinds of elements the sum over each of them.
+    """Return the potential of a law on the mesh of a problem; for several kinds of elements, the sum over the kinds.
 
-    Raises ModelError for a problem without a material or a section, and for a mesh of lines.
+    Raises ModelError if the problem has no material or section, or a mesh of lines.
     """
     require_continuum(problem)
     kind = _POTENTIALS[interpolation]

@@ -13,7 +13,7 @@ def _equilateral() -> Mesh:
     return Mesh(halved.nodes @ np.array([[1.0, 0.0], [0.5, np.sqrt(3) / 2]]), halved.elements, "triangle")
 
 
-#: Meshes of some elements each, by the name of their lattice: what `Realised.lattice` takes.
+#: Meshes of some elements each, by the name of their lattice: what `LatticeModuli.lattice` takes.
 LATTICES: MappingProxyType[str, Callable[[], Mesh]] = MappingProxyType(
     {
         "squares": lambda: rectangle((4.0, 3.0), (4, 3)),

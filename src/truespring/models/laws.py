@@ -1,9 +1,9 @@
-"""Constitutive laws: from the strain to energy density, stress and elasticity.
+"""Constitutive laws: energy density, stress and elasticity of a strain.
 
-Arrays have their tensor axes first, then those of elements and points; a symmetric tensor has one
-axis, its components in Voigt's order. A law accounts for the third direction of a plane body: in plane
-strain its length is fixed, in plane stress it is free of stress. A law is two functions, the response
-and the energy density in principal stretches against which it is tested, and one entry of LAWS.
+The tensor axes of arrays come first, then the axes of elements and points; a symmetric tensor has one axis, its
+components in Voigt's order. A law accounts for the third direction of a plane body: its length is fixed in plane
+strain, its stress is zero in plane stress. A law consists of two functions, the response and the energy density in
+principal stretches that tests compare it with, and one entry of LAWS.
 """
 
 from types import MappingProxyType
@@ -29,24 +29,26 @@ from truespring.models.symmetric import (
 )
 from truespring.problem import Problem
 
-# A law whose constants give Young's modulus and Poisson's ratio at small strain takes a material within these of it.
+# Largest difference of young (relative) and poisson (absolute) between a material and a law whose constants determine
+# both at small strain.
 _SAME_MATERIAL = 0.01
 
 
 def linear(strain: Floats, constants: Constants) -> Response:
-    """Hooke: W = lam/2 (tr e)^2 + mu e : e of the small strain."""
+    """Return the response of Hooke's law, W = lam/2 (tr e)^2 + mu e : e of the small strain e."""
     return _quadratic(strain, constants, 1.0 + _thickness_strain(strain, constants))
 
 
 def saint_venant_kirchhoff(C: Floats, constants: Constants) -> Response:
-    """W = lam/2 (tr E)^2 + mu E : E of the Green strain E = (C - I) / 2."""
+    """Return the response of W = lam/2 (tr E)^2 + mu E : E of the Green strain E = (C - I) / 2."""
     strain = (C - identity(C)) / 2
-    # The thickness is the root of 1 + 2 E_33; the law itself goes on where that is negative.
+    # The thickness stretch is sqrt(1 + 2 E_33); energy and stress are defined where that is imaginary, too.
     thickness = np.sqrt(np.maximum(1 + 2 * _thickness_strain(strain, constants), 0.0))
     return _quadratic(strain, constants, thickness)
 
 
 def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Response:
+    """Return the response of a law that is quadratic in `strain`, with the given thickness stretch."""
     lam, mu = constants.lam_plane, constants.mu
     dim, volume_change = dimensions(strain), trace(strain)
     stress = 2 * mu * strain
@@ -64,17 +66,17 @@ def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Respo
 
 
 def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
-    """Strain of the third direction under a quadratic law: -lam / (lam + 2 mu) tr e in plane stress."""
+    """Return the strain of the third direction under a quadratic law: -lam / (lam + 2 mu) tr e in plane stress."""
     if not constants.plane_stress:
         return np.zeros(strain.shape[1:])
     return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * trace(strain))
 
 
 def neo_hookean(C: Floats, constants: Constants) -> Response:
-    """W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2, J the volume ratio (Simo and Pister 1984).
+    """Return the response of W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2, J the volume ratio (Simo and Pister 1984).
 
-    In plane stress C_33 solves mu (C_33 - 1) + lam ln J = 0 at every point; eliminated, it turns
-    lam into lam 2 mu C_33 / (2 mu C_33 + lam) in the elasticity.
+    In plane stress C_33 solves mu (C_33 - 1) + lam ln J = 0 at every point; eliminating it replaces lam by
+    lam 2 mu C_33 / (2 mu C_33 + lam) in the elasticity.
     """
     lam, mu = constants.lam, constants.mu
     det = determinant(C)
@@ -99,9 +101,8 @@ def neo_hookean(C: Floats, constants: Constants) -> Response:
 def _free_thickness(log_det: Floats, ratio: float | Floats) -> Floats:
     """Solve C_33 - 1 + ratio/2 (log_det + ln C_33) = 0 for C_33 > 0, by Newton in y = ln C_33.
 
-    e^y + ratio/2 y is convex and rises where ratio > 0, so that from the second step on Newton
-    descends monotonically. Below zero (ratio in (-2/3, 0)) there is none under strong compression;
-    what is returned there is not a number.
+    For ratio > 0, e^y + ratio/2 y is convex and increasing: Newton's method converges monotonically from the second
+    step on. For ratio in (-2/3, 0) there is no solution under strong compression; NaN is returned there.
     """
     half = ratio / 2
     y = np.clip(-half * log_det / (1 + half), -50.0, 50.0)
@@ -115,11 +116,11 @@ def _free_thickness(log_det: Floats, ratio: float | Floats) -> Floats:
 
 
 def hencky(C: Floats, constants: Constants) -> Response:
-    """W = mu |ln U|^2 + lam/2 (tr ln U)^2, U the right stretch; Hencky's law in Kirchhoff stress.
+    """Return the response of W = mu |ln U|^2 + lam/2 (tr ln U)^2, U the right stretch tensor (Hencky 1928).
 
     With C = sum c_i N_i (x) N_i and e_i = ln(c_i) / 2 the stress is S_i = (2 mu e_i + lam tr e) / c_i.
-    Its shear elasticities are the divided differences (S_i - S_j) / (c_i - c_j), written with
-    log1p so that equal stretches need no special case. Plane stress keeps the law, with lam_plane.
+    The shear components of the elasticity are the divided differences (S_i - S_j) / (c_i - c_j), computed with
+    log1p so that equal stretches need no special case. In plane stress, lam_plane replaces lam.
     """
     lam, mu = constants.lam_plane, constants.mu
     dim = dimensions(C)
@@ -151,7 +152,7 @@ def hencky(C: Floats, constants: Constants) -> Response:
 
 
 def _principal(C: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, ascending, axes (which, ...), and unit eigenvectors, axes (direction, which, ...)."""
+    """Return the eigenvalues, ascending, axes (number, ...), and unit eigenvectors, axes (direction, number, ...)."""
     dim = dimensions(C)
     full = np.empty((*C.shape[1:], dim, dim))
     for component, (i, j) in zip(C, voigt_pairs(dim), strict=True):
@@ -162,7 +163,7 @@ def _principal(C: Floats) -> tuple[Floats, Floats]:
 
 
 def _log_difference(a: Floats, b: Floats) -> Floats:
-    """b (ln a - ln b) / (a - b), 1 where a = b."""
+    """Return b (ln a - ln b) / (a - b), 1 where a = b."""
     x = (a - b) / b
     near = np.abs(x) < 0.5
     logarithm = np.where(near, np.log1p(np.where(near, x, 0.0)), np.log(a) - np.log(b))
@@ -182,7 +183,7 @@ def _hencky_density(stretch: Any, constants: Constants) -> Any:
 
 
 def _quadratic_density(strain: Any, constants: Constants) -> Any:
-    """mu e : e + lam/2 (tr e)^2 of the three principal strains [J/m^3]."""
+    """Return mu e : e + lam/2 (tr e)^2 of the three principal strains [J/m^3]."""
     return constants.mu * (strain**2).sum() + constants.lam / 2 * strain.sum() ** 2
 
 
@@ -240,15 +241,15 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
 
 
 def material_constants() -> dict[str, Constant]:
-    """Return all constants that laws take besides lam and mu, by name: the further keys of a material."""
+    """Return the constants of all laws by name, without lam and mu: the optional keys of a material."""
     return {name: constant for law in LAWS.values() for name, constant in law.constants.items()}
 
 
 def law_constants(problem: Problem, name: str) -> Constants:
-    """Return the constants of a law for the elements of a problem, numbers or of shape (n_elements, 1) [SI].
+    """Return the constants of a law for the elements of a problem [SI], numbers or arrays of shape (n_elements, 1).
 
-    Raises ModelError where a material has a constant that no law knows, lacks one that the law needs, has one out of
-    range, or has other moduli than the law's constants give at small strain.
+    Raises ModelError if a material has an unknown constant, lacks a constant of the law, has one out of range, or if
+    its young and poisson differ from those of the law at small strain.
     """
     plane_stress = problem.section is not None and problem.section.free_thickness
     law = LAWS[name]
@@ -265,18 +266,18 @@ def law_constants(problem: Problem, name: str) -> Constants:
 
 
 def _values(material: Material, name: str) -> dict[str, float]:
-    """The values of a law's constants for a material, defaults filled in [SI]."""
+    """Return the constants of a law for a material by name [SI], with default values."""
     law, known, has = LAWS[name], material_constants(), dict(material.constants)
     for key in has.keys() - known.keys():
-        allowed = f"allowed: {', '.join(known)}" if known else "no law has constants besides young and poisson"
+        allowed = f"allowed: {', '.join(known)}" if known else "allowed: only young, poisson and density"
         raise ModelError(f"material: constant '{key}' is unknown{nearest(key, known)}; {allowed}")
     values: dict[str, float] = {}
     for key, constant in law.constants.items():
         value = has.get(key, constant.default)
         if value is None:
             raise ModelError(
-                f"law = '{name}' needs {key} [{constant.unit}], {constant.meaning}: the material has none; "
-                f"give it beside young and poisson"
+                f"law = '{name}' requires {key} [{constant.unit}], {constant.meaning}: add it to the material, next to "
+                "young and poisson"
             )
         if not constant.smallest <= value <= constant.largest:
             raise ModelError(
@@ -289,14 +290,14 @@ def _values(material: Material, name: str) -> dict[str, float]:
 
 
 def _require_same_moduli(material: Material, name: str, values: dict[str, float]) -> None:
-    """Raise ModelError where a law has other moduli at small strain than a material."""
+    """Raise ModelError if young and poisson of a material differ from those of the law at small strain."""
     lame = LAWS[name].lame
     assert lame is not None
     lam, mu = lame(values)
     young, poisson = mu * (3 * lam + 2 * mu) / (lam + mu), lam / 2 / (lam + mu)
     if abs(young / material.young - 1) > _SAME_MATERIAL or abs(poisson - material.poisson) > _SAME_MATERIAL:
-        given = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        values_text = ", ".join(f"{key} = {value:g}" for key, value in values.items())
         raise ModelError(
-            f"law = '{name}' with {given} has young = {young:g} Pa and poisson = {poisson:g} at small strain, the "
-            f"material {material.young:g} Pa and {material.poisson:g}: give the same material to all models"
+            f"law = '{name}' with {values_text} has young = {young:g} Pa and poisson = {poisson:g} at small strain, "
+            f"the material {material.young:g} Pa and {material.poisson:g}: change these or the constants of the law"
         )

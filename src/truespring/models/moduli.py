@@ -1,6 +1,7 @@
-"""Moduli: what a spring model realises, known before anything is solved."""
+"""Effective moduli of springs, computed before the study is solved."""
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,42 +24,44 @@ from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 from truespring.remembering import remembered
 
-#: Depths, in elements, at which the bending factor is shown.
+#: Depths at which the bending factor is reported, in elements.
 DEPTHS = (1, 2, 3, 4, 6, 8)
 
-# Sections of more elements than this have no bending factor of their own.
+# Largest section for which the bending factor of the mesh is computed, in elements.
 _FINEST_SECTION = 150
 
-# Sums of stiffness below this share of the largest are rounding.
+# Stiffness below this share of the largest is rounding.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, repr=False)
 class Moduli:
-    """Effective linear moduli of a body of springs, beside those of the material in its section.
+    """Effective linear moduli of a body of springs, and the moduli of its material.
 
     Attributes:
-        elasticity: of the unbounded lattice, or of this irregular body with its boundary strained
-            uniformly, in Voigt's order (xx, yy, xy or xx, yy, zz, yz, xz, xy) [Pa], shape (3, 3) or (6, 6).
-        young_wanted, poisson_wanted: what a test within the mesh's directions would find on the material [Pa],
-            [-]; in plane strain E / (1 - nu^2) and nu / (1 - nu).
-        bending: EI of a strip n elements deep (in 3D n by n), bent along x, over that of the material; n to factor.
-        fem_bending: the same of linear finite elements on this mesh: the error of the reference itself.
-        depth: the number of elements through the depth (y) of this mesh, None where it is no lattice of
-            rectangles or bricks along the axes, or one so fine that its bending factor is that of the bulk; in
-            3D `bending[depth]` has this mesh's width (z).
-        lattice: whether the mesh is a lattice, whose moduli are exact.
-        body: the elasticity of this very body, its boundary strained uniformly: of a lattice that is cut off at the
-            outside, as body-centred-cubic tetrahedra are, other than the lattice's [Pa], as `elasticity`.
-        patch_score: the patch test under unit uniform strains: root-mean-square unbalanced force at inner nodes
-            over E h^(d-1) [-], h the size of an element; 0 where uniform strain is an equilibrium.
-        n_springs, n_negative, n_zero: springs of the mesh, and those of negative and of no stiffness.
-        stable: whether springs of negative stiffness, if any, leave the body at rest stable as far as was seen.
+        elasticity: elasticity matrix of the infinite lattice or, on an irregular mesh, of the body under a uniform
+            strain of its boundary [Pa], in Voigt's order (xx, yy, xy or xx, yy, zz, yz, xz, xy), shape (3, 3) or
+            (6, 6).
+        material_young, material_poisson: apparent moduli of the material [Pa], [-]; in plane strain E / (1 - nu^2) and
+            nu / (1 - nu).
+        bending: bending factor by depth: EI of a strip n elements deep (n by n in 3D), bent along x, over that of the
+            material [-].
+        fem_bending: bending factors of finite elements on the same mesh: the discretisation error of the reference.
+        depth: number of elements through the depth (y) of this mesh. None if it is not a lattice of rectangles or
+            bricks along the axes, or so fine that its bending factor is that of the bulk. In 3D, `bending[depth]` is
+            for the width (z) of this mesh.
+        lattice: whether the mesh is a lattice, so that the moduli are exact.
+        body: elasticity matrix of the body under a uniform strain of its boundary [Pa], as `elasticity`. It differs
+            from that of the lattice if the outer elements are cut, as those of body-centred-cubic tetrahedra are.
+        patch_score: root-mean-square unbalanced force at inner nodes under unit uniform strains, over E h^(d-1) with
+            element size h [-]; 0 if a uniform strain is an equilibrium.
+        n_springs, n_negative, n_zero: number of springs, and of springs with negative and with zero stiffness.
+        stable: whether the undeformed body is stable, as far as known, if springs have negative stiffness.
     """
 
     elasticity: Floats
-    young_wanted: float
-    poisson_wanted: float
+    material_young: float
+    material_poisson: float
     bending: MappingProxyType[int, float]
     fem_bending: MappingProxyType[int, float]
     depth: int | None
@@ -79,46 +82,59 @@ class Moduli:
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Dimension of the body, 2 or 3."""
         return 2 if len(self.elasticity) == 3 else 3
+
+    @property
+    def young_wanted(self) -> float:
+        """Deprecated: `material_young`."""
+        _warn_renamed("young_wanted", "material_young")
+        return self.material_young
+
+    @property
+    def poisson_wanted(self) -> float:
+        """Deprecated: `material_poisson`."""
+        _warn_renamed("poisson_wanted", "material_poisson")
+        return self.material_poisson
 
     @cached_property
     def _compliance(self) -> Floats:
         return np.asarray(np.linalg.inv(self.elasticity))
 
     def young(self, along: float | Sequence[float] = 0.0) -> float:
-        """Return Young's modulus in a test along a direction [Pa]: a vector, or an angle from x to y in degrees."""
+        """Return Young's modulus along a direction [Pa], given as a vector or as an angle from x to y in degrees."""
         return 1 / self._directional(along)[0]
 
     def poisson(self, along: float | Sequence[float] = 0.0) -> float:
-        """Return Poisson's ratio in a test along a direction [-]; in 3D the mean of all directions across it."""
+        """Return Poisson's ratio for tension along a direction [-], in 3D the mean over the transverse directions."""
         axial, sideways = self._directional(along)
         return -sideways / axial
 
     def _directional(self, along: float | Sequence[float]) -> tuple[float, float]:
-        """Strain along and, as the mean, across a direction for a unit stress along it [1/Pa]."""
+        """Return the axial and the mean transverse strain for a unit stress along a direction [1/Pa]."""
         n = self._unit(along)
         strain = self._compliance @ _voigt_stress(n)
         axial = float(_voigt_stress(n) @ strain)
         return axial, (float(strain[: self.dim].sum()) - axial) / (self.dim - 1)
 
     def _unit(self, along: float | Sequence[float]) -> Floats:
+        """Return the unit vector of a direction, shape (dim,)."""
         if np.ndim(along) == 0:
             along = float(along)  # type: ignore[arg-type]
             turned = np.array([np.cos(np.radians(along)), np.sin(np.radians(along)), 0.0])[: self.dim]
             return np.asarray(turned)
         vector = np.asarray(along, dtype=float)
         if vector.shape != (self.dim,) or not np.linalg.norm(vector) > 0:
-            raise ModelError(f"along = {along!r}: an angle in degrees or a vector of {self.dim} components is wanted")
+            raise ModelError(f"along = {along!r}: must be an angle in degrees or a vector of {self.dim} components")
         return np.asarray(vector / np.linalg.norm(vector))
 
     def young_along(self, directions: Floats) -> Floats:
-        """Return Young's modulus along unit vectors [Pa], shape (n, dim) to (n,)."""
+        """Return Young's modulus along unit vectors of shape (n, dim) [Pa], shape (n,)."""
         stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
         return np.asarray(1 / np.einsum("ni,ij,nj->n", stress, self._compliance, stress))
 
     def poisson_along(self, directions: Floats) -> Floats:
-        """Return Poisson's ratio along unit vectors, in 3D the mean across [-], shape (n, dim) to (n,)."""
+        """Return Poisson's ratio along unit vectors of shape (n, dim) [-], in 3D the transverse mean, shape (n,)."""
         stress = np.stack([directions[:, i] * directions[:, j] for i, j in voigt_pairs(self.dim)], axis=1)
         strain = stress @ self._compliance
         axial = (strain * stress).sum(axis=1)
@@ -131,7 +147,7 @@ class Moduli:
 
     @property
     def zener(self) -> float:
-        """2 C66 / (C11 - C12), normal and mixed constants as means where they differ; 1 if isotropic [-]."""
+        """Zener ratio 2 C66 / (C11 - C12) of the mean constants over the axes [-]; 1 if isotropic."""
         C, dim = self.elasticity, self.dim
         normal = np.diag(C)[:dim].mean()
         mixed = C[:dim, :dim][~np.eye(dim, dtype=bool)].mean()
@@ -139,7 +155,7 @@ class Moduli:
 
     @property
     def anisotropy(self) -> float:
-        """In the plane Zener's ratio, in space the largest over the smallest Young's modulus; 1 if isotropic [-]."""
+        """Zener ratio in 2D, largest over smallest Young's modulus in 3D [-]; 1 if isotropic."""
         if self.dim == 2:
             return self.zener
         lowest, highest = self.young_range
@@ -147,27 +163,27 @@ class Moduli:
 
     @cached_property
     def poisson_range(self) -> tuple[float, float]:
-        """Smallest and largest Poisson's ratio over the directions of the test [-]."""
+        """Smallest and largest Poisson's ratio over all directions of tension [-]."""
         return _extremes(self.poisson_along, self.dim)
 
     @property
     def deviation(self) -> float:
-        """How far the elasticity is from the material's: the norm of their difference over the material's [-].
+        """Relative difference between the elasticity matrices of springs and material, in the Frobenius norm [-].
 
-        In Mandel's form, so that the directions of the axes do not matter.
+        Uses Mandel's notation, so that the result does not depend on the axes.
         """
         dim = self.dim
-        young, poisson = self.young_wanted, self.poisson_wanted
+        young, poisson = self.material_young, self.material_poisson
         mu = young / (2 * (1 + poisson))
         lam = 2 * mu * poisson / (1 - poisson) if dim == 2 else 2 * mu * poisson / (1 - 2 * poisson)
-        wanted = hooke(lam, mu, dim)
-        weight = np.sqrt([1.0] * dim + [2.0] * (len(wanted) - dim))
+        exact = hooke(lam, mu, dim)
+        weight = np.sqrt([1.0] * dim + [2.0] * (len(exact) - dim))
         mandel = weight[:, None] * weight
-        return float(np.linalg.norm(mandel * (self.elasticity - wanted)) / np.linalg.norm(mandel * wanted))
+        return float(np.linalg.norm(mandel * (self.elasticity - exact)) / np.linalg.norm(mandel * exact))
 
 
 def _extremes(value: Callable[[Floats], Floats], dim: int) -> tuple[float, float]:
-    """Smallest and largest value over all directions: of many tried the best few, refined."""
+    """Return the smallest and largest value over all directions: the best few of a fixed set, refined."""
     directions = _directions(dim)
     found = value(directions)
 
@@ -175,8 +191,8 @@ def _extremes(value: Callable[[Floats], Floats], dim: int) -> tuple[float, float
 
     def refined(sign: float) -> float:
         best = directions[np.argsort(sign * found)[:40:10]]
-        step = 0.1  # wider than directions are apart
-        while step > 1e-8:  # there a value is flat: it is found to rounding
+        step = 0.1  # larger than the distance of neighbouring directions
+        while step > 1e-8:  # values are flat at an extremum: found to rounding
             near = best[:, None] + step * around
             near /= np.linalg.norm(near, axis=2, keepdims=True)
             values = sign * value(near.reshape(-1, dim)).reshape(near.shape[:2])
@@ -188,12 +204,12 @@ def _extremes(value: Callable[[Floats], Floats], dim: int) -> tuple[float, float
 
 
 def _voigt_stress(n: Floats) -> Floats:
-    """The stress n n^T in Voigt's order."""
+    """Return the stress n n^T in Voigt's order, shape (3,) or (6,)."""
     return np.array([n[i] * n[j] for i, j in voigt_pairs(len(n))])
 
 
 def _directions(dim: int) -> Floats:
-    """Unit vectors that cover all directions evenly, the axes and diagonals among them, shape (n, dim)."""
+    """Return evenly distributed unit vectors, with axes and diagonals, shape (n, dim)."""
     if dim == 2:
         angle = np.radians(np.arange(0.0, 180.0, 0.5))
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -208,13 +224,13 @@ def _directions(dim: int) -> Floats:
 
 @remembered
 def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
-    """Return what `springs` realise on the problem's mesh, were it all of the problem's own material.
+    """Return the effective moduli of springs on the mesh of a problem, all of it of the material of the problem.
 
-    On a lattice, whose nodes are centres of symmetry, a uniform strain is an equilibrium and
-    C_ijkl = sum k L^2 n_i n_j n_k n_l over the springs of a cell, by its volume, is exact. On an
-    irregular mesh the nodes inside relax while the boundary is strained uniformly. A spring that
-    several elements share belongs to each by its part; with sharing "single" the part of one spring.
-    Raises ModelError where the springs do not resist every strain.
+    On a lattice whose nodes are centres of symmetry, a uniform strain is an equilibrium, and
+    C_ijkl = sum k L^2 n_i n_j n_k n_l over the springs of a cell, divided by its volume, is exact (Born and Huang,
+    Dynamical Theory of Crystal Lattices, 1954). On an irregular mesh, a uniform strain is applied to the boundary and
+    the inner nodes relax. The stiffness of a spring that several elements share is divided among them.
+    Raises ModelError if the springs do not resist every strain.
     """
     material, section = require_body(problem)
     alone = replace(problem, regions=()) if problem.regions else problem
@@ -245,8 +261,8 @@ def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
         sizes[depth] = cells[1:]
     return Moduli(
         elasticity=elasticity,
-        young_wanted=young,
-        poisson_wanted=poisson,
+        material_young=young,
+        material_poisson=poisson,
         bending=bending_factors(alone, springs, sizes),
         fem_bending=fem_bending_factors(alone, tuple(sizes.items())),
         depth=depth,
@@ -260,14 +276,20 @@ def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     )
 
 
+def _warn_renamed(former: str, name: str) -> None:
+    """Issue a DeprecationWarning for an attribute that was renamed."""
+    warnings.warn(f"Moduli.{former} is deprecated, use Moduli.{name}", DeprecationWarning, stacklevel=3)
+
+
 def _require_resistance(elasticity: Floats) -> None:
+    """Raise ModelError if an elasticity matrix is not positive definite."""
     resistance = np.linalg.eigvalsh(elasticity)
     if not resistance[0] > 1e-12 * resistance[-1]:
-        raise ModelError("these springs do not resist every strain: edges and diagonals must both carry")
+        raise ModelError("these springs do not resist every strain: give edges and diagonals a stiffness")
 
 
 def _sharing(mesh: Mesh) -> Floats:
-    """How many elements share each link: of an unbounded regular mesh where that is known, else of this one."""
+    """Return how many elements share each link, in the infinite lattice if the kind of element has one, else here."""
     if mesh.element != MIXED and mesh.kind.sharing:
         return np.array(mesh.kind.sharing, dtype=float)
     found = distinct_rows([_link_keys(mesh)])
@@ -282,13 +304,13 @@ def _sharing(mesh: Mesh) -> Floats:
 
 
 def _link_keys(mesh: Mesh) -> Ints:
-    """A number for each link of each element, the same for the same two nodes: link after link, kind after kind."""
+    """Return a key of the two nodes of each element's links, link by link, kind by kind, shape (n,)."""
     keys = [part.pair_keys(part.kind.links).ravel() for _, part in mesh.blocks]
     return keys[0] if len(keys) == 1 else np.concatenate(keys)
 
 
 class SpringCounts(NamedTuple):
-    """The springs of a mesh, and those of negative and of no stiffness."""
+    """Number of springs of a mesh, and of springs with negative and with zero stiffness."""
 
     n_springs: int
     n_negative: int
@@ -296,20 +318,23 @@ class SpringCounts(NamedTuple):
 
 
 def spring_counts(mesh: Mesh, stiffness: Floats) -> SpringCounts:
-    """Count springs, each the sum of what its elements give [N/m], shape (n_elements, links); rounding is zero."""
+    """Count the springs of a mesh; `stiffness` of each element's links [N/m], shape (n_elements, links).
+
+    The stiffness of a spring is the sum over the elements that share it. Rounding counts as zero.
+    """
     smallest = float(in_a_row(mesh, stiffness).min())
-    if smallest > 1e3 * _ROUNDING * stiffness.max():  # no thousand elements share a spring
+    if smallest > 1e3 * _ROUNDING * stiffness.max():  # a spring has fewer than 1000 elements
         return SpringCounts(_n_links(mesh), 0, 0)
     found = distinct_rows([_link_keys(mesh)])
-    given = [stiffness[numbers, : len(part.kind.links)].T.ravel() for numbers, part in mesh.blocks]
-    sums = np.add.reduceat(np.concatenate(given)[found.order], found.starts)
+    by_kind = [stiffness[numbers, : len(part.kind.links)].T.ravel() for numbers, part in mesh.blocks]
+    sums = np.add.reduceat(np.concatenate(by_kind)[found.order], found.starts)
     rounding = _ROUNDING * np.abs(sums).max()
     return SpringCounts(len(sums), int((sums < -rounding).sum()), int((np.abs(sums) <= rounding).sum()))
 
 
 @remembered
 def _n_links(mesh: Mesh) -> int:
-    """The number of pairs of nodes that links join."""
+    """Return the number of pairs of nodes that are joined by links."""
     keys = _link_keys(mesh)
     keys.sort(kind="stable")
     return 1 + int(np.count_nonzero(keys[1:] != keys[:-1]))

@@ -1,4 +1,4 @@
-"""Linear response of a whole body of simplices to uniform stress and to pure bending, against its material."""
+"""Linear response of a body of simplices to uniform stress and pure bending, compared with the exact solution."""
 
 import math
 from typing import NamedTuple
@@ -17,11 +17,11 @@ from truespring.remembering import remembered
 
 
 class Response(NamedTuple):
-    """How much more a body deforms than its material: below zero it is too stiff, above too soft.
+    """Relative errors of the deformation of a body: negative if it is too stiff, positive if too soft.
 
     Attributes:
-        stretch: relative error of the deformation under a uniform stress along an axis, the worst axis [-].
-        bending: the same under the stress of pure bending of the longest side, the worst direction [-].
+        stretch: error under a uniform stress along an axis, worst axis [-].
+        bending: error in pure bending of the longest side, worst direction [-].
     """
 
     stretch: float
@@ -35,12 +35,12 @@ class Response(NamedTuple):
 
 @remembered
 def response(problem: Problem, springs: SpringsByRule) -> Response | None:
-    """Return the response of a free body of triangles or tetrahedra; None where no equilibrium is found.
+    """Return the response of a free body of triangles or tetrahedra; None if no equilibrium is found.
 
-    The body is loaded by the nodal forces of a stress field that is in equilibrium, integral of stress : grad N. Their
-    work on the displacement of the springs is compared with that on the exact one, which is the integral of
-    stress : stress / E: along an axis, or -y along x. Elements that lock show it in bending, for a uniform strain does
-    not make them lock.
+    The loads are the nodal forces of a stress field in equilibrium, the integral of stress : grad N, for a uniform
+    stress along an axis and for the stress -y along x of pure bending. Their work on the displacement of the springs is
+    compared with their work on the exact displacement, the integral of stress : stress / E. Elements that lock are too
+    stiff in bending, not under uniform strain.
     """
     mesh = problem.mesh
     forces, works = _loads(problem)
@@ -54,10 +54,10 @@ def response(problem: Problem, springs: SpringsByRule) -> Response | None:
 
 
 def _loads(problem: Problem) -> tuple[Floats, Floats]:
-    """Nodal forces [N], shape (n_dof, loads), and their work on the exact displacement [J], shape (loads,)."""
+    """Return nodal forces [N], shape (n_dof, loads), and their work on the exact displacement [J], shape (loads,)."""
     mesh = problem.mesh
     if mesh.element not in ("triangle", "tetrahedron"):
-        raise ModelError(f"the response is of triangles and tetrahedra, this mesh has {mesh.kinds} elements")
+        raise ModelError(f"the response is defined for triangles and tetrahedra, this mesh has {mesh.kinds} elements")
     material, section = require_body(problem)
     young, _ = section.apparent_moduli(material)
     gradients, volumes = (part[:, 0] for part in fem_of_one_kind(problem, "linear").quadrature())
@@ -76,7 +76,7 @@ def _loads(problem: Problem) -> tuple[Floats, Floats]:
 
 
 def _nodal(mesh: Mesh, axis: int, gradients: Floats, weights: Floats) -> Floats:
-    """Nodal forces [N], shape (n_dof,), of a stress along an axis [Pa] times the volume of each element [m^3]."""
+    """Return nodal forces [N], shape (n_dof,), of a stress along an axis; `weights`: stress times volume [Pa m^3]."""
     force = np.zeros(mesh.nodes.shape)
     by_node = weights[:, None] * gradients[:, :, axis]
     force[:, axis] = np.bincount(mesh.elements.ravel(), by_node.ravel(), minlength=mesh.n_nodes)

@@ -1,8 +1,8 @@
-"""Stiffness rules: from a material and an element to the stiffness of the element's springs.
+"""Stiffness rules: the stiffness of the springs of an element, from its shape and material.
 
-A rule is one function of the problem that returns stiffness [N/m], shape (n_elements, links), in
-the order of `ElementKind.links`, and one entry of RULES. The effective moduli that an entry states are
-confirmed by `moduli`, which computes them from the stiffness.
+A rule consists of a function of the problem that returns stiffness [N/m], shape (n_elements, links), in the order of
+`ElementKind.links`, and an entry of RULES. The tests compare the effective moduli that the entry states with those that
+`moduli` computes.
 """
 
 import math
@@ -24,26 +24,25 @@ from truespring.models.fem_potential import fem_of_one_kind
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
 from truespring.problem import Problem, sample
 
-#: Share of E h that `isotropic` gives to each body diagonal of a cube unless told otherwise: the member
-#: of its family whose matrix is nearest to that of the hexahedron.
+#: Default stiffness of each body diagonal of a cube in the rule `isotropic`, in E h: the member of the family whose
+#: element matrix is nearest to that of the hexahedron.
 K_BODY = 1 / 12
 _LARGEST_K_BODY = 0.3
 
 
-#: The lattice of `Realised` that stands for all meshes.
+#: Value of `LatticeModuli.lattice` for moduli that hold on all meshes.
 ANY_MESH = "any mesh"
 
 
 @dataclass(frozen=True, slots=True)
-class Realised:
-    """Effective moduli of a rule on a lattice, in plane stress or 3D; `moduli` confirms them in the tests.
+class LatticeModuli:
+    """Effective moduli of a rule on a lattice, in plane stress or 3D; the tests compare them with `moduli`.
 
     Attributes:
         lattice: a key of LATTICES, or ANY_MESH.
         young: smallest and largest Young's modulus over all directions, over that of the material [-].
-        poisson: smallest and largest Poisson's ratio over the directions of the test [-]; None where it is the
-            material's.
-        at: the material's Poisson's ratio for which these hold [-]; None for any.
+        poisson: smallest and largest Poisson's ratio over all directions [-]; None if it is that of the material.
+        at: Poisson's ratio of the material for which the moduli hold [-]; None for any.
     """
 
     lattice: str
@@ -56,59 +55,59 @@ class Realised:
         lowest, highest = (_number(value) for value in self.young)
         young = "E" if lowest == highest == "1" else f"{lowest} E" if lowest == highest else f"{lowest} to {highest} E"
         if self.poisson is None:
-            return f"{where}: {young}, the material's Poisson's ratio"
+            return f"{where}: {young}, Poisson's ratio of the material"
         smallest, largest = (_number(value) for value in self.poisson)
         return f"{where}: {young}, Poisson's ratio {smallest if smallest == largest else f'{smallest} to {largest}'}"
 
 
 def _number(value: float) -> str:
-    """A value as a fraction of small numbers if it is one, else with three digits."""
+    """Return a value as a fraction of small integers if it is one, else with three digits."""
     found = Fraction(value).limit_denominator(4)
     return str(found) if abs(float(found) - value) < 1e-9 else f"{value:.3f}"
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """An entry of RULES. All its statements are checked by the contract tests (`tests/test_rules.py`).
+    """An entry of RULES. The contract tests (`tests/test_rules.py`) check all its attributes.
 
     Attributes:
-        stiffness: takes the problem, and by name those of `parameters` that are set, and returns the stiffness of each
-            element's links [N/m], shape (n_elements, links).
-        elements: the kinds of element that it is for, keys of ELEMENT_KINDS.
-        idea: how stiffness follows from material and element, in a few words.
-        moduli: effective moduli, on one lattice at least of each kind of element.
-        source: where it is published.
-        shapes: of kinds of element that must have a shape, by kind: "square", "rectangle" or "brick".
-        parameters: keys of Springs that it takes.
-        coupled: whether the force of a spring depends on the lengths of its neighbours too: `stiffness` is then that
-            of a spring whose neighbours keep their length.
+        stiffness: returns the stiffness of each element's links [N/m], shape (n_elements, links), of a problem and the
+            given `parameters` by name.
+        elements: supported kinds of element, keys of ELEMENT_KINDS.
+        idea: how the stiffness is determined, in a few words.
+        moduli: effective moduli, on at least one lattice of each kind of element.
+        source: publication.
+        shapes: required shape, by kind of element: "square", "rectangle" or "brick"; no entry for any shape.
+        parameters: optional parameters, attributes of Springs.
+        coupled: whether the force of a spring depends also on the lengths of other springs of the element; `stiffness`
+            is then that of a spring while the others keep their lengths.
     """
 
     stiffness: Callable[..., Floats]
     elements: tuple[str, ...]
     idea: str
-    moduli: tuple[Realised, ...]
+    moduli: tuple[LatticeModuli, ...]
     source: str
     shapes: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     parameters: tuple[str, ...] = ()
     coupled: bool = False
 
     def takes(self, mesh: Mesh) -> bool:
-        """Return whether it is for all kinds of elements that a mesh has."""
+        """Return whether the rule supports all kinds of elements of a mesh."""
         return all(kind in self.elements for kind in mesh.element_kinds)
 
     @property
     def realises(self) -> str:
-        """Its effective moduli in words, of E and Poisson's ratio."""
+        """Effective moduli in words, in terms of the Young's modulus E of the material."""
         return "; ".join(str(one) for one in self.moduli)
 
 
 @dataclass(frozen=True, slots=True)
 class UserStiffness:
-    """Stiffness of the user's own: of edges, diagonals of faces and diagonals through the body.
+    """User-defined stiffness of edges, face diagonals and body diagonals.
 
-    In units of thickness times Young's modulus; in three dimensions of Young's modulus times the
-    edge of a cube of the element's volume.
+    In units of t E in 2D, thickness times Young's modulus, and of E h in 3D, h the edge of a cube of the same volume as
+    the element.
     """
 
     edge: float
@@ -123,84 +122,89 @@ class UserStiffness:
 
 
 def require_body(problem: Problem) -> tuple[Material, Section]:
-    """Return material and section; raise ModelError where the problem is a plain network."""
+    """Return material and section; raise ModelError if the problem is a plain network."""
     if problem.material is None or problem.section is None or problem.mesh.element == "line":
-        raise ModelError("a model of a body needs a mesh of elements, a material and a section")
+        raise ModelError("a model of a body requires a mesh of elements, a material and a section")
     return problem.material, problem.section
 
 
 def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
-    """Return what a rule of RULES gives to each element's springs [N/m], shape (n_elements, links).
+    """Return the stiffness of each element's links by a rule of RULES [N/m], shape (n_elements, links).
 
-    Of several kinds of elements zero beyond an element's own links.
+    If the mesh has several kinds of elements, rows are padded with zeros.
     """
     check_rule(problem, rule, parameters)
     return by_kind(problem, lambda part: _of_one_kind(part, rule, parameters))
 
 
 def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
+    """Return the stiffness of links [N/m] on a mesh of one kind of elements, shape (n_elements, links)."""
     recipe = partial(RULES[rule].stiffness, **parameters)
     forms = problem.mesh.forms
     if not forms.few:
         return recipe(problem)
     kinds = distinct_rows((forms.of, problem.material_numbers))
-    try:  # of elements that are alike one
+    try:  # one element of each form
         return np.take(recipe(sample(problem, kinds.first)), kinds.of, axis=0)
     except ModelError:
-        return recipe(problem)  # refuses it too, and counts and names the elements of the body
+        return recipe(problem)  # raises the error with the element numbers of the whole body
 
 
 def check_rule(problem: Problem, rule: str, parameters: dict[str, float]) -> None:
-    """Raise ModelError where a rule is not for the problem's elements or does not take the parameters."""
+    """Raise ModelError if a rule does not support the elements of the problem or the parameters."""
     require_body(problem)
     entry = RULES[rule]
     if not entry.takes(problem.mesh):
         allowed = [name for name, other in RULES.items() if other.takes(problem.mesh)]
         raise ModelError(
-            f"rule = '{rule}' is for {', '.join(entry.elements)}; for this mesh of {problem.mesh.kinds} elements "
-            f"there are {', '.join(allowed)}"
+            f"rule = '{rule}' supports {', '.join(entry.elements)}; allowed for this mesh of {problem.mesh.kinds} "
+            f"elements: {', '.join(allowed)}"
         )
     idle = sorted(parameters.keys() - set(entry.parameters))
     if idle:
         owners = [name for name, other in RULES.items() if set(idle) & set(other.parameters)]
-        raise ModelError(f"rule = '{rule}' takes no {', '.join(idle)}; that is for {', '.join(owners)}")
+        raise ModelError(f"rule = '{rule}' has no parameter {', '.join(idle)}: use it with {', '.join(owners)}")
     if "k_body" in parameters and not any(part.kind.body_diagonals for _, part in problem.mesh.blocks):
-        raise ModelError("k_body is for cubes: there are no diagonals through the body of a plane element")
+        raise ModelError("k_body requires bricks: plane elements have no body diagonals")
 
 
 def user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
-    """Return stiffness of the user's own for each element's springs [N/m], shape (n_elements, links).
+    """Return the user-defined stiffness of each element's links [N/m], shape (n_elements, links).
 
-    Of several kinds of elements zero beyond an element's own links.
+    If the mesh has several kinds of elements, rows are padded with zeros.
     """
     require_body(problem)
     kinds = [part.kind for _, part in problem.mesh.blocks]
     there = {"diagonal": any(kind.diagonals for kind in kinds), "body": any(kind.body_diagonals for kind in kinds)}
     for name, value in (("diagonal", own.diagonal), ("body", own.body)):
         if value and not there[name]:
-            raise ModelError(f"stiffness: {name} = {value:g}, but a {problem.mesh.kinds} has no such diagonals")
-    return by_kind(problem, lambda part: _given(part, own))
+            raise ModelError(
+                f"stiffness: {name} = {value:g}, but a {problem.mesh.kinds} has no such diagonals; leave it out"
+            )
+    return by_kind(problem, lambda part: _user_stiffness(part, own))
 
 
-def _given(problem: Problem, own: UserStiffness) -> Floats:
+def _user_stiffness(problem: Problem, own: UserStiffness) -> Floats:
+    """Return the user-defined stiffness on a mesh of one kind of elements [N/m], shape (n_elements, links)."""
     kind = problem.mesh.kind
     values = [own.edge] * len(kind.edges) + [own.diagonal] * len(kind.diagonals) + [own.body] * len(kind.body_diagonals)
     return np.asarray(_scale(problem)[:, None] * np.array(values))
 
 
 def _scale(problem: Problem) -> Floats:
-    """The unit of stiffness [N/m], shape (n_elements,): E t in the plane, E h in 3D, h^3 the element's volume."""
+    """Return the unit of stiffness of each element [N/m], shape (n_elements,): E t in 2D, E h in 3D, h^3 its volume."""
     _, section = require_body(problem)
     size = problem.mesh.measures ** (1 / 3) if problem.mesh.dim == 3 else section.thickness
     return np.asarray(problem.of_elements(lambda material: material.young) * size)
 
 
 def _classes(problem: Problem, edge: float, diagonal: float = 0.0, body: float = 0.0) -> Floats:
+    """Return stiffness by class of link times `_scale` [N/m], shape (n_elements, links)."""
     return user_stiffness(problem, UserStiffness(edge, diagonal, body))
 
 
 def _bricks(problem: Problem, rule: str) -> Floats:
-    """Side lengths of each rectangle or brick [m], shape (n_elements, dim); raise ModelError where one is none."""
+    """Return the sides of rectangles or bricks [m], shape (n_elements, dim); raise ModelError for other shapes."""
     mesh = problem.mesh
     lengths, off = np.empty((len(mesh.elements), mesh.dim)), np.empty(len(mesh.elements))
     for part in slices(len(off), 32 * mesh.kind.n_nodes * mesh.dim):
@@ -215,18 +219,19 @@ def _bricks(problem: Problem, rule: str) -> Floats:
     wrong = np.flatnonzero(off > 1e-6)
     if wrong.size:
         raise ModelError(
-            f"rule = '{rule}' is made for {'rectangles' if mesh.dim == 2 else 'bricks'}, {wrong.size} elements are "
-            f"none, the first is element {wrong[0]}; allowed here: {', '.join(_of_any_shape(mesh))}"
+            f"rule = '{rule}' requires {'rectangles' if mesh.dim == 2 else 'bricks'}; {wrong.size} elements have other "
+            f"shapes, the first is element {wrong[0]}; allowed for any shape: {', '.join(_of_any_shape(mesh))}"
         )
     return lengths
 
 
 def _of_any_shape(mesh: Mesh) -> list[str]:
-    """The rules that take the elements of a mesh whatever their shape."""
+    """Return the rules that support the elements of a mesh in any shape."""
     return [name for name, rule in RULES.items() if rule.takes(mesh) and not rule.shapes.keys() & mesh.element_kinds]
 
 
 def _of_rectangles() -> list[str]:
+    """Return the rules that support rectangles."""
     return [
         name
         for name, rule in RULES.items()
@@ -235,12 +240,12 @@ def _of_rectangles() -> list[str]:
 
 
 def lloyd(problem: Problem) -> Floats:
-    """Squares: edges 5/16, diagonals 7/16 of t E. Triangles: sqrt(3)/4 t E. Tetrahedra: 2 sqrt(2)/25 E l.
+    """Return the stiffness [N/m], shape (n_elements, links), by the rule `lloyd`.
 
-    l = (12 V / sqrt(2))^(1/3) is the edge of a regular tetrahedron of the element's volume V. Squares:
-    Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders (2007). Tetrahedra: the
-    same paper as the bond style tetmsm of LAMMPS gives it, exact fit of a regular one at Poisson's
-    ratio 1/4. Triangles: the exact stiffness of an equilateral one at 1/3.
+    Squares: edges 5/16 t E, diagonals 7/16 t E (Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely,
+    Harders 2007). Triangles: sqrt(3)/4 t E, exact for an equilateral triangle at Poisson's ratio 1/3. Tetrahedra:
+    2 sqrt(2)/25 E l with l = (12 V / sqrt(2))^(1/3), the edge of a regular tetrahedron of the same volume V (Lloyd et
+    al. 2007, as implemented by the bond style tetmsm of LAMMPS), exact for a regular one at Poisson's ratio 1/4.
     """
     element = problem.mesh.element
     if element == "triangle":
@@ -252,24 +257,24 @@ def lloyd(problem: Problem) -> Floats:
     if unequal.max() > 1e-6:
         worst = sides[int(unequal.argmax())]
         raise ModelError(
-            f"rule = 'lloyd' is made for squares, the elements measure {worst[0]:g} m by {worst[1]:g} m: "
-            f"choose size and elements so that they are squares, or a rule among {', '.join(_of_rectangles())}"
+            f"rule = 'lloyd' requires squares, but an element has {worst[0]:g} m by {worst[1]:g} m: change size or "
+            f"elements, or use one of the rules {', '.join(_of_rectangles())}"
         )
     return _classes(problem, 5 / 16, 7 / 16)
 
 
 def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
-    """Springs whose lattice is isotropic with the material's E; Poisson's ratio 1/3 in plane stress, 1/4 in 3D.
+    """Return the stiffness [N/m], shape (n_elements, links), of an isotropic lattice with the E of the material.
 
-    Squares: 3/8 on edges and diagonals (Brisard, "What is homogenization?", part 4; the only such pair).
-    Cubes, per E h: edges 1/10 + k_body/3, diagonals of faces 1/5 - 2 k_body/3, through the body k_body,
-    which is free (the family of Golec et al. 2020). Rectangles and bricks: likewise what makes
-    C_iijj = sum k (d_i d_j)^2 / L^2 / V isotropic, d the vector along a spring of length L: first the
-    diagonals of each face, from C_iijj, then the edges, from C_iiii. On rectangles it is the member for
-    Poisson's ratio 1/3 of Baudet et al. (2009); an edge turns negative beyond an aspect of sqrt(3).
+    Its Poisson's ratio is 1/3 in plane stress and 1/4 in 3D. Squares: 3/8 t E on edges and diagonals (Brisard, "What is
+    homogenization?", part 4; the only such pair). Cubes, in E h: edges 1/10 + k_body/3, face diagonals
+    1/5 - 2 k_body/3, body diagonals k_body, a free parameter (the family of Golec et al. 2020). Rectangles and bricks:
+    the stiffness for which C_iijj = sum k (d_i d_j)^2 / L^2 / V is isotropic, d the vector along a spring of length L:
+    the diagonals of each face follow from C_iijj, then the edges from C_iiii. On rectangles this is the member for
+    Poisson's ratio 1/3 of the family of Baudet et al. (2009); an edge is negative at aspect ratios above sqrt(3).
     """
     if not 0 <= k_body <= _LARGEST_K_BODY:
-        raise ModelError(f"k_body = {k_body:g}: allowed are 0 to {_LARGEST_K_BODY:g}, in E h")
+        raise ModelError(f"k_body = {k_body:g}: allowed are values from 0 to {_LARGEST_K_BODY:g}, in E h")
     kind, dim = problem.mesh.kind, problem.mesh.dim
     sides = _bricks(problem, "isotropic")
     links = np.array(kind.links)
@@ -281,7 +286,7 @@ def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
     stiffness = np.where(along.sum(axis=1) == 3, k_body * (young * size ** (1 / 3))[:, None], 0.0)
 
     def share(i: int, j: int) -> Floats:
-        """What a unit of stiffness of each link adds to C_iijj V."""
+        """Return the contribution of each link of unit stiffness to C_iijj V [m^2], shape (n_elements, links)."""
         return np.asarray(squares[:, :, i] * squares[:, :, j] / squares.sum(axis=2))
 
     pairs = [(i, j) for i in range(dim) for j in range(i)] + [(i, i) for i in range(dim)]
@@ -293,10 +298,10 @@ def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
 
 
 def projected(problem: Problem) -> Floats:
-    """k = -n . K_ij n with the blocks K_ij of the element's own linear FEM matrix.
+    """Return k = -n . K_ij n [N/m], shape (n_elements, links), with the blocks K_ij of the linear FEM element matrix.
 
-    The least-squares fit of the off-diagonal blocks alone. On squares in plane stress at Poisson's
-    ratio 1/3 it gives Lloyd's 5/16 and 7/16; on triangles at 1/3 Van Gelder's (1998) longer formula.
+    This is the least-squares fit of the off-diagonal blocks. At Poisson's ratio 1/3 it gives Lloyd's 5/16 and 7/16 on
+    squares in plane stress, and the longer formula of Van Gelder (1998) on triangles.
     """
     links = np.array(problem.mesh.kind.links)
 
@@ -308,12 +313,12 @@ def projected(problem: Problem) -> Floats:
 
 
 def least_squares(problem: Problem) -> Floats:
-    """The springs whose element matrix is nearest to the FEM one, all entries counted alike (Frobenius).
+    """Return the stiffness [N/m], shape (n_elements, links), whose element matrix is nearest to that of linear FEM.
 
-    A spring's matrix is b b^T with b = (-n, n) on its ends; the normal equations are
-    sum_t (b_s . b_t)^2 k_t = b_s . K b_s. Squares in plane stress, Poisson's ratio nu:
-    (6 - nu) / (21 (1 - nu^2)) on edges, (15 + nu) / (42 (1 - nu^2)) on diagonals; cubes at 1/4, per E h:
-    29/350, 188/1575 and 41/525.
+    The distance is the Frobenius norm of the difference.
+    The matrix of a spring of unit stiffness is b b^T with b = (-n, n) at its ends; the normal equations are
+    sum_t (b_s . b_t)^2 k_t = b_s . K b_s. Squares in plane stress, in t E: (6 - nu) / (21 (1 - nu^2)) on edges,
+    (15 + nu) / (42 (1 - nu^2)) on diagonals; cubes at nu = 1/4, in E h: 29/350, 188/1575 and 41/525.
     """
     links = np.array(problem.mesh.kind.links)
     every = np.arange(len(links))
@@ -329,9 +334,9 @@ def least_squares(problem: Problem) -> Floats:
 
 
 def van_gelder(problem: Problem) -> Floats:
-    """Triangles: k = E t A / L^2, tetrahedra: k = E V / L^2, with the element's area A or volume V.
+    """Return E t A / L^2 of triangles, E V / L^2 of tetrahedra [N/m], shape (n_elements, links); A area, V volume.
 
-    Van Gelder, Journal of Graphics Tools 3 (1998), the simple formula. Exact on equilateral triangles.
+    The simple formula of Van Gelder, Journal of Graphics Tools 3 (1998). Exact on equilateral triangles.
     """
     _, section = require_body(problem)
     young = problem.of_elements(lambda material: material.young)
@@ -340,20 +345,20 @@ def van_gelder(problem: Problem) -> Floats:
 
 
 def biquadratic(problem: Problem) -> Floats:
-    """k = 8 L^2 M_ss of the coupled springs W = q . M q, q = l^2 - L^2, which are exact St. Venant-Kirchhoff FEM.
+    """Return k = 8 L^2 M_ss [N/m], shape (n_elements, links), of the coupled springs W = q . M q, q = l^2 - L^2.
 
-    Delingette (2008) on triangles, Goulette and Chen (2015) on tetrahedra; on the others the same between all pairs
-    of nodes. See `link_coupling`.
+    They equal St. Venant-Kirchhoff finite elements: Delingette (2008) on triangles, Goulette and Chen (2015) on
+    tetrahedra, the same formula between all pairs of nodes of other elements. See `link_coupling`.
     """
     length_squared = (link_vectors(problem.mesh) ** 2).sum(axis=2)
     return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(problem)))
 
 
 def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats:
-    """What `fit` makes of elements, slice by slice [N/m], shape (n_elements, links).
+    """Return the stiffness that `fit` gives for all elements, slice by slice [N/m], shape (n_elements, links).
 
-    From the unit vectors of their links, shape (n, links, dim), and their linear FEM matrices as blocks [N/m],
-    shape (n, nodes, dim, nodes, dim).
+    The arguments of `fit` are the unit vectors of the links, shape (n, links, dim), and the linear FEM matrices in
+    blocks [N/m], shape (n, nodes, dim, nodes, dim).
     """
     mesh, potential = problem.mesh, fem_of_one_kind(problem, "linear")
     shape = (mesh.kind.n_nodes, mesh.dim)
@@ -374,11 +379,11 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
         "lloyd": Rule(
             lloyd,
             ("triangle", "quadrilateral", "tetrahedron"),
-            "the same multiple of E for all elements of a kind",
+            "a constant multiple of E for each kind of element",
             (
-                Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17)),
-                Realised("equilateral triangles", poisson=_THIRD),
-                Realised("body-centred-cubic tetrahedra", (127 / 126, 127 / 126), _QUARTER),
+                LatticeModuli("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17)),
+                LatticeModuli("equilateral triangles", poisson=_THIRD),
+                LatticeModuli("body-centred-cubic tetrahedra", (127 / 126, 127 / 126), _QUARTER),
             ),
             "Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders 2007",
             shapes=MappingProxyType({"quadrilateral": "square"}),
@@ -386,8 +391,8 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
         "isotropic": Rule(
             isotropic,
             ("quadrilateral", "hexahedron"),
-            "the springs whose lattice is isotropic",
-            (Realised("rectangles", poisson=_THIRD), Realised("bricks", poisson=_QUARTER)),
+            "an isotropic lattice",
+            (LatticeModuli("rectangles", poisson=_THIRD), LatticeModuli("bricks", poisson=_QUARTER)),
             "Brisard, What is homogenization? part 4; Baudet et al. 2009; Golec et al. 2020",
             shapes=MappingProxyType({"quadrilateral": "rectangle", "hexahedron": "brick"}),
             parameters=("k_body",),
@@ -395,28 +400,28 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
         "least-squares": Rule(
             least_squares,
             _ALL,
-            "the springs nearest to the element's FEM matrix, all entries",
+            "least-squares fit to all entries of the FEM element matrix",
             (
-                Realised("squares", (340 / 399, 460 / 441), (17 / 63, 23 / 57), at=1 / 3),
-                Realised("equilateral triangles", poisson=_THIRD, at=1 / 3),
-                Realised("cubes", (0.7258, 0.8469), (0.2351, 0.2730), at=1 / 4),
-                Realised("body-centred-cubic tetrahedra", (0.6337, 1.1715), (0.1982, 0.3367), at=1 / 4),
-                Realised("wedges", (0.2433, 1.0396), (0.1108, 0.5308), at=1 / 4),
-                Realised("pyramids", (0.3987, 1.1040), (0.1749, 0.3826), at=1 / 4),
+                LatticeModuli("squares", (340 / 399, 460 / 441), (17 / 63, 23 / 57), at=1 / 3),
+                LatticeModuli("equilateral triangles", poisson=_THIRD, at=1 / 3),
+                LatticeModuli("cubes", (0.7258, 0.8469), (0.2351, 0.2730), at=1 / 4),
+                LatticeModuli("body-centred-cubic tetrahedra", (0.6337, 1.1715), (0.1982, 0.3367), at=1 / 4),
+                LatticeModuli("wedges", (0.2433, 1.0396), (0.1108, 0.5308), at=1 / 4),
+                LatticeModuli("pyramids", (0.3987, 1.1040), (0.1749, 0.3826), at=1 / 4),
             ),
             "the norm of Lloyd et al. 2007 for tetrahedra, applied to every element",
         ),
         "projected": Rule(
             projected,
             _ALL,
-            "the springs nearest to the off-diagonal blocks of the element's FEM matrix",
+            "least-squares fit to the off-diagonal blocks of the FEM element matrix",
             (
-                Realised("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17), at=1 / 3),
-                Realised("equilateral triangles", poisson=_THIRD, at=1 / 3),
-                Realised("cubes", (0.8325, 1.1057), (0.2236, 0.2919), at=1 / 4),
-                Realised("body-centred-cubic tetrahedra", (12 / 17, 33 / 28), (23 / 112, 11 / 34), at=1 / 4),
-                Realised("wedges", (0.3202, 1.2490), (0.1151, 0.5515), at=1 / 4),
-                Realised("pyramids", (3 / 5, 21 / 17), (13 / 68, 7 / 20), at=1 / 4),
+                LatticeModuli("squares", (15 / 17, 21 / 19), (5 / 19, 7 / 17), at=1 / 3),
+                LatticeModuli("equilateral triangles", poisson=_THIRD, at=1 / 3),
+                LatticeModuli("cubes", (0.8325, 1.1057), (0.2236, 0.2919), at=1 / 4),
+                LatticeModuli("body-centred-cubic tetrahedra", (12 / 17, 33 / 28), (23 / 112, 11 / 34), at=1 / 4),
+                LatticeModuli("wedges", (0.3202, 1.2490), (0.1151, 0.5515), at=1 / 4),
+                LatticeModuli("pyramids", (3 / 5, 21 / 17), (13 / 68, 7 / 20), at=1 / 4),
             ),
             "after Lloyd et al. 2007; the longer formula of Van Gelder 1998 on triangles",
         ),
@@ -425,16 +430,16 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             ("triangle", "tetrahedron"),
             "E area / length^2 and E volume / length^2",
             (
-                Realised("equilateral triangles", poisson=_THIRD),
-                Realised("body-centred-cubic tetrahedra", (6 / 7, 12 / 11), (5 / 22, 2 / 7)),
+                LatticeModuli("equilateral triangles", poisson=_THIRD),
+                LatticeModuli("body-centred-cubic tetrahedra", (6 / 7, 12 / 11), (5 / 22, 2 / 7)),
             ),
             "Van Gelder, Journal of Graphics Tools 3, 1998",
         ),
         "biquadratic": Rule(
             biquadratic,
             _ALL,
-            "springs in squared lengths, coupled within an element: St. Venant-Kirchhoff finite elements",
-            (Realised(ANY_MESH),),
+            "springs in squared lengths, coupled within an element: equal to St. Venant-Kirchhoff finite elements",
+            (LatticeModuli(ANY_MESH),),
             "Delingette 2008 (triangles), Goulette and Chen 2015 (tetrahedra)",
             coupled=True,
         ),

@@ -1,4 +1,4 @@
-"""Springs: a body idealised as nodes joined by springs."""
+"""The mass-spring model of a body."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,23 +23,23 @@ from truespring.models.volume import VolumeTerm
 from truespring.models.volume_springs import VolumeSprings
 from truespring.problem import Problem
 
-# A lattice whose elasticity is within this share of an isotropic one takes a volume term.
+# Largest relative deviation of a lattice from isotropy for which a volume term is allowed.
 _ISOTROPIC = 1e-6
 
 
 @dataclass(frozen=True)
 class Springs(Model):
-    """The mass-spring model: the edges and diagonals of every element carry springs.
+    """The mass-spring model: springs on the edges and diagonals of every element.
 
     Attributes:
-        rule: how stiffness follows from the material, a key of RULES.
-        stiffness: numbers of the user's own instead of a rule.
-        sharing: "summed" adds the springs of elements that share a pair of nodes,
-            "single" takes one spring a pair (their mean).
-        allow_negative: accept springs of negative stiffness, which some rules give on some meshes.
-        volume: add the area or volume term with which an isotropic lattice realises the material's
-            Young's modulus and Poisson's ratio, from 0 on; the springs are rescaled for it.
-        k_body: stiffness of each diagonal through the body of a cube, in E h, for the rule isotropic.
+        rule: the stiffness rule, a key of RULES.
+        stiffness: user-defined stiffness, instead of a rule.
+        sharing: stiffness of a spring that several elements share: "summed" is the sum over the elements, "single" the
+            mean.
+        allow_negative: allow springs with negative stiffness, which some rules give on some meshes.
+        volume: add the area or volume term that gives an isotropic lattice the Young's modulus and the Poisson's ratio
+            of the material, from 0 to 0.5; the springs are rescaled.
+        k_body: stiffness of each body diagonal of a cube in E h, for the rule isotropic.
     """
 
     rule: str | None = None
@@ -51,7 +51,7 @@ class Springs(Model):
 
     def __post_init__(self) -> None:
         if (self.rule is None) == (self.stiffness is None):
-            raise ModelError(f"springs take either a rule ({', '.join(RULES)}) or a stiffness of your own")
+            raise ModelError(f"springs: give either a rule ({', '.join(RULES)}) or stiffness")
         if self.stiffness is not None and not isinstance(self.stiffness, UserStiffness):
             raise ModelError(f"stiffness = {self.stiffness!r}: give UserStiffness(edge=..., diagonal=...)")
         if self.rule is not None and self.rule not in RULES:
@@ -61,24 +61,26 @@ class Springs(Model):
         if self.k_body is not None and not np.isfinite(self.k_body):
             raise ModelError(f"k_body = {self.k_body}: must be finite")
         if self.k_body is not None and self.rule is None:
-            raise ModelError("k_body is for the rule isotropic; of your own stiffness `body` is that of the diagonals")
+            raise ModelError("k_body requires the rule isotropic; with stiffness, use its key body")
         if self.sharing == "single" and (self.volume or self.coupled):
             what = "volume = true" if self.volume else f"rule = '{self.rule}'"
-            raise ModelError(f"{what} takes every element's springs: sharing = 'single' does not go with it")
+            raise ModelError(f"{what} requires sharing = 'summed', not sharing = 'single'")
         if self.volume and self.coupled:
-            raise ModelError(f"rule = '{self.rule}' realises any Poisson's ratio by itself: leave volume out")
+            raise ModelError(
+                f"rule = '{self.rule}' has the Poisson's ratio of the material without a volume term: remove volume"
+            )
 
     kind = "springs"
     has_springs = True
 
     @property
     def coupled(self) -> bool:
-        """Whether the springs of an element answer to each other's lengths: see BiquadraticSprings."""
+        """Whether the springs of an element are coupled, see BiquadraticSprings."""
         return self.rule is not None and RULES[self.rule].coupled
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model."""
+        """Name in figures and tables."""
         words = [self.rule or "own stiffness"]
         words += [f"k_body {self.k_body:g}"] if self.k_body is not None else []
         words += ["single"] if self.sharing == "single" else []
@@ -86,65 +88,64 @@ class Springs(Model):
         return f"springs ({', '.join(words)})"
 
     def element_stiffness(self, problem: Problem) -> Floats:
-        """Stiffness of each element's own springs [N/m], shape (n_elements, links of the kind).
+        """Return the stiffness of each element's links [N/m], shape (n_elements, links).
 
-        Of several kinds of elements as many as the kind with most has, zero beyond an element's own.
+        If the mesh has several kinds of elements, rows are padded with zeros.
         """
-        given = self._given_stiffness(problem)
+        unscaled = self._unscaled_stiffness(problem)
         if not self.volume:
-            return given
+            return unscaled
         scale = {material: self._correction(problem, material)[0] for material in problem.materials}
-        return given * problem.of_elements(lambda material: scale[material])[:, None]
+        return unscaled * problem.of_elements(lambda material: scale[material])[:, None]
 
-    def _given_stiffness(self, problem: Problem) -> Floats:
-        """What the rule or the user gives, before a volume term rescales it."""
+    def _unscaled_stiffness(self, problem: Problem) -> Floats:
+        """Return the stiffness of links [N/m], shape (n_elements, links), before scaling for a volume term."""
         if self.stiffness is not None:
             return user_stiffness(problem, self.stiffness)
         return rule_stiffness(problem, str(self.rule), self._parameters)
 
     @property
     def _parameters(self) -> dict[str, float]:
-        """What was given of the rule's parameters."""
+        """Parameters of the rule that are set, by name."""
         return {} if self.k_body is None else {"k_body": self.k_body}
 
     def kappa(self, problem: Problem) -> Floats:
-        """Modulus of the area or volume term of each element [Pa], shape (n_elements,); zero without one."""
+        """Return the modulus of the area or volume term of each element [Pa], shape (n_elements,); zero without one."""
         if not self.volume:
             return np.zeros(len(problem.mesh.elements))
         kappas = {material: self._correction(problem, material)[1] for material in problem.materials}
         return problem.of_elements(lambda material: kappas[material])
 
     def _correction(self, problem: Problem, material: Material) -> tuple[float, float]:
-        """What scales the springs, and the modulus of the volume term [Pa], on a body of one material.
+        """Return the scale factor of the springs [-] and the modulus of the volume term [Pa] for one material.
 
-        Springs alone have lam = mu (Cauchy). Scaled to the material's mu, they leave lam - mu to the
-        term. Scaled to E instead, as is sometimes seen, they leave mu wrong.
+        Springs have lam = mu (Cauchy's relation). Scaled to the mu of the material, the term adds kappa = lam - mu
+        (Golec et al. 2020). Scaling the springs to E instead gives a wrong mu.
         """
         _, section = require_body(problem)
         if material.poisson < 0:
             raise ModelError(
-                f"volume = true: poisson = {material.poisson:g} is below 0; a volume term realises 0 to 0.5, "
-                "the rule biquadratic any"
+                f"volume = true: poisson = {material.poisson:g} must be from 0 to 0.5; the rule biquadratic allows any"
             )
         alone = dict(zip(problem.materials, problem.homogeneous, strict=True))[material]
         classes = lattice_classes(problem.mesh)
-        found = lattice_elasticity(alone, self._given_stiffness(alone), classes)
+        found = lattice_elasticity(alone, self._unscaled_stiffness(alone), classes)
         mu = float(found[-1, -1])
         if classes is None or np.abs(found - hooke(mu, mu, problem.mesh.dim)).max() > _ISOTROPIC * abs(mu):
-            this = "none" if classes is None else "anisotropic"
+            this = "irregular" if classes is None else "anisotropic"
             other = {
                 "triangle": "rule lloyd on equilateral triangles",
-                "tetrahedron": "rule lloyd on body-centred-cubic tetrahedra, three cells deep or more",
+                "tetrahedron": "rule lloyd on body-centred-cubic tetrahedra, at least three cells deep",
             }.get(problem.mesh.element, "rule isotropic")
             raise ModelError(
-                f"volume = true is for isotropic lattices, this one is {this}: take the {other}, "
-                "or the rule biquadratic, which realises any Poisson's ratio on any mesh"
+                f"volume = true requires isotropic lattices, this mesh is {this}: use the {other}, or the rule "
+                "biquadratic, which has the Poisson's ratio of the material on any mesh"
             )
-        wanted = section.lame_within(material)
-        return wanted.mu / mu, wanted.lam - wanted.mu
+        exact = section.lame_within(material)
+        return exact.mu / mu, exact.lam - exact.mu
 
     def potential(self, problem: Problem) -> SpringNetwork | LinkedElements | SummedLinks | VolumeSprings:
-        """Return the springs on the problem's mesh; raise ModelError for a negative one unless allowed."""
+        """Return the potential of the springs; raise ModelError if one has a negative stiffness, unless allowed."""
         if self.coupled:
             check_rule(problem, str(self.rule), self._parameters)
             return summed_links(problem, BiquadraticSprings)
@@ -152,52 +153,51 @@ class Springs(Model):
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 
     def check(self, problem: Problem) -> None:
-        """Raise ModelError where the springs do not fit the problem, or do not resist every strain."""
+        """Raise ModelError if the springs do not fit the problem, or do not resist every strain."""
         self.potential(problem)
         self.moduli(problem.homogeneous[0])
 
     def moduli(self, problem: Problem) -> Moduli:
-        """Return the effective moduli on the problem's mesh, all of it of its own material."""
+        """Return the effective moduli on the mesh of the problem, all of it of the material of the problem."""
         return moduli(problem, self)
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known of the springs: moduli other than the material's, springs that lock."""
+        """Return warnings: effective moduli that differ from those of the material, locking."""
         return springs_warnings(problem, self)
 
     def allowing_negative(self) -> "Springs":
-        """Return the same springs, those of negative stiffness allowed."""
+        """Return a copy that allows negative stiffness."""
         return replace(self, allow_negative=True)
 
     def network(self, problem: Problem, per_element: Floats) -> SpringNetwork:
-        """Return the springs of the given stiffness of each element's links [N/m], shape (n_elements, links)."""
+        """Return springs from the stiffness of each element's links [N/m], shape (n_elements, links)."""
         mesh = problem.mesh
         springs, place = shared_springs(mesh)
         stiffness = np.bincount(place, in_a_row(mesh, per_element)).astype(np.float64)
         if self.sharing == "single":
             stiffness = stiffness / np.bincount(place)
-        # Rules whose sum is zero on some links leave rounding there, which is no negative spring.
+        # Where contributions of a rule cancel, only rounding is left: not a negative spring.
         stiffness[np.abs(stiffness) <= 1e-12 * np.abs(stiffness).max()] = 0.0
         negative = np.flatnonzero(stiffness < 0)
         if negative.size and not self.allow_negative:
             middle = mesh.nodes[springs[negative[0]]].mean(axis=0)
             raise ModelError(
-                f"{negative.size} of {len(springs)} springs have a negative stiffness, "
-                f"the first {stiffness[negative[0]]:g} "
-                f"N/m at {middle.tolist()} m: take elements nearer to squares, cubes or regular simplices, "
-                "another rule, or allow_negative = true"
+                f"{negative.size} of {len(springs)} springs have a negative stiffness, the first "
+                f"{stiffness[negative[0]]:g} N/m at {middle.tolist()} m: use elements closer to squares, cubes or "
+                "regular simplices, another rule, or allow_negative = true"
             )
         return SpringNetwork(mesh.nodes, springs, stiffness)
 
 
 def springs_by_rule(models: Mapping[str, object]) -> dict[str, Springs]:
-    """Return those of several models that are springs by a rule or of the user's numbers, by name."""
+    """Return the models that are springs by a rule or by user-defined stiffness, by name."""
     return {name: model for name, model in models.items() if isinstance(model, Springs)}
 
 
 def shared_springs(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Return the pairs of nodes that links join, each once, and the number of the pair of each element's each link.
+    """Return the springs of a mesh, and the number of the spring of each link.
 
-    Shapes (n_springs, 2) and (n_elements * links,), of several kinds of elements kind after kind.
+    Shapes (n_springs, 2), node numbers, each pair once, and (n_elements * links,), kind by kind of element.
     """
     from truespring.kernels.sparsity import unique_pairs
     from truespring.kernels.threads import writable

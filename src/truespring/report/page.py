@@ -315,7 +315,7 @@ def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
         extremes = ("smallest of all directions", "largest of all directions")
         youngs += zip(extremes, moduli.young_range, strict=True)
         poissons += zip(extremes, moduli.poisson_range, strict=True)
-    young, poisson = quantity(moduli.young_wanted, "Pa"), f"{moduli.poisson_wanted:.3f}"
+    young, poisson = quantity(moduli.material_young, "Pa"), f"{moduli.material_poisson:.3f}"
     ratio = "Zener ratio (1 is isotropic)" if plane else "largest over smallest Young’s modulus"
     return [
         *((f"Young’s modulus {where}", quantity(value, "Pa"), young) for where, value in youngs),

@@ -67,8 +67,8 @@ def moduli_values(moduli: Moduli) -> dict[str, Any]:
         "young_max": moduli.young_range[1],
         "poisson_min": moduli.poisson_range[0],
         "poisson_max": moduli.poisson_range[1],
-        "young_wanted": moduli.young_wanted,
-        "poisson_wanted": moduli.poisson_wanted,
+        "young_wanted": moduli.material_young,
+        "poisson_wanted": moduli.material_poisson,
         "directions": [
             {"along": list(along), "young": moduli.young(along), "poisson": moduli.poisson(along)}
             for along in (_PLANE if plane else _SPACE)

@@ -19,7 +19,7 @@ def moduli_line(title: str, moduli: Moduli) -> str:
     scale = natural_scale(high, "Pa")
     young = _span(f"{low / scale.size:.4g}", f"{high / scale.size:.4g}")
     poisson = _span(f"{least:.3f}", f"{most:.3f}")
-    material = f"material {moduli.young_wanted / scale.size:.4g} {scale.unit}, {moduli.poisson_wanted:.3f}"
+    material = f"material {moduli.material_young / scale.size:.4g} {scale.unit}, {moduli.material_poisson:.3f}"
     return f"{title}: Young's modulus {young} {scale.unit}, Poisson's ratio {poisson} ({material})"
 
 
@@ -37,7 +37,7 @@ def moduli_table(title: str, moduli: Moduli) -> "Table":
     def add(what: str, found: str, wanted: str = "") -> None:
         table.add_row(what, found, *[wanted] * (1 + len(elements)))
 
-    young, poisson = f"{moduli.young_wanted:.6g}", f"{moduli.poisson_wanted:.4f}"
+    young, poisson = f"{moduli.material_young:.6g}", f"{moduli.material_poisson:.4f}"
     directions = _PLANE if plane else _SPACE
     for name, along in directions.items():
         add(f"Young's modulus {name} [Pa]", f"{moduli.young(along):.6g}", young)

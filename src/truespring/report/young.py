@@ -65,7 +65,7 @@ def _polar(several: Sequence[Known], material: str) -> Sheet:
     """The springs' curves against the material's circle."""
     from matplotlib.lines import Line2D
 
-    wanted = several[0].moduli.young_wanted
+    wanted = several[0].moduli.material_young
     angles = np.radians(np.arange(0.0, 361.0))
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     largest = max(wanted, *(known.moduli.young_range[1] for known in several))
@@ -118,7 +118,7 @@ def _surfaces(several: Sequence[Known], material: str) -> Sheet:
     height = _TOP + rows * (_PANEL + _CAPTION) + _FOOT
     sheet = Sheet(width, height, _TITLE)
     draw_words(sheet, width / 2, height - 0.19, _TITLE, 9, bold=True, align=0.5)
-    shares = np.array([known.moduli.young_range for known in several]) / several[0].moduli.young_wanted
+    shares = np.array([known.moduli.young_range for known in several]) / several[0].moduli.material_young
     facets = [_facets(known.moduli) for known in several]
     extent = max(1.0, *(float(np.abs(corners[..., :2]).max()) for corners, _ in facets))
     farthest = max(1.1, float(np.exp(np.abs(np.log(shares)).max())))
@@ -139,7 +139,7 @@ def _surfaces(several: Sequence[Known], material: str) -> Sheet:
     marks = np.array(_marks(farthest))
     shown = colors(np.linspace(0, 1, 256))[:, :3]
     draw_bar(sheet, width / 2 - 1.2, 0.49, 2.4, shown, np.asarray(norm(marks)), [f"{mark:g}" for mark in marks])
-    wanted = quantity(several[0].moduli.young_wanted, "Pa")
+    wanted = quantity(several[0].moduli.material_young, "Pa")
     under = f"times that of the {material}, {wanted} (the sphere)"
     draw_words(sheet, width / 2, 0.11, under, 7.5, align=0.5)
     return sheet
@@ -189,7 +189,7 @@ def _draw_axes(area: Area, moduli: Moduli, extent: float) -> None:
 
 
 def _share(moduli: Moduli, directions: Floats) -> Floats:
-    return moduli.young_along(directions) / moduli.young_wanted
+    return moduli.young_along(directions) / moduli.material_young
 
 
 def _facets(moduli: Moduli) -> tuple[Floats, Floats]:
@@ -232,7 +232,7 @@ def _visible_pieces(line: Floats, moduli: Moduli) -> list[Floats]:
 
 def _visible(points: Floats, moduli: Moduli) -> Bools:
     """Whether the eye sees points on or outside the sphere: on this side of it, and not behind the surface."""
-    far = 1 + moduli.young_range[1] / moduli.young_wanted
+    far = 1 + moduli.young_range[1] / moduli.material_young
     ray = points[:, None] + np.linspace(0, far, 100)[:, None] * VIEW[2]
     distance = np.linalg.norm(ray, axis=2)
     share = _share(moduli, (ray / distance[..., None]).reshape(-1, 3)).reshape(distance.shape)
