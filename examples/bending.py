@@ -1,4 +1,4 @@
-"""examples/bending.toml in Python: a soft cantilever bent by half its length, springs beside FEM."""
+"""The study bending.toml in Python: a soft cantilever bent by half its length, springs compared with FEM."""
 
 import truespring as ts
 

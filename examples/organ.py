@@ -1,4 +1,4 @@
-"""The study of organ.toml in Python: a liver from a label image, held at one end and grasped at the other."""
+"""The study organ.toml in Python: a liver from a label image, held at one end and grasped at the other."""
 
 import truespring as ts
 

@@ -1,4 +1,4 @@
-"""The study of soft_block.toml in Python: a nearly incompressible block, springs with a volume term beside FEM."""
+"""The study soft_block.toml in Python: a nearly incompressible block, springs with a volume term compared with FEM."""
 
 import truespring as ts
 

@@ -1,4 +1,4 @@
-"""examples/stretching.toml in Python: a soft body pulled to a nominal stress of 0.30 E, springs beside FEM."""
+"""The study stretching.toml in Python: a soft body under a nominal stress of 0.30 E, springs compared with FEM."""
 
 import truespring as ts
 

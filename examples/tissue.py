@@ -1,4 +1,4 @@
-"""The study of tissue.toml in Python: a mesh from a file, biquadratic springs beside FEM."""
+"""The study tissue.toml in Python: a mesh from a file, biquadratic springs compared with FEM."""
 
 from pathlib import Path
 

@@ -223,7 +223,7 @@ def test_springs_in_a_file_are_checked(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="leave rule out"):
         read_study(written(tmp_path, STUDY.replace('rule = "lloyd"', 'rule = "lloyd"\nstiffness = { file = "k.csv" }')))
     zeros = [",".join([*row.split(",")[:2], "0"]) for row in rows]
-    for left, said in ((rows[:9], "mechanism"), ([], "carry nothing")):
+    for left, said in ((rows[:9], "mechanism"), ([], "positive stiffness")):
         file.write_text("\n".join([names, *left, *zeros[len(left) :]]), encoding="utf-8")
         with pytest.raises(StudyError, match=said):
             read_study(written(tmp_path, STUDY.replace('rule = "lloyd"', 'stiffness = { file = "k.csv" }')))

@@ -393,7 +393,7 @@ VARY = ["--vary", "material.poisson=0:0.4:3", "--vary", "mesh.elements=[8,2],[9,
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], str]:
-    """A sweep of six points, three of which fail, for lloyd's rule is made for squares; what it printed and said."""
+    """A sweep of six points, three of which fail, for the rule lloyd requires squares; what it printed and said."""
     folder = tmp_path_factory.mktemp("sweep")
     process = started(written(folder, FAST), *VARY, "--out", folder / "out", "--json", "--workers", 1)
     told, errors = process.communicate(timeout=120)
@@ -407,8 +407,8 @@ def test_a_failed_point_is_recorded_and_the_rest_goes_on(swept: tuple[Path, dict
     for row in told["rows"]:
         failed = row["mesh.elements"] == [9, 2]
         assert row["status"] == ("failed" if failed else "converged")
-        assert ("is made for squares" in row["reason"]) if failed else row["reason"] is None
-    assert errors.count("is made for squares") == 3
+        assert ("requires squares" in row["reason"]) if failed else row["reason"] is None
+    assert errors.count("requires squares") == 3
     assert len(records(folder / "out")) == 6
 
 
@@ -441,7 +441,7 @@ def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, A
 
 def test_the_page_loads_nothing(swept: tuple[Path, dict[str, Any], str]) -> None:
     page = (swept[0] / "out" / "report.html").read_text(encoding="utf-8")
-    assert "3 of 6 points failed" in page and page.count("is made for squares") == 3
+    assert "3 of 6 points failed" in page and page.count("requires squares") == 3
     assert "http://" not in page.replace("http://www.w3.org", "") and "https://" not in page
     assert "data:image/svg+xml" in page and "--vary &#39;mesh.elements=[8,2],[9,2]&#39;" in page
 

@@ -96,11 +96,11 @@ def test_without_lateral_contraction_it_is_saint_venant_kirchhoff(mesh: ts.Mesh)
 
 def test_it_says_what_it_cannot_realise() -> None:
     (told,) = ts.Terzopoulos("trapezoid").warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 1 / 3))
-    assert "Poisson's ratio is 0 where the material has 0.3333" in told
+    assert "Poisson's ratio is 0" in told and "0.3333" in told
     # (C11 - 2 C66) / (C11 + 2 C66) of C11 = E, C66 = 3/8 E, and E at 45 degrees 4 / (2 / E + 8 / (3 E))
-    assert f"{6 * YOUNG / 7:.6g} Pa and {1 / 7:.4g}" in told
+    assert f"{6 * YOUNG / 7:.6g} Pa" in told and f"{1 / 7:.4g}" in told
     (told,) = ts.Terzopoulos("trapezoid").warnings(body(ts.rectangle((2.0, 1.0), (2, 1)), 0.3, SECTIONS[1]))
-    assert f"the material has {0.3 / 0.7:.4g} in plane strain" in told
+    assert f"{0.3 / 0.7:.4g} in plane strain" in told
 
 
 @pytest.mark.parametrize(

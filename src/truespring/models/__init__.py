@@ -19,7 +19,7 @@ from truespring.models.law import Law as Law
 from truespring.models.laws import LAWS as LAWS
 from truespring.models.laws import material_constants as material_constants
 from truespring.models.mass_tensor import MassTensor as MassTensor
-from truespring.models.mechanism import refuse_mechanism as refuse_mechanism
+from truespring.models.mechanism import check_mechanism as check_mechanism
 from truespring.models.model import Model as Model
 from truespring.models.model import as_model as as_model
 from truespring.models.moduli import Moduli as Moduli

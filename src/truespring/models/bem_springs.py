@@ -76,7 +76,7 @@ class BemSprings(Model):
                 "use springs or fem"
             )
         chosen = self._chosen(problem)
-        _refuse_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
+        _check_inside(problem, inner_nodes(problem.mesh, np.flatnonzero(chosen)))
         return chosen, _springs_beside(problem, self.rule, chosen)
 
     def _chosen(self, problem: Problem) -> Bools:
@@ -89,9 +89,9 @@ class BemSprings(Model):
         several = np.unique(problem.material_numbers[chosen])
         if len(several) > 1:
             raise ModelError(
-                f"block: its elements have {len(several)} materials, boundary elements require one: select other elements"
+                f"block: its elements have {len(several)} materials, boundary elements require one: select others"
             )
-        _refuse_apart(mesh, chosen)
+        _check_connected(mesh, chosen)
         return chosen
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ class BemSprings(Model):
         return tuple(f"outside the block: {text}" for text in Springs(self.rule).warnings(problem))
 
 
-def _refuse_apart(mesh: Mesh, chosen: Bools) -> None:
+def _check_connected(mesh: Mesh, chosen: Bools) -> None:
     """Raise ModelError if a block has several parts, or no facet in common with the other elements."""
     nodes, elements = np.unique(mesh.elements[chosen], return_inverse=True)
     n_parts = int(Mesh(mesh.nodes[nodes], elements.reshape(-1, mesh.kind.n_nodes), mesh.element).parts.max()) + 1
@@ -126,7 +126,7 @@ def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork
     return SpringNetwork(mesh.nodes, network.springs[kept], network.stiffness[kept])
 
 
-def _refuse_inside(problem: Problem, inside: Ints) -> None:
+def _check_inside(problem: Problem, inside: Ints) -> None:
     """Raise ModelError if a load or support acts inside the block."""
     everywhere = next((load.words() for load in problem.loads if load.on is None), None)
     loading = problem.loading
@@ -167,7 +167,7 @@ class BlockSprings:
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.mesh.nodes
 
     @property
@@ -188,7 +188,7 @@ class BlockSprings:
         return self.frame.block.forces(self.frame.displacement(self._local(positions)))
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         return self.network.energy(positions) + float(self._node_energies(positions).sum())
 
     def _node_energies(self, positions: Floats) -> Floats:
@@ -208,13 +208,13 @@ class BlockSprings:
         return np.concatenate([tension, frame.block.forces(further).ravel()])
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         force = self.network.gradient(positions)
         force[self.frame.block.numbers] += self.frame.gradient(self._local(positions), self._force(positions))
         return force
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
+        """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
         stress = self.stress(positions) if stress is None else stress
         tension, force = np.split(stress, [len(self.springs)])
         local = self._local(positions)

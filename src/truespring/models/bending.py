@@ -85,18 +85,18 @@ def bending_excess(problem: Problem) -> float:
 
 
 def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tuple[int, ...]) -> float:
-    """EI of a strip of elements like the first under pure bending along x, over E I of the material in its section.
+    """Return EI of a strip of elements like the first in pure bending along x, over EI of the material [-].
 
-    A column of them is bent to unit curvature, u = (-x y, x^2 / 2), plus a displacement that repeats
-    from column to column and makes the energy least; EI is twice that energy by length. For springs on
-    squares with summed sharing it is e0 (1 - 1/n^2) + 6 a / n^2, e0 = E_0 / E.
+    A column of elements is bent to unit curvature, u = (-x y, x^2 / 2), plus the periodic displacement that minimises
+    the energy; EI is twice this energy per length. For springs on squares with summed sharing the factor is
+    e0 (1 - 1/n^2) + 6 a / n^2, n elements deep: e0 is Young's modulus along x over E, a the stiffness of edges in t E.
     """
     material, section = require_body(problem)
     mesh = problem.mesh
     dim, corners = mesh.dim, CORNERS[: mesh.kind.n_nodes, : mesh.dim]
     sides = mesh.nodes[mesh.elements[0, -2 if dim == 3 else 2]] - mesh.nodes[mesh.elements[0, 0]]
     grid = np.array([count + 1 for count in counts])
-    # Both ends of a cell along x are one place of the section.
+    # The displacement is periodic: both ends of a cell along x have the same degrees of freedom.
     section_corners, place = np.unique(corners[:, 1:], axis=0, return_inverse=True)
     gather = np.kron(np.eye(len(section_corners))[place.ravel()], np.eye(dim))
     n_free = dim * int(np.prod(grid))

@@ -34,7 +34,7 @@ class BiquadraticSprings(LinkedElements):
         return SpringData(None, {"springs": self.springs, "links": links, "coupling": coupling}, COUPLING)
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         from truespring.kernels import vectors
         from truespring.kernels.threads import run
 
@@ -54,7 +54,7 @@ class BiquadraticSprings(LinkedElements):
         self._run(links.couple, self.coupling, change, pull)
         return pull
 
-    def _carried_on(self, change: Floats, growth: Floats) -> Floats:
+    def _extrapolated(self, change: Floats, growth: Floats) -> Floats:
         return self._pulls(change + growth)
 
     def _couplings(self, change: Floats, first: int, last: int) -> Floats:

@@ -81,7 +81,7 @@ def make_block(problem: Problem, elements: Ints) -> Block:
     surface = np.unique(facets)
     inside = inner_nodes(mesh, elements)
     panels = Panels(mesh.nodes[surface], np.searchsorted(surface, facets))
-    _refuse_too_large(panels, len(inside))
+    _check_memory(panels, len(inside))
     nodes = mesh.nodes[np.concatenate([surface, inside])]
     material = problem.materials[problem.material_numbers[elements[0]]]
     poisson = material.poisson / (1 + material.poisson) if section.free_thickness else material.poisson
@@ -128,7 +128,7 @@ def _symmetric(stiffness: Floats, rigid: Floats) -> Floats:
     return np.asarray(projected)
 
 
-def _refuse_too_large(panels: Panels, n_inside: int) -> None:
+def _check_memory(panels: Panels, n_inside: int) -> None:
     """Raise ModelError if the dense matrices do not fit in memory."""
     n, n_surface = panels.n_panels * panels.dim, panels.nodes.size
     needed = 8 * (2 * n * n + 4 * n * n_surface + 4 * n_surface**2 + n_inside * panels.dim * (n + 3 * n_surface))

@@ -14,13 +14,13 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.models.panels import Panels, Patch
 
-# Gauss points a direction on panels that are nearer to a point than so many times their radius, in the plane and in
-# space: their error is some 1e-14 and 1e-8.
+# By dimension: Gauss points per direction on panels that are closer to a point than the given multiple of their radius;
+# the error is about 1e-14 in 2D and 1e-8 in 3D.
 _LEVELS = {
     2: ((2.0, 24), (6.0, 12), (np.inf, 8)),
     3: ((1.3, 20), (2.2, 12), (4.0, 6), (10.0, 4), (np.inf, 3)),
 }
-# A panel whose middle is nearer, in its radii, is the one that the point is the middle of.
+# If the midpoint of a panel is closer to a point than this multiple of its radius, the point is the midpoint.
 _ITSELF = 1e-6
 
 

@@ -1,4 +1,4 @@
-"""Finite elements on the same mesh, the embedded reference."""
+"""The finite element model."""
 
 from dataclasses import dataclass, field
 
@@ -23,14 +23,14 @@ class Fem(Model):
     """The finite element model.
 
     Attributes:
-        law: a key of LAWS.
-        element: "linear", full integration, 2 Gauss points a direction; "mean-dilatation" (quadrilaterals, hexahedra,
-            wedges and pyramids), whose volume changes as a whole; "quadratic" (triangles and tetrahedra), with nodes
-            in the middle of the edges, and "quadratic-mean-dilatation", these with lambda's part of the law at the
-            mean volume. None takes what does not lock: quadratic ones on triangles and tetrahedra, since linear ones
-            are too stiff in bending at any Poisson's ratio, and mean dilatation on all of them above a Poisson's ratio
-            of 0.4 in plane strain and in 3D; linear ones on others. On a mesh of several kinds triangles and
-            tetrahedra are linear: quadratic ones do not meet the others.
+        law: the constitutive law, a key of LAWS.
+        element: the interpolation. "linear" has full integration, 2 Gauss points per direction. "mean-dilatation"
+            (quadrilaterals, hexahedra, wedges and pyramids) uses the mean volume ratio of the element. "quadratic"
+            (triangles and tetrahedra) has nodes at the midpoints of edges; "quadratic-mean-dilatation" also uses the
+            mean volume ratio in the part of lam. By default, None, elements do not lock: quadratic on triangles and
+            tetrahedra, which are too stiff in bending if linear, and mean dilatation on all kinds above a Poisson's
+            ratio of 0.4 in plane strain and 3D; otherwise linear. On a mesh of several kinds, triangles and tetrahedra
+            are linear, since quadratic ones would not be conforming.
     """
 
     law: str = field()
@@ -47,40 +47,40 @@ class Fem(Model):
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model: the law is always named."""
-        asked = "" if self.element is None else f" ({self.element.replace('-', ' ')})"
-        return f"{LAWS[self.law].label} FEM{asked}"
+        """Name in figures and tables."""
+        element = "" if self.element is None else f" ({self.element.replace('-', ' ')})"
+        return f"{LAWS[self.law].label} FEM{element}"
 
     def chosen_element(self, problem: Problem) -> str:
-        """Return the interpolation on the problem's mesh; raise ModelError where the one asked for is not for it."""
+        """Return the interpolation on the mesh of a problem; raise ModelError if the mesh does not allow `element`."""
         return chosen_interpolation(problem, self.law, self.element)
 
     @property
     def finite(self) -> bool:
-        """Whether strains are finite: false for the linear law."""
+        """Whether strains are finite; false for the linear law."""
         return LAWS[self.law].finite
 
     @property
     def element_is_open(self) -> bool:
-        """Whether the mesh decides on the interpolation."""
+        """Whether the mesh determines the interpolation."""
         return self.element is None
 
     def second_order(self, problem: Problem) -> "Fem | None":
-        """Return the model of second order on triangles or tetrahedra; None where the own elements are as good."""
+        """Return the model with elements of second order, or None if the elements of this model are not linear."""
         return Fem(self.law) if self.chosen_element(problem) == "linear" else None
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: elements that lock, or that are too stiff."""
+        """Return warnings about elements that lock or are too stiff in bending."""
         chosen, stiff = self.chosen_element(problem), stiff_simplices(problem)
         if chosen != "linear" or not locks(problem):
             return stiff
         largest = max(material.poisson for material in problem.materials)
         return (
             f"linear elements lock at a Poisson's ratio of {largest:g}: they are too stiff; "
-            f'element = "{default_interpolations(problem, self.law)[-1]}", the default here, does not lock',
+            f'element = "{default_interpolations(problem, self.law)[-1]}", the default on this mesh, does not lock',
             *stiff,
         )
 
     def potential(self, problem: Problem) -> FemPotential | SummedElements:
-        """Return the potential on the problem's mesh."""
+        """Return the potential on the mesh of a problem."""
         return fem_potential(problem, self.law, self.chosen_element(problem))

@@ -1,4 +1,4 @@
-"""The frame in which a linear elastic block strains: at rest, or turning with the block (corotated)."""
+"""The frame of reference of a linear elastic block: fixed, or rotating with the block (corotated)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,12 +11,12 @@ from truespring.models.block import Block
 
 
 class Tangent(NamedTuple):
-    """The tangent stiffness of a block [N/m].
+    """The tangent stiffness of a block, in parts [N/m].
 
     Attributes:
-        surface: between nodes of the surface, shape (n_surface, dim, n_surface, dim).
-        inside: from nodes of the surface to those inside, shape (n_surface, dim, n_inside, dim).
-        alone: of each node inside with itself, the same in every direction and for every node.
+        surface: between surface nodes, shape (n_surface, dim, n_surface, dim).
+        inside: between surface nodes and inner nodes, shape (n_surface, dim, n_inside, dim).
+        alone: diagonal of the inner nodes, a number.
     """
 
     surface: Floats
@@ -25,74 +25,75 @@ class Tangent(NamedTuple):
 
 
 class Frame(Protocol):
-    """From positions to the displacement that strains a block, and back from its forces; [m], [N], (n_nodes, dim)."""
+    """Maps positions to the displacement in the frame of the block, and forces back; [m], [N], shape (n_nodes, dim)."""
 
     @property
     def block(self) -> Block:
-        """The block."""
+        """The block in this frame."""
         ...
 
     def displacement(self, positions: Floats) -> Floats:
-        """What strains the block."""
+        """Return the displacement in the frame of the block [m], shape (n_nodes, dim)."""
         ...
 
     def change(self, positions: Floats, step: Floats) -> Floats:
-        """The change of it that is linear in a step of the positions."""
+        """Return the linear change of this displacement for a step of the positions [m], shape (n_nodes, dim)."""
         ...
 
     def gradient(self, positions: Floats, force: Floats) -> Floats:
-        """The derivative of the energy by the positions from that by the displacement."""
+        """Return the forces on the nodes [N], shape (n_nodes, dim), from the forces in the frame."""
         ...
 
     def tangent(self, positions: Floats, force: Floats) -> Tangent:
-        """The second derivative; zero forces leave what is positive semidefinite."""
+        """Return the tangent stiffness for forces in the frame; positive semidefinite if they are zero."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class AtRest:
-    """The frame of linear elasticity: the block takes a turn for strain."""
+    """The fixed frame of linear elasticity: a rotation of the block causes strain."""
 
     block: Block
 
     def displacement(self, positions: Floats) -> Floats:
-        """Positions less those at rest."""
+        """Return the displacement from the undeformed positions [m], shape (n_nodes, dim)."""
         return positions - self.block.nodes
 
     def change(self, positions: Floats, step: Floats) -> Floats:
-        """The step."""
+        """Return the step [m], shape (n_nodes, dim)."""
         return step
 
     def gradient(self, positions: Floats, force: Floats) -> Floats:
-        """The force."""
+        """Return the force [N], shape (n_nodes, dim)."""
         return force
 
     def tangent(self, positions: Floats, force: Floats) -> Tangent:
-        """The stiffness of the block."""
+        """Return the stiffness of the block."""
         return Tangent(*_coupled(self.block), self.block.kappa)
 
 
 def _turned_by(rotation: Floats, blocks: Floats) -> Floats:
-    """Blocks R A R^T of a matrix, of shape (n, dim, m, dim)."""
+    """Return R A R^T for the blocks A of a matrix, shape (n, dim, m, dim)."""
     n, dim, m, _ = blocks.shape
     return (rotation @ blocks.reshape(n, dim, m * dim)).reshape(n, dim, m, dim) @ rotation.T
 
 
 def _coupled(block: Block) -> tuple[Floats, Floats]:
+    """Return `Block.coupled` in blocks, shapes (n_surface, dim, n_surface, dim) and (n_surface, dim, n_inside, dim)."""
     n, dim = len(block.surface), block.nodes.shape[1]
     surface, inside = block.coupled
     return surface.reshape(n, dim, n, dim), inside.reshape(n, dim, -1, dim)
 
 
 class _Turned(NamedTuple):
-    """A block's rotation at some positions.
+    """The rotation of a block and its derivatives at given positions; m spins, one in 2D and three in 3D.
 
     Attributes:
-        rotation: R, turns the block at rest nearest to the positions.
-        arms: positions from the middle of the surface, turned back [m], shape (n_nodes, dim).
-        rates: of the spins omega by the positions of the surface [1/m], shape (m, n_surface, dim).
+        rotation: R, the rotation of the undeformed block that fits the positions best, shape (dim, dim).
+        arms: positions relative to the centre of the surface, rotated back [m], shape (n_nodes, dim).
+        rates: derivative of the spins omega with respect to the surface positions [1/m], shape (m, n_surface, dim).
         flexibility: D^-1 [1/m^2], shape (m, m).
-        stretch: S = R^T M [m^2].
+        stretch: S = R^T M [m^2], shape (dim, dim).
     """
 
     rotation: Floats
@@ -104,18 +105,18 @@ class _Turned(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """A frame that turns with the block: R^T x - X strains it, with R the rotation that fits its surface best.
+    """A frame that rotates with the block: the displacement in it is R^T x - X, R the rotation that fits it best.
 
-    R is the polar rotation of M = sum x X^T over the nodes of the surface, both from their middle: atan2 in the plane.
-    Its derivatives are exact. With the unit spins A_k, one in the plane and three in space, R changes by
-    R sum omega_k A_k, where D omega = (A_k : R^T dM), D_kl = A_k : A_l S, S = R^T M.
+    R is the rotation in the polar decomposition of M = sum x X^T over the surface nodes, x and X relative to their
+    centres; atan2 in 2D. Its derivatives are exact: with the unit spins A_k, one in 2D and three in 3D,
+    dR = R sum omega_k A_k, where D omega = (A_k : R^T dM), D_kl = A_k : A_l S, S = R^T M.
     """
 
     block: Block
 
     @cached_property
     def _at_rest(self) -> Floats:
-        """Reference positions from the middle of the surface [m], shape (n_nodes, dim)."""
+        """Undeformed positions relative to the centre of the surface [m], shape (n_nodes, dim)."""
         nodes = self.block.nodes
         return np.asarray(nodes - nodes[: len(self.block.surface)].mean(axis=0))
 
@@ -140,31 +141,31 @@ class Turning:
         resistance = self._resistance(S)
         try:
             flexibility = np.asarray(np.linalg.inv(resistance), dtype=np.float64)
-        except np.linalg.LinAlgError:  # a block turned inside out may have no nearest rotation
+        except np.linalg.LinAlgError:  # an inverted block may have no best rotation
             flexibility = np.full_like(resistance, np.nan)
         rates = np.einsum("kl,lij,aj->kai", flexibility, R @ spins, X)
         return _Turned(R, x @ R, rates, flexibility, S)
 
     def _resistance(self, stretch: Floats) -> Floats:
-        """D of S, or of many, axes (..., m, m)."""
+        """Return D for S, axes (..., m, m)."""
         return np.asarray(np.einsum("kij,...lij->...kl", self._spins, self._spins @ stretch[..., None, :, :]))
 
     def displacement(self, positions: Floats) -> Floats:
-        """R^T x - X, both from the middle of the surface."""
+        """Return R^T x - X [m], both relative to the centre of the surface, shape (n_nodes, dim)."""
         return self._turned(positions).arms - self._at_rest
 
     def change(self, positions: Floats, step: Floats) -> Floats:
-        """R^T dx, and what the change of R does to the arms."""
+        """Return R^T dx plus the change of the arms with R [m], shape (n_nodes, dim)."""
         at = self._turned(positions)
         omega = np.einsum("kai,ai->k", at.rates, step[: at.rates.shape[1]])
         return np.asarray(step @ at.rotation + self._swung(at.arms) @ omega)
 
     def _swung(self, arms: Floats) -> Floats:
-        """How a unit of each spin changes what is seen from the frame, shape (n_nodes, dim, m)."""
+        """Return the change of the arms for unit spins [m], shape (n_nodes, dim, m)."""
         return np.asarray(np.einsum("kji,aj->aik", self._spins, arms))
 
     def gradient(self, positions: Floats, force: Floats) -> Floats:
-        """R f, and the work of f on the arms as R changes."""
+        """Return R f plus the work of f on the arms as R changes [N], shape (n_nodes, dim)."""
         at = self._turned(positions)
         gradient = force @ at.rotation.T
         work = np.einsum("aik,ai->k", self._swung(at.arms), force)
@@ -172,7 +173,7 @@ class Turning:
         return np.asarray(gradient)
 
     def tangent(self, positions: Floats, force: Floats) -> Tangent:
-        """The stiffness turned with the frame and through its spins, and the forces times the second derivatives."""
+        """Return the stiffness in the rotated frame, with the derivatives of the rotation of first and second order."""
         at = self._turned(positions)
         R, rates, n = at.rotation, at.rates, at.rates.shape[1]
         surface, inside = (_turned_by(R, one) for one in _coupled(self.block))
@@ -190,9 +191,9 @@ class Turning:
         return Tangent(surface, inside, self.block.kappa)
 
     def _curvature(self, at: _Turned, turned: Floats) -> Floats:
-        """The second derivative by M of R : P, from R^T P, axes (i, j, k, l) of two changes of M.
+        """Return the second derivative of R : P with respect to M, from `turned` = R^T P, axes (i, j, k, l).
 
-        The first is R sum z_k A_k with D z = (A_k : R^T P); this is its change with M.
+        The first derivative is R sum z_k A_k with D z = (A_k : R^T P); this is its derivative.
         """
         spins, R, dim = self._spins, at.rotation, len(at.rotation)
         seen = R.T @ np.eye(dim * dim).reshape(-1, dim, dim)  # R^T dM of unit changes of M

@@ -1,4 +1,4 @@
-"""HEML, hyper-elastic mass links: the energy of a finite element told by the squared lengths of its links."""
+"""HEML, hyper-elastic mass links: the energy of a finite element as a function of the squared lengths of its links."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -24,19 +24,19 @@ from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-#: Laws that links can tell: those of finite strain.
+#: Laws allowed for links: those of finite strain.
 HEML_LAWS = tuple(name for name, law in LAWS.items() if law.finite)
-# Threads share the elements of a slice from so many on.
+# Smallest number of elements for which threads share a slice.
 _SMALLEST_PIECE = 256
 _SIMPLICES = ("triangle", "tetrahedron")
 
 
 @dataclass(frozen=True)
 class Heml(Model):
-    """Hyper-elastic mass links (Goulette and Chen 2015), by the law of the material.
+    """Hyper-elastic mass links (Goulette and Chen 2015).
 
     Attributes:
-        law: saint-venant-kirchhoff on any element; neo-hookean or hencky on triangles and tetrahedra.
+        law: saint-venant-kirchhoff on any element; other laws of finite strain on triangles and tetrahedra.
     """
 
     law: str = field()
@@ -47,8 +47,8 @@ class Heml(Model):
     def __post_init__(self) -> None:
         if self.law == "linear":
             raise ModelError(
-                "law = 'linear': links know lengths, whose change is no linear strain; "
-                f"allowed: {', '.join(HEML_LAWS)}; the linear law is that of fem and mass-tensor"
+                "law = 'linear': small strain is not a function of the lengths of links; "
+                f"allowed: {', '.join(HEML_LAWS)}; use the linear law with fem or mass-tensor"
             )
         if self.law not in HEML_LAWS:
             close = nearest(self.law, HEML_LAWS)
@@ -56,40 +56,40 @@ class Heml(Model):
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model."""
+        """Name in figures and tables."""
         return f"HEML ({LAWS[self.law].label})"
 
     def second_order(self, problem: Problem) -> Fem:
-        """Return the finite elements of second order of the same law: where finer meshes of this model lead."""
+        """Return finite elements of second order with the same law, the limit of this model on fine meshes."""
         return Fem(self.law)
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: elements that lock."""
+        """Return warnings about elements that lock."""
         return locking_warnings(problem)
 
     def potential(self, problem: Problem) -> LinkedElements | SummedLinks:
-        """Return the potential on the problem's mesh; raise ModelError for a law that does not fit its elements."""
+        """Return the potential; raise ModelError if the law does not support the elements of the mesh."""
         element = problem.mesh.element
-        fem_potential(problem, self.law)  # refuses what is no continuum, such as a plain network
+        fem_potential(problem, self.law)  # raises for problems without a continuum, such as a plain network
         if self.law == "saint-venant-kirchhoff":
             return summed_links(problem, BiquadraticSprings)
         if element not in _SIMPLICES:
             raise ModelError(
-                f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, whose strain is one and told by the "
-                f"lengths of their links; the mesh has {problem.mesh.kinds} elements: take law = "
-                "'saint-venant-kirchhoff', which goes with any, kind = 'fem' with this law, or a mesh of "
+                f"law = '{self.law}' requires {' or '.join(_SIMPLICES)} elements, whose uniform strain follows from "
+                f"the lengths of their links; the mesh has {problem.mesh.kinds} elements: use law = "
+                "'saint-venant-kirchhoff', which supports any element, kind = 'fem' with this law, or a mesh of "
                 f"{_SIMPLICES[problem.mesh.dim - 2]} elements"
             )
         return HyperelasticLinks(problem, self.law)
 
 
 class _Work(NamedTuple):
-    """What links are to the law, in an element or in a slice of them.
+    """Derivatives that relate squared lengths to the strain of the law, for a slice of elements.
 
     Attributes:
-        strain: how each component of C changes with each squared length [1/m^2], shape (n, links, components).
-        work: by what a stress is multiplied to be p [m], shape (n, links, components): the reference volume by half the
-            strain, shear twice.
+        strain: derivative of C with respect to each squared length [1/m^2], shape (n, links, components).
+        work: factor from stress to p [m], shape (n, links, components): undeformed volume times half of `strain`, shear
+            components doubled.
     """
 
     strain: Floats
@@ -98,19 +98,19 @@ class _Work(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HyperelasticLinks(LinkedElements):
-    """Triangles or tetrahedra of any law: as many links as a strain has components, so W(C) is a function of lengths.
+    """Triangles or tetrahedra of any law: they have as many links as strain components, so lengths determine W(C).
 
-    With C = I + sum q_l C_l (see `link_strains`), S and D the law's stress and elasticity there and V the rest volume:
-    W = V W(C), p_l = V/2 S : C_l and 2M_kl = V/4 C_k : D : C_l. For the neo-Hookean law this is Goulette and
-    Chen's, V (mu/2 (sum tr C_l l^2 - 3) - mu ln J + lam/2 (ln J)^2), J from the same lengths; its sign, which no
-    length tells, is taken from the nodes: an element that is turned inside out has infinite energy.
+    With C = I + sum q_l C_l (see `link_strains`), stress S and elasticity D of the law, and undeformed volume V:
+    W = V W(C), p_l = V/2 S : C_l and 2M_kl = V/4 C_k : D : C_l. For the neo-Hookean law this is the energy of Goulette
+    and Chen (2015), V (mu/2 (sum tr C_l l^2 - 3) - mu ln J + lam/2 (ln J)^2), J from the same lengths. Lengths do not
+    determine the orientation, which is computed from the positions: an inverted element has infinite energy.
     """
 
     law: str
 
     @cached_property
     def _fem(self) -> FemPotential:
-        """The finite elements of the same law, which are the same function."""
+        """Finite elements of the same law, the same function of the positions."""
         return fem_of_one_kind(self.problem, self.law)
 
     @cached_property
@@ -121,7 +121,7 @@ class HyperelasticLinks(LinkedElements):
         return _Work(strain, volumes[:, :, None] / 2 * twice * strain)
 
     def _response(self, change: Floats, first: int = 0, last: int | None = None) -> Response:
-        """What the law answers in a slice of the elements, axes (component, element, 1)."""
+        """Return the response of the law in a slice of the elements, axes (component, element, 1)."""
         from truespring.kernels import links
         from truespring.kernels.threads import run, writable
 
@@ -132,16 +132,16 @@ class HyperelasticLinks(LinkedElements):
         return LAWS[self.law].respond(identity(grown) + grown, self._fem.constants.part(first, end))
 
     def _energies(self, change: Floats) -> Floats:
-        """Stored energy of each element [J], were it not turned inside out, shape (n_elements,)."""
+        """Return the energy of each element [J], regardless of its orientation, shape (n_elements,)."""
         return np.asarray(self._response(change).energy[:, 0] * self._volumes)
 
     @cached_property
     def _volumes(self) -> Floats:
-        """Reference volume of each element [m^3], shape (n_elements,)."""
+        """Undeformed volume of each element [m^3], shape (n_elements,)."""
         return self._fem.quadrature()[1][:, 0]
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]; infinite where an element is turned inside out."""
+        """Return the stored energy [J]; infinite if an element is inverted."""
         if LAWS[self.law].barrier and not (self._signed(positions) > 0).all():
             return float("inf")
         with np.errstate(over="ignore", invalid="ignore"):
@@ -149,7 +149,7 @@ class HyperelasticLinks(LinkedElements):
         return total if np.isfinite(total) else float("inf")
 
     def _signed(self, positions: Floats) -> Floats:
-        """Signed area or volume of each element, without thickness, shape (n_elements,)."""
+        """Return the signed area [m^2] or volume [m^3] of each element, shape (n_elements,)."""
         from truespring.kernels import volumes
         from truespring.kernels.threads import writable
 
@@ -159,7 +159,7 @@ class HyperelasticLinks(LinkedElements):
         return signed
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Sum of the element Hessians, each with its negative eigenvalues cut off [N/m]."""
+        """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
         matrices = self._matrices(positions)
 
         def positive(first: int, last: int) -> Floats:
@@ -175,12 +175,12 @@ class HyperelasticLinks(LinkedElements):
         self._run(links.work, self._response(change).stress, self._work.work, pull)
         return pull
 
-    def _carried_on(self, change: Floats, growth: Floats) -> Floats:
+    def _extrapolated(self, change: Floats, growth: Floats) -> Floats:
         coupled = np.matmul(self._couplings(change, 0, len(change)), growth[..., None])[..., 0]
         return np.asarray(self._pulls(change) + 2 * coupled)
 
     def _couplings(self, change: Floats, first: int, last: int) -> Floats:
-        """M = V/8 C_k : D : C_l."""
+        """Return M = V/8 C_k : D : C_l of a slice of the elements [J/m^4], shape (n, links, links)."""
         from truespring.kernels import links
         from truespring.kernels.threads import run
 
@@ -191,6 +191,6 @@ class HyperelasticLinks(LinkedElements):
         return coupling
 
     def _link_energies(self, change: Floats) -> Floats:
-        """No law but the quadratic ones tells whose the energy is: its element's links have equal shares."""
+        """Return equal shares of each element's energy [J], shape (n_elements, links); links have no own energy."""
         n_links = change.shape[1]
         return np.repeat(self._energies(change)[:, None] / n_links, n_links, axis=1)

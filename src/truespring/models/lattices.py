@@ -1,4 +1,4 @@
-"""Regular meshes, as lattices on which rules state their effective moduli."""
+"""Regular meshes on which stiffness rules state their effective moduli."""
 
 from collections.abc import Callable
 from types import MappingProxyType
@@ -9,11 +9,12 @@ from truespring.mesh import Mesh, box, rectangle
 
 
 def _equilateral() -> Mesh:
+    """Return a mesh of equilateral triangles."""
     halved = rectangle((4.0, 3.0), (4, 3), "triangle", "left")
     return Mesh(halved.nodes @ np.array([[1.0, 0.0], [0.5, np.sqrt(3) / 2]]), halved.elements, "triangle")
 
 
-#: Meshes of some elements each, by the name of their lattice: what `LatticeModuli.lattice` takes.
+#: Small meshes by the name of their lattice, the values of `LatticeModuli.lattice`.
 LATTICES: MappingProxyType[str, Callable[[], Mesh]] = MappingProxyType(
     {
         "squares": lambda: rectangle((4.0, 3.0), (4, 3)),

@@ -1,4 +1,4 @@
-"""Elements that know nothing but the squared lengths of their links: biquadratic springs and HEML are such."""
+"""Elements whose energy is a function of the squared lengths of their links: base of biquadratic springs and HEML."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from truespring.assembly import Pattern
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-# Threads share the elements from so many on.
+# Smallest number of elements for which threads share the work.
 _SMALLEST_PIECE = 64
 
 
@@ -22,43 +22,46 @@ class LinkedElements(ABC):
     """Elements whose energy W(q) depends on q = l^2 - L^2 of the links between all their nodes.
 
     With p = dW/dq, 2M = d^2W/dq^2 and d the vector of a link from a to b: force 2 p d on b and -2 p d on a;
-    Hessian J^T 2M J + sum 2 p [[I, -I], [-I, I]], J = dq/dx. What W is, the heirs say.
+    Hessian J^T 2M J + sum 2 p [[I, -I], [-I, I]], J = dq/dx. Subclasses define W.
     """
 
     problem: Problem
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.problem.mesh.nodes
 
     @abstractmethod
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
 
     @abstractmethod
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """A positive semidefinite neighbour of the Hessian [N/m]."""
+        """Return a positive semidefinite approximation of the Hessian [N/m]."""
 
     @abstractmethod
     def _pulls(self, change: Floats) -> Floats:
-        """The derivative p of the energy by each squared length [N/m], shape (n_elements, links)."""
+        """Return the derivatives p of the energy with respect to squared lengths [N/m], shape (n_elements, links)."""
 
     @abstractmethod
     def _couplings(self, change: Floats, first: int, last: int) -> Floats:
-        """Half the second derivative, M, of a slice of the elements [J/m^4], shape (n, links, links) or one of all."""
+        """Return half the second derivative, M, of a slice of the elements [J/m^4].
+
+        Shape (n, links, links), or (1, links, links) if all are equal.
+        """
 
     @abstractmethod
-    def _carried_on(self, change: Floats, growth: Floats) -> Floats:
-        """p + 2M dq of a growth dq [m^2]: carried on linearly [N/m], shape (n_elements, links)."""
+    def _extrapolated(self, change: Floats, growth: Floats) -> Floats:
+        """Return p + 2M dq for a growth dq [m^2], in N/m, shape (n_elements, links)."""
 
     @abstractmethod
     def _link_energies(self, change: Floats) -> Floats:
-        """The share of each link in the energy [J], shape (n_elements, links)."""
+        """Return the share of each link in the energy [J], shape (n_elements, links)."""
 
     @cached_property
     def _links(self) -> Ints:
-        """The link of each pair of an element's nodes, shape (k, k)."""
+        """Number of the link between each two nodes of an element, shape (k, k)."""
         kind = self.problem.mesh.kind
         number = np.full((kind.n_nodes, kind.n_nodes), -1)
         for link, (i, j) in enumerate(kind.links):
@@ -70,22 +73,22 @@ class LinkedElements(ABC):
         return Pattern(self.problem.mesh.elements, *self.nodes.shape)
 
     def _run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
-        """Run a kernel over all elements."""
+        """Run a kernel on all elements in parallel."""
         from truespring.kernels.threads import run
 
         run(kernel, len(self._pattern.elements), *arguments, smallest=_SMALLEST_PIECE)
 
     @property
     def _place(self) -> tuple[ShortInts, Ints]:
-        """What kernels ask of the elements: their nodes and links."""
+        """Arguments of kernels: node numbers and links of the elements."""
         return self._pattern.elements, self._links
 
     def _by_link(self) -> Floats:
-        """Room for a value of each link, shape (n_elements, links)."""
+        """Return an empty array for values of links, shape (n_elements, links)."""
         return np.empty((len(self._pattern.elements), len(self.problem.mesh.kind.links)))
 
     def _changes(self, positions: Floats) -> Floats:
-        """The change q of squared lengths [m^2], shape (n_elements, links)."""
+        """Return the change q of squared lengths [m^2], shape (n_elements, links)."""
         from truespring.kernels import links
         from truespring.kernels.threads import writable
 
@@ -95,7 +98,7 @@ class LinkedElements(ABC):
         return change
 
     def _growths(self, positions: Floats, step: Floats) -> Floats:
-        """The change of squared lengths that is linear in a step [m], in m^2, shape (n_elements, links)."""
+        """Return the linear change of squared lengths for a step [m], in m^2, shape (n_elements, links)."""
         from truespring.kernels import links
         from truespring.kernels.threads import writable
 
@@ -105,7 +108,7 @@ class LinkedElements(ABC):
         return growth
 
     def _squared(self, positions: Floats) -> Floats:
-        """Squared lengths [m^2], shape (n_elements, links)."""
+        """Return squared lengths [m^2], shape (n_elements, links)."""
         from truespring.kernels import links
         from truespring.kernels.threads import writable
 
@@ -114,15 +117,15 @@ class LinkedElements(ABC):
         return squared
 
     def stress(self, positions: Floats) -> Floats:
-        """The derivative p of the energy by each squared length [N/m], shape (n_elements, links)."""
+        """Return the derivatives p of the energy with respect to squared lengths [N/m], shape (n_elements, links)."""
         return self._pulls(self._changes(positions))
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """p carried on by 2M dq with dq = 2 d . change of d along the step [N/m], shape (n_elements, links)."""
-        return self._carried_on(self._changes(positions), self._growths(positions, step))
+        """Return p + 2M dq, dq = 2 d . (change of d along `step`) [N/m], shape (n_elements, links)."""
+        return self._extrapolated(self._changes(positions), self._growths(positions, step))
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         from truespring.kernels import links
         from truespring.kernels.threads import writable
 
@@ -132,11 +135,11 @@ class LinkedElements(ABC):
         return self._pattern.vector(force)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
+        """Return the tangent stiffness [N/m]; `stress` [N/m] gives the geometric part, by default the current one."""
         return self._pattern.summed(self._matrices(positions, stress))
 
     def _matrices(self, positions: Floats, stress: Floats | None = None) -> Callable[[int, int], Floats]:
-        """What gives the element matrices of a slice [N/m], shape (last - first, n_dof, n_dof)."""
+        """Return a function that returns element matrices of a slice [N/m], shape (last - first, n_dof, n_dof)."""
         from truespring.kernels import links
         from truespring.kernels.threads import run, writable
 
@@ -154,12 +157,12 @@ class LinkedElements(ABC):
         return matrices
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length of each element's links, shape (n_elements * links,)."""
+        """Return length over rest length of each element's links [-], shape (n_elements * links,)."""
         return np.asarray(np.sqrt(self._squared(positions) / self._squared(self.nodes)).ravel())
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints]:
-        """Each pair of nodes that a link joins once, and the pair of each element's links."""
+        """Springs, each pair of nodes once, and the number of the spring of each link."""
         from truespring.kernels.sparsity import unique_pairs
         from truespring.kernels.threads import writable
 
@@ -170,18 +173,19 @@ class LinkedElements(ABC):
 
     @property
     def springs(self) -> Ints:
-        """Each pair of nodes that a link joins once, shape (n_springs, 2)."""
+        """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
         return self._shared[0]
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The links as lines, shape (n_springs, 2)."""
+        """Links as lines, shape (n_springs, 2)."""
         return {"line": self.springs}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension [N], stretch [-], stiffness at rest [N/m] and strain energy [J] of each link.
+        """Return tension [N], stretch [-], undeformed stiffness [N/m] and strain energy [J], shape (n_springs,).
 
-        Sums over the elements that share it: tension 2 p l, stiffness 8 L^2 M_ss, and of the energy the links' parts.
+        Sums over the elements that share a spring of the tension 2 p l, the stiffness 8 L^2 M_ss and the energy of the
+        link.
         """
         change = self._changes(positions)
         at_rest = self._couplings(np.zeros_like(change), 0, len(change))

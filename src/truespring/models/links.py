@@ -1,4 +1,4 @@
-"""Links: the pairs of nodes of an element that may carry springs, and the strain that their lengths tell."""
+"""Links, the pairs of nodes of an element that springs can join, and the strain as a function of their lengths."""
 
 from collections.abc import Callable
 
@@ -15,19 +15,19 @@ from truespring.problem import Problem
 #: Corners of a square (the first four) and of a cube, in the order of quadrilaterals and hexahedra.
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
-# Elements whose coupling is found at a time.
+# Number of elements for which the coupling is computed at a time.
 _SLICE = 1024
 
 
 def n_links(mesh: Mesh) -> int:
-    """Return the number of links of an element; of several kinds that of the kind with most."""
+    """Return the number of links of an element; for several kinds, the largest."""
     return max(len(part.kind.links) for _, part in mesh.blocks)
 
 
 def in_a_row(mesh: Mesh, values: Floats) -> Floats:
-    """Return a value of each element's each link, shape (n_elements, links), in the order of `shared_springs`.
+    """Return values of links in the order of `shared_springs`, shape (n,), from `values` of shape (n_elements, links).
 
-    Of several kinds rows are as long as that of the kind with most links; what is beyond an element's own is no link's.
+    If the mesh has several kinds of elements, the padding of rows is left out.
     """
     if len(mesh.blocks) == 1:
         return values.ravel()
@@ -35,9 +35,9 @@ def in_a_row(mesh: Mesh, values: Floats) -> Floats:
 
 
 def by_kind(problem: Problem, values: Callable[[Problem], Floats]) -> Floats:
-    """Return what `values` makes of the elements of each kind for their links, shape (n_elements, links).
+    """Return the results of `values` for the links of each kind of elements, shape (n_elements, links).
 
-    Of several kinds zero beyond an element's own links.
+    If the mesh has several kinds of elements, rows are padded with zeros.
     """
     if len(problem.blocks) == 1:
         return values(problem)
@@ -48,28 +48,27 @@ def by_kind(problem: Problem, values: Callable[[Problem], Floats]) -> Floats:
 
 
 def link_vectors(mesh: Mesh, chosen: slice | Ints = slice(None)) -> Floats:
-    """From the first to the second node of each link of the elements chosen [m], shape (n, links, dim)."""
+    """Return the vectors from the first to the second node of the links of elements [m], shape (n, links, dim)."""
     at = mesh.nodes[mesh.elements[chosen]]
     links = np.array(mesh.kind.links)
     return np.asarray(at[:, links[:, 1]] - at[:, links[:, 0]])
 
 
 def all_alike(mesh: Mesh, share: float) -> bool:
-    """Return whether the links of all elements are the same vectors, but for this share of the longest component."""
+    """Return whether the links of all elements are equal vectors, up to this share of the longest component."""
     own = link_vectors(mesh, slice(1))
     bound = share * np.abs(own).max()
     return all(np.abs(link_vectors(mesh, part) - own).max() <= bound for part in slices(len(mesh.elements), own.nbytes))
 
 
 def link_coupling(problem: Problem) -> Floats:
-    """Return M of W = q . M q, the energy of an element in the changes q = l^2 - L^2 of its squared link lengths.
+    """Return M of W = q . M q, the energy of an element as a function of q = l^2 - L^2 of its links [J/m^4].
 
-    Shape (n_elements, links, links) [J/m^4]; on a body of one material whose elements are all alike one M
-    for all, shape (1, links, links). With g_a the gradient of a node's shape function,
-    C = F^T F = sum l^2 C_ab over the links, C_ab = -(g_a g_b^T + g_b g_a^T) / 2; St. Venant-Kirchhoff's
-    energy is quadratic in C, so M = integral of lam/8 tr C_k tr C_l + mu/4 tr(C_k C_l), by the
-    quadrature of the finite element: the two are one function. On triangles these are the
-    biquadratic springs of Delingette (2008), on tetrahedra the links of Goulette and Chen (2015).
+    Shape (n_elements, links, links), or (1, links, links) for a body of one material with equal elements. With the
+    gradients g_a of the shape functions, C = F^T F = sum l^2 C_ab over the links, C_ab = -(g_a g_b^T + g_b g_a^T) / 2.
+    The St. Venant-Kirchhoff energy is quadratic in C, so M = integral of lam/8 tr C_k tr C_l + mu/4 tr(C_k C_l). With
+    the quadrature of the finite element, both energies are the same function. On triangles these are the biquadratic
+    springs of Delingette (2008), on tetrahedra the links of Goulette and Chen (2015).
     """
     potential = fem_of_one_kind(problem, "saint-venant-kirchhoff")
     alike = len(problem.materials) == 1 and problem.mesh.forms.single
@@ -83,10 +82,10 @@ def link_coupling(problem: Problem) -> Floats:
 
 
 def link_strains(mesh: Mesh, gradients: Floats) -> Floats:
-    """Return C_ab = -(g_a g_b^T + g_b g_a^T) / 2 of each link, by which C = F^T F changes with its squared length.
+    """Return C_ab = -(g_a g_b^T + g_b g_a^T) / 2, the derivatives of C = F^T F with respect to squared link lengths.
 
-    `gradients` of the shape functions have axes (element, point, node, direction); the result (element, point, link,
-    component in Voigt's order) [1/m^2].
+    Axes (element, point, link, component in Voigt's order) [1/m^2]; `gradients` of the shape functions have axes
+    (element, point, node, direction) [1/m].
     """
     links = np.array(mesh.kind.links)
     first, second = gradients[:, :, links[:, 0]], gradients[:, :, links[:, 1]]
@@ -95,7 +94,7 @@ def link_strains(mesh: Mesh, gradients: Floats) -> Floats:
 
 
 def _coupling(mesh: Mesh, gradients: Floats, volumes: Floats, constants: Constants) -> Floats:
-    """M of elements by the gradients of their shape functions, axes (element, point, node, direction)."""
+    """Return M [J/m^4], shape (n, links, links); axes of `gradients` as in `link_strains`."""
     lam, mu = constants.lam_plane, constants.mu
     C = link_strains(mesh, gradients)
     trace = C[..., : mesh.dim].sum(axis=-1)

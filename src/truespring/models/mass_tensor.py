@@ -1,4 +1,4 @@
-"""The mass-tensor method: forces as polynomials of the displacements, by tensors that are computed once."""
+"""The mass-tensor method: forces as polynomials of the displacements, with precomputed tensors."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,10 +23,10 @@ from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-#: Laws whose energy is a polynomial of the displacements.
+#: Allowed laws: those whose energy is a polynomial of the displacements.
 TENSOR_LAWS = tuple(name for name, law in LAWS.items() if law.quadratic)
 _SIMPLICES = ("triangle", "tetrahedron")
-# Threads share the simplices from so many on.
+# Smallest number of simplices for which threads share the work.
 _SMALLEST_PIECE = 256
 
 
@@ -45,8 +45,8 @@ class MassTensor(Model):
     def __post_init__(self) -> None:
         if self.law in LAWS and self.law not in TENSOR_LAWS:
             raise ModelError(
-                f"law = '{self.law}': its energy is no polynomial of the displacements, which tensors need; "
-                f"allowed: {', '.join(TENSOR_LAWS)}; this law is one of fem and heml"
+                f"law = '{self.law}': the mass-tensor method requires an energy that is a polynomial of the "
+                f"displacements; allowed: {', '.join(TENSOR_LAWS)}; use this law with fem or heml"
             )
         if self.law not in TENSOR_LAWS:
             close = nearest(self.law, TENSOR_LAWS)
@@ -54,54 +54,54 @@ class MassTensor(Model):
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model."""
+        """Name in figures and tables."""
         return f"mass-tensor ({LAWS[self.law].label})"
 
     @property
     def finite(self) -> bool:
-        """Whether strains are finite: false for the linear law."""
+        """Whether strains are finite; false for the linear law."""
         return LAWS[self.law].finite
 
     def second_order(self, problem: Problem) -> Fem:
-        """Return the finite elements of second order of the same law: where finer meshes of this model lead."""
+        """Return finite elements of second order with the same law, the limit of this model on fine meshes."""
         return Fem(self.law)
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: elements that lock."""
+        """Return warnings about elements that lock."""
         return locking_warnings(problem)
 
     def potential(self, problem: Problem) -> "LinearTensors | NonlinearTensors":
-        """Return the potential on the problem's mesh; raise ModelError for a law that does not fit its elements."""
+        """Return the potential; raise ModelError if the law does not support the elements of the mesh."""
         element = problem.mesh.element
         if self.law == "linear":
             return LinearTensors(fem_potential(problem, self.law))
         if element not in _SIMPLICES:
             raise ModelError(
-                f"law = '{self.law}' is for {' and '.join(_SIMPLICES)} elements, where its tensors are few; the mesh "
-                f"has {problem.mesh.kinds} elements: take kind = 'heml', which is the same function and goes with any, "
-                f"law = 'linear', or a mesh of {_SIMPLICES[problem.mesh.dim - 2]} elements"
+                f"law = '{self.law}' requires {' or '.join(_SIMPLICES)} elements; the mesh has {problem.mesh.kinds} "
+                "elements: use kind = 'heml', which is the same function on any element, law = 'linear', or a mesh of "
+                f"{_SIMPLICES[problem.mesh.dim - 2]} elements"
             )
         return NonlinearTensors(fem_of_one_kind(problem, self.law))
 
 
 @dataclass(frozen=True, eq=False)
 class _Tensors:
-    """What both laws share: the body, and what is drawn, which is told by the finite elements of the same function."""
+    """Base of both laws: nodes, cells and fields, computed by the equal finite elements."""
 
     fem: FemPotential | SummedElements
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.fem.nodes
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The elements by VTK's name of their kind, shape (n_elements, nodes)."""
+        """The elements by VTK name of their kind, shape (n_elements, nodes)."""
         return self.fem.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element."""
+        """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,)."""
         return self.fem.cell_fields(positions)
 
     @property
@@ -110,20 +110,21 @@ class _Tensors:
 
 
 class LinearTensors(_Tensors):
-    """Linear elasticity: force sum T_ij (u_j - u_i) on node i, a tensor T_ij for each two nodes of an element.
+    """Linear elasticity: force sum T_ij (u_j - u_i) on node i, with a tensor T_ij for each two nodes of an element.
 
-    T_ij = sum V (lam g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I) over the elements at an edge of simplices, g the
-    gradients of the shape functions; of other elements the integral, and their diagonals have tensors too. A vertex has
-    minus the sum of the tensors of its edges. A force costs one product by edges: no element is looked at.
+    T_ij = sum V (lam g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I) over the simplices at an edge, g the gradients of the
+    shape functions (Cotin, Delingette, Ayache 1999); for other elements the integral, with tensors on the diagonals,
+    too. The tensor of a vertex is minus the sum of the tensors of its edges. A force is a sum over edges, without a
+    loop over elements.
     """
 
     @cached_property
     def tensors(self) -> SparseMatrix:
-        """The tensors of the edges, and on the diagonal those of the vertices [N/m]: the constant tangent."""
+        """The tensors of edges and, on the diagonal, of vertices [N/m]: the constant tangent stiffness."""
         return self.fem.hessian(self.nodes)
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         from truespring.kernels import tensors
         from truespring.kernels.threads import run
 
@@ -131,7 +132,7 @@ class LinearTensors(_Tensors):
         return float(sum(run(tensors.edge_energy, len(positions), *known, self._zero)))
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         from truespring.kernels import tensors
         from truespring.kernels.threads import run
 
@@ -140,44 +141,46 @@ class LinearTensors(_Tensors):
         return force
 
     def _known(self, positions: Floats) -> tuple[Floats, Floats, ShortInts, ShortInts, Floats]:
-        """What kernels ask for: positions at present and at rest, and the tensors by rows."""
+        """Return arguments of kernels: current and undeformed positions, and the tensors by rows."""
         from truespring.kernels.threads import writable
 
         matrix = self.tensors
         return writable(positions), writable(self.nodes), matrix.indptr, matrix.indices, matrix.data
 
     def hessian(self, positions: Floats) -> SparseMatrix:
-        """Tangent stiffness [N/m], the same everywhere."""
+        """Return the tangent stiffness [N/m], the same for all positions."""
         return self.tensors
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The tangent, which is positive semidefinite [N/m]."""
+        """Return the tangent stiffness, which is positive semidefinite [N/m]."""
         return self.tensors
 
 
 @dataclass(frozen=True, eq=False)
 class NonlinearTensors(_Tensors):
-    """St. Venant-Kirchhoff's law on simplices: an energy of fourth order in the displacements.
+    """St. Venant-Kirchhoff law on simplices: an energy of fourth order in the displacements.
 
-    In a simplex E is linear in z, the displacements w_a of its further nodes relative to the first and the products
-    w_a . w_b: W = z . T z / 2. The blocks of T are the tensors of second, third and fourth order by which
-    Picinbono and others write W = 1/2 sum w_a . K_ab w_b + sum (w_a . w_b) (C_abc . w_c) + sum D_abcd (w_a . w_b)
-    (w_c . w_d). They sum them over the elements at each vertex, edge and face; here each element keeps its own, for
-    with absolute displacements u cubes of u over the element's size are lost to rounding.
+    In a simplex the Green strain is linear in z, the displacements w_a of nodes relative to the first node and the
+    products w_a . w_b: W = z . T z / 2. The blocks of T are the tensors of second, third and fourth order of Picinbono,
+    Delingette, Ayache (2003), W = 1/2 sum w_a . K_ab w_b + sum (w_a . w_b) (C_abc . w_c) + sum D_abcd (w_a . w_b)
+    (w_c . w_d). They sum the tensors over the elements at each vertex, edge and face. Here each element has separate
+    tensors, since with absolute displacements u, differences of order u^3 are lost to rounding.
 
-    Biquadratic springs and HEML are the same function: the tangent and its stress are theirs.
+    The same function as biquadratic springs and HEML, which compute the tangent.
     """
 
     fem: FemPotential
 
     @cached_property
     def links(self) -> BiquadraticSprings:
-        """The same function of the lengths of the elements' links."""
+        """The same potential as a function of the lengths of links."""
         return BiquadraticSprings(self.fem.problem)
 
     @cached_property
     def tensors(self) -> Floats:
-        """T of each element, or one of all, dim^2 displacements by nodes first, then products a <= b [N/m, N, N m]."""
+        """T of each element, or one for all equal ones, in blocks [N/m], [N/m^2], [N/m^3], shape (n, size, size).
+        Rows and columns: dim^2 displacements by node, then the products w_a . w_b with a <= b.
+        """
         problem, dim = self.fem.problem, self.fem.mesh.dim
         alike = len(problem.materials) == 1 and problem.mesh.forms.single
         size = dim * dim + dim * (dim + 1) // 2
@@ -198,7 +201,7 @@ class NonlinearTensors(_Tensors):
         return Pattern(self.fem.elements, *self.nodes.shape)
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         from truespring.kernels import tensors
         from truespring.kernels.threads import run
 
@@ -207,7 +210,7 @@ class NonlinearTensors(_Tensors):
         return float(energy.sum())
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         from truespring.kernels import tensors
         from truespring.kernels.threads import run
 
@@ -216,32 +219,33 @@ class NonlinearTensors(_Tensors):
         return self._pattern.vector(force)
 
     def _known(self, positions: Floats) -> tuple[Floats, Floats, ShortInts, Floats]:
-        """What kernels ask for: positions at present and at rest, the elements and their tensors."""
+        """Return arguments of kernels: current and undeformed positions, the elements and their tensors."""
         from truespring.kernels.threads import writable
 
         return writable(positions), writable(self.nodes), self._pattern.elements, self.tensors
 
     def stress(self, positions: Floats) -> Floats:
-        """The stress of the links, see BiquadraticSprings [N/m], shape (n_elements, links)."""
+        """Return the stress of the links as `BiquadraticSprings.stress` [N/m], shape (n_elements, links)."""
         return self.links.stress(positions)
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """That stress carried on linearly along `step` [m], in N/m, shape (n_elements, links)."""
+        """Return this stress extrapolated linearly along `step` [m], in N/m, shape (n_elements, links)."""
         return self.links.extrapolated_stress(positions, step)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
+        """Return the tangent stiffness [N/m]; `stress` [N/m] gives the geometric part, by default the current one."""
         return self.links.hessian(positions, stress)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The tangent without what compressed links add to its geometric part, positive semidefinite [N/m]."""
+        """Return the tangent without the geometric part of compressed links, positive semidefinite [N/m]."""
         return self.links.projected_hessian(positions)
 
 
 def _strain_of(gradients: Floats) -> Floats:
-    """E by z, axes (element, component, place in z), by the gradients of the further nodes, (element, node, direction).
+    """Return the derivative of the Green strain with respect to z, axes (element, component, entry of z).
 
-    E_ij = sum_a (w_ai g_aj + w_aj g_ai) / 2 + sum_ab w_a . w_b (g_ai g_bj + g_aj g_bi) / 4.
+    E_ij = sum_a (w_ai g_aj + w_aj g_ai) / 2 + sum_ab w_a . w_b (g_ai g_bj + g_aj g_bi) / 4. `gradients` of the shape
+    functions of all nodes but the first have axes (element, node, direction).
     """
     n, dim, _ = gradients.shape
     products = list(combinations_with_replacement(range(dim), 2))

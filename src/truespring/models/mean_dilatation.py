@@ -1,4 +1,4 @@
-"""Elements whose volume changes as a whole: they do not lock where the material is nearly incompressible."""
+"""Elements of mean dilatation, which do not lock for nearly incompressible materials."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from truespring.models.symmetric import contracted, identity, inverted, outer, s
 
 
 class _Exchange(NamedTuple):
-    """The exchange of the volume ratio at the Gauss points.
+    """The replacement of the volume ratio at the Gauss points.
 
     Attributes:
-        J: the true ratio, axes (element, point); 1 for a linear law.
-        theta: ln(Jm / J), Jm the mean of J over the element at rest; for a linear law the change of the trace.
-        scale: exp(2 theta / d), by which C is changed; 1 for a linear law, not a number in an inverted element.
+        J: volume ratio, axes (element, point); 1 for a linear law.
+        theta: ln(Jm / J), Jm the mean of J over the undeformed element; for a linear law the change of the trace.
+        scale: factor exp(2 theta / d) of C; 1 for a linear law, NaN in an inverted element.
         metric: C, axes (component, element, point); the identity for a linear law.
-        inverse: its inverse, which is the derivative of ln J by the strain.
+        inverse: inverse of `metric`, the derivative of ln J with respect to the strain.
     """
 
     J: Floats
@@ -28,13 +28,12 @@ class _Exchange(NamedTuple):
 
 
 class MeanDilatationPotential(FemPotential):
-    """Quadrilaterals and hexahedra whose volume ratio J is replaced at every point by the element's own.
+    """Quadrilaterals and hexahedra with the mean volume ratio of the element at every Gauss point.
 
-    The law is asked at (Jm / J)^(1/d) F with the mean Jm of J over the element at rest and d the
-    dimensions: the mean dilatation method of Nagtegaal, Parks and Rice (CMAME 4, 1974), at finite
-    strain that of Simo, Taylor and Pister (CMAME 51, 1985) with the pressure eliminated. For the
-    linear law it is the trace of the strain that is averaged (Hughes' B-bar). `stress` is what the
-    law answers there.
+    The law is evaluated at (Jm / J)^(1/d) F, Jm the mean of J over the undeformed element, d the dimension: the mean
+    dilatation method of Nagtegaal, Parks and Rice (CMAME 4, 1974), at finite strain of Simo, Taylor and Pister (CMAME
+    51, 1985) with the pressure eliminated. For the linear law the trace of the strain is averaged (B-bar method of
+    Hughes). `stress` is that of the law at this deformation gradient.
     """
 
     interpolation = "mean-dilatation"
@@ -53,40 +52,44 @@ class MeanDilatationPotential(FemPotential):
         return _Exchange(J, theta, np.where(valid, np.exp(2 * theta / dim), np.nan), metric, inverted(metric))
 
     def _strain(self, at: Points) -> Floats:
-        """What the law asks for, with the element's volume ratio; that at rest where an element is inverted."""
+        """Return C or the small strain with the mean volume ratio, undeformed in an inverted element."""
         exchange = self._exchange(at)
         if not self.law.finite:
             return super()._strain(at) + exchange.theta / self.mesh.dim * exchange.metric
         return np.where(np.isnan(exchange.scale), 1.0, exchange.scale) * exchange.metric
 
-    def _refused(self, at: Points) -> bool:
-        """Whether an element is inverted: its volume ratio has no logarithm."""
+    def _inverted(self, at: Points) -> bool:
+        """Return whether an element is inverted, so that ln J is undefined."""
         return self.law.finite and bool((determinant(at.F) <= 0).any())
 
     def _law_gradient(self, at: Points) -> Floats:
-        """The deformation gradient with the element's volume ratio."""
+        """Return the deformation gradient with the mean volume ratio, axes (i, j, element, point)."""
         return np.sqrt(self._exchange(at).scale) * at.F
 
     def _strain_change(self, at: Points, change: Floats) -> Floats:
-        """The change of the law's strain that is linear in one of F, axes (component, element, point)."""
+        """Return the linear change of the strain of the law for a change of F, axes (component, element, point)."""
         own, exchange = super()._strain_change(at, change), self._exchange(at)
         grown = contracted(exchange.inverse, own)  # of ln J
         theta = _mean(exchange.J * grown, at) / _mean(exchange.J, at) - grown
         return exchange.scale * (own + theta / self.mesh.dim * exchange.metric)
 
     def _working_stress(self, at: Points) -> Floats:
-        """S' + (g - p) C^-1: S' works at a constant theta, p on theta, and g is what ln Jm takes of ln J."""
+        """Return S' + (g - p) C^-1 [Pa], axes (component, element, point).
+
+        S' is the stress at constant theta, p the derivative of the energy with respect to theta, g its part that acts
+        on ln J through ln Jm.
+        """
         exchange = self._exchange(at)
         stress = exchange.scale * self._respond(at).stress
         pressure = contracted(stress, exchange.metric) / self.mesh.dim
         return stress + (_share(pressure, exchange, at) - pressure) * exchange.inverse
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
-        """Element matrices [N/m], the geometric part of `stress` or the law's own.
+        """Return element matrices [N/m] with the geometric part of `stress`, by default that of the law.
 
-        With S', p and g as above, m the derivative of ln Jm by the nodes and c half that of S' : C / d by the
-        true strain, theta being constant: what depends on a point's strain alone is the tangent of a law, and
-        what the mean couples adds y m^T + m y^T + b m m^T.
+        S', p and g are those of `_working_stress`, m is the derivative of ln Jm with respect to the nodes, c half the
+        derivative of S' : C / d with respect to the strain at constant theta. Terms of the strain at one point have
+        the form of the tangent of a law; the mean adds y m^T + m y^T + b m m^T.
         """
         exchange, response, dim = self._exchange(at), self._respond(at), self.mesh.dim
         metric, inverse = exchange.metric, exchange.inverse
@@ -115,10 +118,10 @@ class MeanDilatationPotential(FemPotential):
 
 
 def _mean(values: Floats, at: Points) -> Floats:
-    """The mean over each element at rest, axes (element, 1)."""
+    """Return the mean over each undeformed element, axes (element, 1)."""
     return np.asarray((values * at.volumes).sum(axis=1, keepdims=True) / at.volumes.sum(axis=1, keepdims=True))
 
 
 def _share(pressure: Floats, exchange: _Exchange, at: Points) -> Floats:
-    """What ln J at each point takes of the pressure's work on the mean ratio [Pa], axes (element, point)."""
+    """Return the share of each point in the pressure on the mean ratio [Pa], axes (element, point)."""
     return _mean(pressure, at) / _mean(exchange.J, at) * exchange.J

@@ -1,7 +1,7 @@
-"""Mechanisms of a network: ways in which nodes move without any spring changing its length.
+"""Mechanisms of a network: motions of nodes that change no length of a spring.
 
-Some stiffen as soon as their springs are pulled; those that no state of self-stress stiffens are refused (Pellegrino
-and Calladine, Int. J. Solids Structures 22, 1986).
+Mechanisms that a state of self-stress stiffens are allowed, others are errors (Pellegrino and Calladine, Int. J. Solids
+Structures 22, 1986).
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ from truespring.arrays import Bools, Floats
 from truespring.errors import ModelError
 from truespring.models.spring_data import PlainSprings
 
-# Singular values below this share of the largest are zero; larger networks than this are not looked at.
+# Singular values below this share of the largest are zero; networks with more degrees of freedom are not tested.
 _ZERO, _MOST = 1e-9, 1000
-# Nodes that move by this share of the most are named, at most so many of them.
+# Nodes that move at least this share of the largest motion are listed; the largest number of listed nodes.
 _NAMED, _SOME = 0.1, 6
 
 
-def refuse_mechanism(network: PlainSprings, held: Bools) -> None:
-    """Raise ModelError where nodes of a network at rest can move freely; `held` of shape (n_nodes, dim)."""
+def check_mechanism(network: PlainSprings, held: Bools) -> None:
+    """Raise ModelError if nodes of an undeformed network can move freely; `held` has shape (n_nodes, dim)."""
     n_nodes, dim = network.nodes.shape
     if max(n_nodes * dim, len(network.springs)) > _MOST:
         return
@@ -28,18 +28,18 @@ def refuse_mechanism(network: PlainSprings, held: Bools) -> None:
     nodes = np.flatnonzero(moved > _NAMED * moved.max())
     some = ", ".join(map(str, nodes[:_SOME])) + (", ..." if len(nodes) > _SOME else "")
     raise ModelError(
-        f"the network is a mechanism: node{'s' * (len(nodes) != 1)} {some} can move without any spring changing its "
-        "length, and no tension hinders it; add springs or supports"
+        f"the network is a mechanism: node{'s' * (len(nodes) != 1)} {some} can move without a change of length of any "
+        "spring, and no tension prevents it; add springs or supports"
     )
 
 
 def _loose_motion(network: PlainSprings, free: Bools) -> Floats | None:
-    """A motion that strains no spring and that no self-stress stiffens, shape (n_nodes, dim); None where none is."""
+    """Return a motion that strains no spring and that no self-stress stiffens, shape (n_nodes, dim), or None."""
     ends, carrying = network.springs, network.stiffness > 0
     along = network.nodes[ends[:, 1]] - network.nodes[ends[:, 0]]
     length = np.linalg.norm(along, axis=1)
     if np.abs(network.rest_length - length).max() > _ZERO * length.max() or not free.any():
-        return None  # springs pull already
+        return None  # springs are prestressed
     ends, along, length = ends[carrying], along[carrying], length[carrying]
     columns = np.flatnonzero(free.ravel())
     lengthening = np.zeros((len(ends), free.size)).reshape(len(ends), *free.shape)
@@ -53,7 +53,7 @@ def _loose_motion(network: PlainSprings, free: Bools) -> Floats | None:
     whole = np.zeros((free.size, motions.shape[1]))
     whole[columns] = motions
     apart = whole.reshape(*free.shape, -1)
-    apart = apart[ends[:, 1]] - apart[ends[:, 0]]  # of the ends of each spring in each motion
+    apart = apart[ends[:, 1]] - apart[ends[:, 0]]  # relative motion of the ends of each spring
     stiffened = [np.einsum("s,sia,sib->ab", stress / length, apart, apart) for stress in stresses.T]
     _, sizes, modes = np.linalg.svd(np.concatenate([np.zeros((1, motions.shape[1])), *stiffened]))
     sizes = np.append(sizes, np.zeros(len(modes) - len(sizes)))

@@ -1,4 +1,4 @@
-"""The energy of the change of the metric tensor on a regular grid: squares of products of finite differences."""
+"""The energy of the change of the metric tensor on a regular grid, by finite differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from truespring.assembly import Pattern
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-# Threads share the cells from so many on.
+# Smallest number of cells for which threads share the work.
 _SMALLEST_PIECE = 64
 
 
 class Component(NamedTuple):
-    """Where a cell has a component ij of the metric tensor: the corners from which differences along i and j lead."""
+    """A component ij of the metric tensor of a cell: the corners at which the differences along i and j start."""
 
     i: int
     j: int
@@ -26,9 +26,9 @@ class Component(NamedTuple):
 
 
 def components(dim: int) -> tuple[Component, ...]:
-    """Return the components of the metric tensor of a cell whose corners count x first, then y, then z.
+    """Return the components of the metric tensor of a cell; corners are numbered along x first, then y, then z.
 
-    G_ii lives on every edge along i, G_ij on every face along i and j, at its first corner.
+    G_ii is defined on every edge along i, G_ij on every face along i and j, at its first corner.
     """
     every = np.arange(2**dim)
     pairs = combinations_with_replacement(range(dim), 2)
@@ -37,14 +37,15 @@ def components(dim: int) -> tuple[Component, ...]:
 
 @dataclass(frozen=True, eq=False)
 class MetricPotential:
-    """Energy sum w (B . C - B0 . C0)^2 over the products of two differences B, C of the positions of a cell's corners.
+    """The energy sum w (B . C - B0 . C0)^2 over products of differences B, C of the corner positions of a cell.
 
-    With p = 2 w (B . C - B0 . C0): force p C at the end of B, p B at that of C, the opposite at their origin; Hessian
-    2 w dq dq^T and p times that of the product, which is constant.
+    With p = 2 w (B . C - B0 . C0): force p C at the end of B, p B at the end of C, the opposite at their common start;
+    Hessian 2 w dq dq^T plus p times the constant Hessian of the product q = B . C. Source: Terzopoulos, Platt, Barr and
+    Fleischer (SIGGRAPH 1987).
 
     Attributes:
         cells_by_corner: nodes of each cell, corners in the order of `components`, shape (n_cells, 4 or 8).
-        weights: [J/m^4], shape (n_cells, n_products), in the order of `components`.
+        weights: w [J/m^4], shape (n_cells, n_products), in the order of `components`.
     """
 
     problem: Problem
@@ -53,7 +54,7 @@ class MetricPotential:
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.problem.mesh.nodes
 
     @cached_property
@@ -62,25 +63,25 @@ class MetricPotential:
 
     @cached_property
     def _ends(self) -> Ints:
-        """The corners of each product of differences: where both lead from, and where each leads to."""
+        """Corners of each product of differences: common start and two ends, shape (n_products, 3)."""
         parts = components(self.nodes.shape[1])
         ends = [np.stack([one.corners, one.corners + 2**one.i, one.corners + 2**one.j], axis=1) for one in parts]
         return np.concatenate(ends)
 
     def _run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
-        """Run a kernel over all cells."""
+        """Run a kernel on all cells in parallel."""
         from truespring.kernels.threads import run
 
         run(kernel, len(self.weights), *arguments, self._pattern.zero, smallest=_SMALLEST_PIECE)
 
     @property
     def _place(self) -> tuple[ShortInts, Ints]:
-        """What kernels ask of the cells: their nodes, and the corners of the products."""
+        """Arguments of kernels: nodes of the cells, and corners of the products."""
         return self._pattern.elements, self._ends
 
     @cached_property
     def _at_rest(self) -> Floats:
-        """The products at rest [m^2], shape (n_cells, n_products)."""
+        """The undeformed products [m^2], shape (n_cells, n_products)."""
         return self._products(self.nodes)
 
     def _products(self, positions: Floats) -> Floats:
@@ -92,18 +93,18 @@ class MetricPotential:
         return found
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         return float(self._cell_energies(positions).sum())
 
     def _cell_energies(self, positions: Floats) -> Floats:
         return np.asarray((self.weights * (self._products(positions) - self._at_rest) ** 2).sum(axis=1))
 
     def stress(self, positions: Floats) -> Floats:
-        """The derivative p of the energy by each product of differences [N/m], shape (n_cells, n_products)."""
+        """Return the derivatives p of the energy with respect to the products [N/m], shape (n_cells, n_products)."""
         return 2 * self.weights * (self._products(positions) - self._at_rest)
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """The stress carried on linearly along `step` [m], in N/m, shape (n_cells, n_products)."""
+        """Return the stress extrapolated linearly along `step` [m], in N/m, shape (n_cells, n_products)."""
         from truespring.kernels import metric
         from truespring.kernels.threads import writable
 
@@ -112,7 +113,7 @@ class MetricPotential:
         return self.stress(positions) + 2 * self.weights * growth
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         from truespring.kernels import metric
         from truespring.kernels.threads import writable
 
@@ -121,12 +122,12 @@ class MetricPotential:
         return self._pattern.vector(force)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` [N/m] makes the geometric part, by default that of the positions."""
-        given = self.stress(positions) if stress is None else stress
-        return self._pattern.summed(lambda first, last: self._matrices(positions, given, first, last))
+        """Return the tangent stiffness [N/m]; `stress` [N/m] gives the geometric part, by default the current one."""
+        geometric = self.stress(positions) if stress is None else stress
+        return self._pattern.summed(lambda first, last: self._matrices(positions, geometric, first, last))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Sum of the Hessians of the cells, each with its negative eigenvalues cut off [N/m]."""
+        """Return the sum of the Hessians of the cells, each with its negative eigenvalues set to zero [N/m]."""
         stress = self.stress(positions)
 
         def positive(first: int, last: int) -> Floats:
@@ -136,7 +137,7 @@ class MetricPotential:
         return self._pattern.summed(positive)
 
     def _matrices(self, positions: Floats, stress: Floats, first: int, last: int) -> Floats:
-        """Tangent stiffness of a slice of the cells [N/m], shape (n, n_dof, n_dof), dofs corner by corner."""
+        """Return the tangent stiffness of a slice of the cells [N/m], shape (n, n_dof, n_dof), corner by corner."""
         from truespring.kernels import metric
         from truespring.kernels.threads import run, writable
 
@@ -149,9 +150,9 @@ class MetricPotential:
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The elements, shape (n_cells, corners)."""
+        """The elements by VTK name of their kind, shape (n_cells, corners)."""
         return self.problem.mesh.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Strain energy of each element [J]."""
+        """Return the strain energy of each element [J], shape (n_cells,)."""
         return {"strain_energy": self._cell_energies(positions)}

@@ -1,4 +1,4 @@
-"""A model: how matter is idealised, and what the rest of the code asks of it."""
+"""The base class of models."""
 
 from typing import Any
 
@@ -11,18 +11,18 @@ from truespring.problem import Problem
 
 
 class Model:
-    """How matter is idealised. A subclass gives `kind`, `label` and `potential`; the other answers have defaults.
+    """A model of a body, which makes the potential of a problem.
 
-    A class of the user's own need not derive from it: `solve` takes any object with a method `potential(problem)`,
-    and any potential. See `as_model`.
+    Subclasses define `kind`, `label` and `potential`; the rest has defaults. A user-defined class need not derive from
+    it: `solve` accepts any object with a method `potential(problem)`, and any potential. See `as_model`.
 
     Attributes:
-        kind: the kind of model in study files and summaries.
-        law: the name of the constitutive law, None for models without one.
-        has_springs: whether the potential is springs: drawn and exported as such.
-        any_mesh: whether the model can be solved on other meshes of the body, as refinement does.
-        solves: whether anything is solved; false for a solution that was read from a file.
-        lines: the name of the lines of the potential in pictures.
+        kind: kind of the model in study files and summaries.
+        law: name of the constitutive law; None for models without one.
+        has_springs: whether the potential consists of springs, which are drawn and exported.
+        any_mesh: whether the model can be solved on other meshes of the body, for refinement.
+        solves: whether the model is solved; false for a solution that is read from a file.
+        lines: name of the lines of the potential in figures.
     """
 
     kind: str = "potential"
@@ -34,62 +34,62 @@ class Model:
 
     @property
     def label(self) -> str:
-        """The name of the model in figures and tables."""
+        """Name in figures and tables."""
         return type(self).__name__
 
     @property
     def finite(self) -> bool:
-        """Whether strains are finite; false for a linear theory, whose loads act on the undeformed body."""
+        """Whether strains are finite; false for a linear theory, in which loads act on the undeformed body."""
         return True
 
     @property
     def element_is_open(self) -> bool:
-        """Whether the mesh decides on the interpolation: on triangles or tetrahedra it is of second order then."""
+        """Whether the mesh determines the interpolation, which is of second order on triangles or tetrahedra."""
         return False
 
     def potential(self, problem: Problem) -> Potential:
-        """Build the potential of the problem's body; raise ModelError where the model does not fit it."""
+        """Return the potential of a problem; raise ModelError if the model does not fit the problem."""
         raise NotImplementedError(f"{type(self).__name__} has no method potential(problem)")
 
     def check(self, problem: Problem) -> None:
-        """Raise ModelError where the model does not fit the problem; solve nothing."""
+        """Raise ModelError if the model does not fit the problem; nothing is solved."""
         self.potential(problem)
 
     def label_on(self, problem: Problem) -> str:
-        """Return the name of the model of this problem."""
+        """Return the name of the model for a problem in figures and tables."""
         return self.label
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved, in sentences."""
+        """Return warnings about the model for a problem, as sentences."""
         return ()
 
     def moduli(self, problem: Problem) -> Moduli | None:
-        """Return the effective moduli on the problem's mesh, all of it of its own material; None where not known."""
+        """Return the effective moduli on the mesh of a problem, all of it of its material; None if unknown."""
         return None
 
     def chosen_element(self, problem: Problem) -> str | None:
-        """Return the interpolation of finite elements on the problem's mesh, one of ELEMENTS; None of other models."""
+        """Return the interpolation of finite elements on the mesh, one of ELEMENTS; None for other models."""
         return None
 
     def second_order(self, problem: Problem) -> "Model | None":
-        """Return a model of elements of second order with the same limit under refinement; None where there is none."""
+        """Return a model with elements of second order and the same limit on fine meshes; None if there is none."""
         return None
 
 
 class BarePotential(Model):
-    """A potential that is solved as it is."""
+    """The model of a given potential."""
 
     def __init__(self, potential: Potential) -> None:
         self._potential = potential
 
     @property
     def label(self) -> str:
-        """The name of the potential's class."""
+        """Name of the class of the potential."""
         return type(self._potential).__name__
 
     @property
     def finite(self) -> bool:
-        """Whether strains are finite: false for finite elements of the linear law."""
+        """Whether strains are finite; false for finite elements of the linear law."""
         return not isinstance(self._potential, FiniteElements) or self._potential.law.finite
 
     def potential(self, problem: Problem) -> Potential:
@@ -97,19 +97,19 @@ class BarePotential(Model):
         return self._potential
 
     def chosen_element(self, problem: Problem) -> str | None:
-        """Return the interpolation of finite elements, None of other potentials."""
+        """Return the interpolation of finite elements, None for other potentials."""
         return self._potential.interpolation if isinstance(self._potential, FiniteElements) else None
 
 
-def as_model(given: Any) -> Model:
-    """Return a model, a potential or a user's object with a method `potential(problem)` as a Model.
+def as_model(model: Any) -> Model:
+    """Return a Model for a model, a potential or an object with a method `potential(problem)`.
 
     Raises ModelError for anything else.
     """
-    if isinstance(given, Model):
-        return given
-    if isinstance(given, Potential):
-        return BarePotential(given)
-    if not hasattr(given, "potential"):
-        raise ModelError(f"{given!r} is no model: give Springs(rule=...), Fem(law=...) or a SpringNetwork")
-    return completed(given, Model)
+    if isinstance(model, Model):
+        return model
+    if isinstance(model, Potential):
+        return BarePotential(model)
+    if not hasattr(model, "potential"):
+        raise ModelError(f"{model!r} is not a model: use Springs(rule=...), Fem(law=...) or a SpringNetwork")
+    return completed(model, Model)

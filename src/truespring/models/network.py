@@ -1,4 +1,4 @@
-"""The potential of nodes joined by linear springs."""
+"""Networks of linear springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_int
 from truespring.assembly import Pattern
 from truespring.errors import ModelError
 from truespring.mesh import Mesh
-from truespring.models.mechanism import refuse_mechanism
+from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
 from truespring.models.spring_data import SpringData
 from truespring.potential import SparseMatrix
@@ -20,16 +20,17 @@ from truespring.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class SpringNetwork(Model):
-    """Nodes joined by linear springs: the spring force of Lembryk and Ciszkiewicz, equation 3.
+    """Nodes joined by linear springs.
+
+    With stiffness k, length l, rest length L, and unit vector n from the first node to the second: energy
+    1/2 k (l - L)^2, tension k (l - L) (Lembryk and Ciszkiewicz, equation 3), Hessian block
+    k [(1 - L/l) (I - n n^T) + n n^T].
 
     Attributes:
-        nodes: reference positions [m], shape (n_nodes, dim).
+        nodes: undeformed positions [m], shape (n_nodes, dim).
         springs: node numbers, shape (n_springs, 2).
-        stiffness: [N/m], shape (n_springs,).
-        rest_length: [m], shape (n_springs,); empty, the default, takes the distances in the reference positions.
-
-    With length l, rest length L, unit vector n from the first node to the second:
-    energy 1/2 k (l - L)^2, tension k (l - L), Hessian block k [(1 - L/l) (I - n n^T) + n n^T].
+        stiffness: stiffness of each spring [N/m], shape (n_springs,).
+        rest_length: rest length of each spring [m], shape (n_springs,); empty, the default, for the undeformed lengths.
     """
 
     nodes: Floats
@@ -48,10 +49,10 @@ class SpringNetwork(Model):
             self._check_springs()
             n_springs = len(self.springs)
             set_field(self, "stiffness", frozen_floats(self.stiffness, (n_springs,), "stiffness"))
-            given = np.asarray(self.rest_length)
+            rest_length = np.asarray(self.rest_length)
             rest = (
-                given
-                if given.size
+                rest_length
+                if rest_length.size
                 else np.linalg.norm(self.nodes[self.springs[:, 1]] - self.nodes[self.springs[:, 0]], axis=1)
             )
             set_field(self, "rest_length", frozen_floats(rest, (n_springs,), "rest_length"))
@@ -61,11 +62,13 @@ class SpringNetwork(Model):
             raise ModelError(f"rest_length of spring {int((self.rest_length <= 0).argmax())} is not positive")
 
     def _check_springs(self) -> None:
+        """Raise ModelError if node numbers of springs are invalid."""
         if not len(self.springs):
-            raise ModelError("a network without springs carries nothing")
+            raise ModelError("a network must have springs")
         if self.springs.min() < 0 or self.springs.max() >= len(self.nodes):
             raise ModelError(
-                f"springs name nodes {self.springs.min()} to {self.springs.max()}, there are 0 to {len(self.nodes) - 1}"
+                f"springs have node numbers {self.springs.min()} to {self.springs.max()}, allowed are 0 to "
+                f"{len(self.nodes) - 1}"
             )
         loops = self.springs[:, 0] == self.springs[:, 1]
         if loops.any():
@@ -73,31 +76,31 @@ class SpringNetwork(Model):
 
     @property
     def label(self) -> str:
-        """The name of the springs in figures and tables."""
+        """Name in figures and tables."""
         return "springs"
 
     def potential(self, problem: Problem) -> "SpringNetwork":
-        """Return the network itself; raise ModelError where its nodes can move without any spring changing length."""
-        refuse_mechanism(self, problem.loading.held)
+        """Return the network; raise ModelError if it is a mechanism."""
+        check_mechanism(self, problem.loading.held)
         return self
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The network as a mesh of lines: what a Problem of a plain network takes."""
+        """The network as a mesh of lines, for a Problem."""
         return Mesh(self.nodes, self.springs, "line")
 
     def spring_data(self) -> SpringData:
-        """Return the springs as plain springs."""
+        """Return the springs as arrays."""
         names = ("springs", "stiffness", "rest_length")
         return SpringData(self, {name: getattr(self, name) for name in names})
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The springs as lines, shape (n_springs, 2)."""
+        """Springs as lines, shape (n_springs, 2)."""
         return {"line": self.springs}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring."""
+        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring, shape (n_springs,)."""
         tension = self.stress(positions)
         return {
             "tension": tension,
@@ -111,18 +114,18 @@ class SpringNetwork(Model):
         return Pattern(self.springs, *self.nodes.shape)
 
     def _run(self, kernel: Callable[..., Any], positions: Floats, *arguments: Any) -> list[Any]:
-        """Run a kernel over all springs."""
+        """Run a kernel on all springs in parallel."""
         from truespring.kernels.threads import run, writable
 
         return run(kernel, len(self.springs), writable(positions), *arguments, self._pattern.zero)
 
     @property
     def _law(self) -> tuple[ShortInts, Floats, Floats]:
-        """What kernels ask of the springs: their nodes, stiffness [N/m] and rest length [m]."""
+        """Arguments of kernels: nodes, stiffness [N/m] and rest length [m] of the springs."""
         return self._pattern.elements, self.stiffness, self.rest_length
 
     def lengths(self, positions: Floats) -> Floats:
-        """Length of each spring [m], shape (n_springs,)."""
+        """Return the length of each spring [m], shape (n_springs,)."""
         from truespring.kernels import springs
 
         length = np.empty(len(self.springs))
@@ -130,11 +133,11 @@ class SpringNetwork(Model):
         return length
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length, shape (n_springs,)."""
+        """Return length over rest length of each spring [-], shape (n_springs,)."""
         return self.lengths(positions) / self.rest_length
 
     def stress(self, positions: Floats) -> Floats:
-        """Tension [N], shape (n_springs,)."""
+        """Return the tension of each spring [N], shape (n_springs,)."""
         from truespring.kernels import springs
 
         tension = np.empty(len(self.springs))
@@ -142,7 +145,7 @@ class SpringNetwork(Model):
         return tension
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """Tension carried on linearly along `step` [m]: k (l - L + n . (d_j - d_i)) [N], shape (n_springs,)."""
+        """Return k (l - L + n . (d_j - d_i)), the tension extrapolated along `step` [m], in N, shape (n_springs,)."""
         from truespring.kernels import springs
         from truespring.kernels.threads import writable
 
@@ -151,13 +154,13 @@ class SpringNetwork(Model):
         return tension
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         from truespring.kernels import springs
 
         return float(sum(self._run(springs.energy, positions, *self._law)))
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         from truespring.kernels import springs
         from truespring.kernels.threads import run, writable
 
@@ -169,10 +172,11 @@ class SpringNetwork(Model):
         return force
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` are the tensions [N] of the geometric part, by default the true ones."""
+        """Return the tangent stiffness [N/m]; `stress` [N] gives the geometric part, by default that at `positions`."""
         return self._tangent(positions, self.stiffness, self.stress(positions) if stress is None else stress)
 
     def _tangent(self, positions: Floats, stiffness: Floats, tension: Floats) -> SparseMatrix:
+        """Return the matrix of springs with a stiffness [N/m] and a tension [N], both of shape (n_springs,)."""
         from truespring.kernels import springs
         from truespring.kernels.threads import run, writable
 
@@ -186,5 +190,8 @@ class SpringNetwork(Model):
         return pattern.matrix(values)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Each spring's Hessian with its negative eigenvalues cut off: compression bears no geometric part [N/m]."""
+        """Return the sum of the Hessians of springs without negative eigenvalues [N/m].
+
+        These are those of the geometric part of compressed springs.
+        """
         return self._tangent(positions, np.maximum(self.stiffness, 0.0), np.maximum(self.stress(positions), 0.0))

@@ -1,4 +1,4 @@
-"""The surface of a body in panels, and the points at which integrals over them are taken."""
+"""The panels of a surface, and quadrature points on them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,19 +8,20 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 
-# Points of the triangles from the middle of a panel to its edges: outward, where what is integrated is a polynomial on
-# flat panels, and along the edge.
+# Quadrature points in the triangles between the midpoint and the edges of a panel: in the outward direction, where the
+# integrand is a polynomial on flat panels, and along the edge.
 _OUTWARD, _AROUND = 4, 28
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Points of panels.
+    """Quadrature points on panels.
 
     Attributes:
-        places, normals: [m], and outward of unit size, shape (n_panels, points, dim).
-        shape: values of the functions of the corners, shape (n_panels, points, corners).
-        measures: the part of the length or area that each point stands for [m, m^2], shape (n_panels, points).
+        places: positions [m], shape (n_panels, points, dim).
+        normals: outward unit normals [-], shape (n_panels, points, dim).
+        shape: shape functions of the corners of the facet [-], shape (n_panels, points, corners).
+        measures: weights, the length [m] or area [m^2] of each point, shape (n_panels, points).
     """
 
     places: Floats
@@ -31,11 +32,11 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """A closed surface, every facet halved along its edges: two panels of a line, four of a triangle or quadrilateral.
+    """A closed surface, with two panels per line and four per triangle or quadrilateral.
 
     Attributes:
-        nodes: [m], shape (n_nodes, dim).
-        facets: their nodes, seen from outside anticlockwise, shape (n_facets, 2 to 4).
+        nodes: positions [m], shape (n_nodes, dim).
+        facets: node numbers, counterclockwise seen from outside, shape (n_facets, 2 to 4).
     """
 
     nodes: Floats
@@ -43,12 +44,12 @@ class Panels:
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Dimension, 2 or 3."""
         return int(self.nodes.shape[1])
 
     @cached_property
     def _pieces(self) -> Floats:
-        """Corners of the panels of a facet in its own coordinates, shape (panels, corners, dim - 1)."""
+        """Corners of the panels in the reference facet, shape (panels, corners, dim - 1)."""
         corners = self.facets.shape[1]
         if self.dim == 2:
             return np.array([[[0.0], [0.5]], [[0.5], [1.0]]])
@@ -61,7 +62,7 @@ class Panels:
 
     @cached_property
     def of(self) -> Ints:
-        """The facet of each panel, shape (n_panels,)."""
+        """Facet number of each panel, shape (n_panels,)."""
         return np.repeat(np.arange(len(self.facets)), len(self._pieces))
 
     @property
@@ -70,7 +71,7 @@ class Panels:
         return len(self.of)
 
     def _functions(self, at: Floats) -> tuple[Floats, Floats]:
-        """Functions of a facet's corners at its own coordinates, axes (..., corner), and their slopes, an axis more."""
+        """Return shape functions in the reference facet, axes (..., corner), and derivatives, (..., corner, axis)."""
         x, y = at[..., 0], at[..., -1]
         one, zero = np.ones_like(x), np.zeros_like(x)
         if self.dim == 2:
@@ -84,7 +85,7 @@ class Panels:
         return np.stack(values, axis=-1), np.stack([np.stack(pair, axis=-1) for pair in slopes], axis=-2)
 
     def _patch(self, at: Floats, weights: Floats) -> Patch:
-        """Points of every panel from those of a facet's pieces in its own coordinates, axes (piece, point, ...)."""
+        """Return points of every panel, from points and weights in the reference facet, axes (piece, point, ...)."""
         values, slopes = self._functions(at)
         corners = self.nodes[self.facets]
         places = np.einsum("pqa,fad->fpqd", values, corners)
@@ -104,7 +105,7 @@ class Panels:
         )
 
     def gauss(self, n: int) -> Patch:
-        """Return Gauss points of the panels, n a direction."""
+        """Return Gauss points of the panels, n per direction."""
         pieces = self._pieces
         x, w = _unit_gauss(n)
         if self.dim == 2:
@@ -121,7 +122,7 @@ class Panels:
         return self._patch(*_collapsed(first, second, last, s, t, both))
 
     def around_middles(self) -> Patch:
-        """Return points of the triangles from the middle of each panel to its edges, dense towards the middle."""
+        """Return points in the triangles from the midpoint of each panel to its edges, denser near the midpoint."""
         (x, w), (y, v) = _unit_gauss(_OUTWARD), _unit_gauss(_AROUND)
         s, t = (one.ravel() for one in np.meshgrid(x, y, indexing="ij"))
         both, pieces = np.outer(w, v).ravel(), self._pieces
@@ -133,13 +134,13 @@ class Panels:
 
     @cached_property
     def middles(self) -> Patch:
-        """The middle of each panel, one point."""
+        """The midpoint of each panel, as one point."""
         middle = self._pieces.mean(axis=1)[:, None]
         return self._patch(middle, np.ones(middle.shape[:2]))
 
     @cached_property
     def radii(self) -> Floats:
-        """The distance from the middle of each panel to the furthest of its corners [m], shape (n_panels,)."""
+        """Distance from the midpoint of each panel to its furthest corner [m], shape (n_panels,)."""
         corners = self._patch(self._pieces, np.ones(self._pieces.shape[:2])).places
         return np.asarray(np.linalg.norm(corners - self.middles.places, axis=2).max(axis=1))
 
@@ -154,6 +155,6 @@ def _determinant(first: Floats, second: Floats) -> Floats:
 
 
 def _collapsed(tip: Floats, one: Floats, other: Floats, s: Floats, t: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Points and weights of a square collapsed to a triangle: all of s = 0 is the tip (Duffy)."""
+    """Return points and weights of a square collapsed to a triangle, with s = 0 at the tip (Duffy 1982)."""
     at = tip + s[:, None] * (one - tip + t[:, None] * (other - one))
     return at, weights * s * _determinant(one - tip, other - tip)

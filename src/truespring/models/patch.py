@@ -1,4 +1,4 @@
-"""The patch test of springs: a free body under uniform stress, and how far from uniform its strain is."""
+"""The patch test of springs: the deviation from uniform strain of a free body under uniform stress."""
 
 import math
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ class Patch:
     """The result of a patch test.
 
     Attributes:
-        error: distance of the nodes from where a uniform strain has them, over its displacement (rms) [-].
-        outside: whether the body is a lattice, and forces are out of balance at its outer elements only.
+        error: root-mean-square deviation from the displacement of a uniform strain, over that displacement [-].
+        outside: whether the body is a lattice and forces are unbalanced only at its outer elements.
     """
 
     error: float
@@ -34,20 +34,20 @@ class Patch:
 
 @remembered
 def patch_test(problem: Problem, springs: SpringsByRule) -> Patch:
-    """Return the distance from a uniform strain of a free body under uniform stress, of the worst stress.
+    """Return the result of the patch test for the worst uniform stress.
 
-    The displacement is compared with that of the springs' effective moduli, without rigid motion. For springs that are
-    stable at rest; the error is infinite where no equilibrium is found.
+    The displacement is compared with that by the effective moduli of the springs, without rigid motion. The undeformed
+    springs must be stable; the error is infinite if no equilibrium is found.
     """
-    mesh, realised = problem.mesh, moduli(problem, springs)
+    mesh, effective = problem.mesh, moduli(problem, springs)
     material, section = require_body(problem)
     K = springs.potential(problem).hessian(mesh.nodes)
-    exact = fem_potential(problem, "linear").hessian(mesh.nodes)  # passes: its forces of a uniform strain are right
+    exact = fem_potential(problem, "linear").hessian(mesh.nodes)  # exact nodal forces of a uniform strain
     elasticity = hooke(*section.lame_within(material), mesh.dim)
     centred = mesh.nodes - mesh.nodes.mean(axis=0)
     strains = np.stack([uniform_strain(centred, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
-    expected = strains @ np.linalg.solve(realised.elasticity, elasticity)
-    definite = not realised.n_negative and not bool((springs.kappa(problem) < -1e-9 * material.young).any())
+    expected = strains @ np.linalg.solve(effective.elasticity, elasticity)
+    definite = not effective.n_negative and not bool((springs.kappa(problem) < -1e-9 * material.young).any())
     moved = relaxed(K, exact @ strains, mesh.nodes, pinned(mesh.nodes), definite)
     if moved is None:
         return Patch(math.inf, False)
@@ -57,11 +57,11 @@ def patch_test(problem: Problem, springs: SpringsByRule) -> Patch:
     worst = float((np.linalg.norm(apart, axis=0) / np.linalg.norm(expected, axis=0)).max())
     unbalanced = np.abs(K @ strains)
     balanced = unbalanced[np.repeat(_far_inside(mesh), mesh.dim)].max(initial=0.0) <= 1e-6 * unbalanced.max()
-    return Patch(worst, bool(realised.lattice and balanced))
+    return Patch(worst, bool(effective.lattice and balanced))
 
 
 def _far_inside(mesh: Mesh) -> Bools:
-    """Return which nodes belong only to elements without a node at the boundary, shape (n_nodes,)."""
+    """Return whether each node belongs only to elements without boundary nodes, shape (n_nodes,)."""
     outside, inside = np.zeros(mesh.n_nodes, dtype=bool), np.ones(mesh.n_nodes, dtype=bool)
     outside[mesh.boundary] = True
     inside[mesh.elements[outside[mesh.elements].any(axis=1)]] = False

@@ -6,7 +6,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import ModelError
-from truespring.models.mechanism import refuse_mechanism
+from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
 from truespring.models.network import SpringNetwork
 from truespring.models.volume import VolumeTerm
@@ -22,11 +22,11 @@ class PrescribedSprings(Model):
 
     Attributes:
         springs: node numbers, shape (n_springs, 2).
-        stiffness: [N/m], shape (n_springs,).
+        stiffness: stiffness of each spring [N/m], shape (n_springs,).
         kappa: modulus of the area or volume term of each element [Pa], shape (n_elements,); empty for none.
-        label: the name of the springs in figures and tables.
+        label: name in figures and tables.
 
-    Raises ModelError where shapes do not fit, or a spring names a node that the problem does not have.
+    Raises ModelError if shapes do not match, or if a node number is not in the mesh of the problem.
     """
 
     springs: Ints
@@ -50,12 +50,12 @@ class PrescribedSprings(Model):
         return f"PrescribedSprings({self.label}, {len(self.springs)} springs{volume})"
 
     def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
-        """Return the springs on the problem's mesh; raise ModelError where they leave nodes free to move."""
+        """Return the potential on the mesh of a problem; raise ModelError if the network is a mechanism."""
         network = SpringNetwork(problem.mesh.nodes, self.springs, self.stiffness)
         if not (self.stiffness > 0).any():
-            raise ModelError("no spring has a positive stiffness: these springs carry nothing")
+            raise ModelError("stiffness: at least one spring must have a positive stiffness")
         if not self.kappa.size:
-            refuse_mechanism(network, problem.loading.held)
+            check_mechanism(network, problem.loading.held)
             return network
         if len(self.kappa) != len(problem.mesh.elements):
             raise ModelError(f"kappa has {len(self.kappa)} values, the mesh has {len(problem.mesh.elements)} elements")

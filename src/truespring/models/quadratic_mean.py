@@ -1,4 +1,4 @@
-"""Elements of second order whose volume counts as a whole: for materials that are nearly incompressible."""
+"""Elements of second order with mean dilatation, for nearly incompressible materials."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,13 +15,14 @@ from truespring.models.symmetric import contracted, identity, inverted, outer, s
 
 
 class _Volume(NamedTuple):
-    """The part of lambda: a function of the mean v of the volume ratio or, of some laws, of the strain's trace.
+    """The part of lam in the energy: a function of the mean v of the trace of the strain, or of the volume ratio.
 
     Attributes:
-        energy, pressure, stiffness: lambda/2 v^2, or lambda/2 (ln v)^2, and its derivatives by v, axes (element, 1).
-        slope: the derivative of the point's own ratio or trace by the strain, axes (component, element, point).
-        second: makes that of `slope`, axes (component, component, element, point).
-        across: what the third direction has of it.
+        energy: lam/2 v^2, or lam/2 (ln v)^2 of the volume ratio [J/m^3], axes (element, 1).
+        pressure, stiffness: first and second derivative of `energy` with respect to v [Pa], axes (element, 1).
+        slope: derivative of the trace or ratio at a point with respect to the strain, axes (component, element, point).
+        second: returns the derivative of `slope`, axes (component, component, element, point).
+        across: derivative of the trace or ratio with respect to the strain of the third direction.
     """
 
     energy: Floats
@@ -33,11 +34,11 @@ class _Volume(NamedTuple):
 
 
 class QuadraticMeanPotential(QuadraticPotential):
-    """Elements of second order that take lambda's part of the law at the mean of each element, mu's at every point.
+    """Elements of second order with the part of lam at the mean of each element, the part of mu at every Gauss point.
 
-    An element has one volume ratio to keep instead of one at every Gauss point, so it does not lock as the Poisson's
-    ratio nears 1/2: selective integration (Malkus and Hughes, CMAME 15, 1978). What mu gives to a change of volume
-    stays at the points; at the mean too, the element would be too soft in bending.
+    An element has one incompressibility constraint instead of one at every Gauss point, so that it does not lock near
+    Poisson's ratio 1/2: selective integration (Malkus and Hughes, CMAME 15, 1978). With the volumetric part of mu at
+    the mean, too, the element would be too soft in bending.
     """
 
     interpolation = "quadratic-mean-dilatation"
@@ -81,13 +82,13 @@ class QuadraticMeanPotential(QuadraticPotential):
         return super()._stress_change(at, response, change) + volume.stiffness * grown * volume.slope
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
-        """Element matrices [N/m]: those of a law, and what the mean couples."""
+        """Return element matrices [N/m]: those of a law plus the coupling by the mean."""
         volume = self._volume(at)
-        along = self._forces(at, np.ascontiguousarray(volume.slope))  # the derivative of the mean, times the volume
+        along = self._forces(at, np.ascontiguousarray(volume.slope))  # derivative of the mean times the volume
         stiffness = (volume.stiffness / at.volumes.sum(axis=1, keepdims=True))[:, :, None]
         return np.asarray(super()._tangent(at, stress) + stiffness * along[:, :, None] * along[:, None])
 
 
 def _mean(values: Floats, at: Points) -> Floats:
-    """The mean over each element at rest, axes (element, 1)."""
+    """Return the mean over each undeformed element, axes (element, 1)."""
     return np.asarray((values * at.volumes).sum(axis=1, keepdims=True) / at.volumes.sum(axis=1, keepdims=True))

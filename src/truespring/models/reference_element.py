@@ -1,4 +1,4 @@
-"""The reference element of each kind: derivatives of its shape functions and weights at the Gauss points."""
+"""Reference elements: derivatives of the shape functions and weights at the Gauss points."""
 
 from typing import Any, NamedTuple
 
@@ -9,8 +9,8 @@ from skfem.quadrature import get_quadrature
 from truespring.arrays import Floats
 from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS
 
-# scikit-fem's element of each kind and its quadrature: the order, or for the constant strain of a triangle its one
-# point and weight. 2 Gauss points a direction integrate polynomials of third order.
+# Element of scikit-fem and its quadrature by kind: the order, or for the constant strain of simplices one point and its
+# weight. 2 Gauss points per direction are exact for polynomials of third order.
 _SKFEM: dict[str, tuple[Any, Any]] = {
     "triangle": (skfem.ElementTriP1, (np.full((2, 1), 1 / 3), np.array([0.5]))),
     "quadrilateral": (skfem.ElementQuad1, 3),
@@ -18,10 +18,10 @@ _SKFEM: dict[str, tuple[Any, Any]] = {
     "hexahedron": (skfem.ElementHex1, 3),
 }
 
-# Points and weights of kinds that scikit-fem lacks, or lacks a quadrature of, in the coordinates of CELL_SHAPES.
-# Wedges: three points of a triangle by two Gauss points along, as full as those of hexahedra. Pyramids: strain is the
-# same all along a line to the tip, since shape functions and places shrink alike towards it. So one point along it,
-# at the centre, with the integral of the shrinking (1 - z)^2, is exact, beside two Gauss points along x and y.
+# Points and weights of kinds without element or quadrature in scikit-fem, in the coordinates of CELL_SHAPES. Wedges:
+# three points of a triangle times two Gauss points, full integration as for hexahedra. Pyramids: the strain is constant
+# along lines to the tip, since shape functions and positions scale alike. One point along z, at the centre, with the
+# integral of (1 - z)^2 as weight is exact, times two Gauss points along x and y.
 _GAUSS = 1 / np.sqrt(3)
 _TRIANGLE = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 _QUADRATURE: dict[str, tuple[Floats, Floats]] = {
@@ -32,20 +32,20 @@ _QUADRATURE: dict[str, tuple[Floats, Floats]] = {
     ),
 }
 
-# scikit-fem counts the corners of a hexahedron in another order than VTK: its places of ours.
+# Corners of a hexahedron in the order of scikit-fem, which differs from that of VTK.
 _ORDER = {"hexahedron": np.array([7, 4, 1, 5, 6, 2, 0, 3])}
 
-#: The kinds that finite elements take.
+#: Kinds that finite elements support.
 FEM_KINDS = (*_SKFEM, *_QUADRATURE)
 
 
 class Reference(NamedTuple):
-    """What is known of every element of a kind, axes (point, node of the element, direction) and (point,).
+    """Reference element at the Gauss points.
 
     Attributes:
-        corner_slopes: derivatives of the functions that place the reference element in space.
-        slopes: derivatives of its shape functions.
-        weights: of the Gauss points.
+        corner_slopes: derivatives of the shape functions of the geometry [-], axes (point, corner, direction).
+        slopes: derivatives of the shape functions of the displacement [-], axes (point, node, direction).
+        weights: weights of the Gauss points [-], axes (point,).
     """
 
     corner_slopes: Floats
@@ -54,10 +54,10 @@ class Reference(NamedTuple):
 
 
 def reference_element(kind: str, element: Any = None, order: int | None = None) -> Reference:
-    """Return scikit-fem's reference element of a kind: of first order, or `element` with the quadrature of `order`.
+    """Return the reference element of a kind: of first order, or scikit-fem's `element` with quadrature of `order`.
 
-    Of pyramids it is the element of Bedrosian (IEEE Transactions on Magnetics 28, 1992), whose shape functions are
-    rational: a hexahedron with four corners made one.
+    Pyramids are those of Bedrosian (IEEE Transactions on Magnetics 28, 1992), with rational shape functions:
+    hexahedra with four corners collapsed to one.
     """
     if kind in _QUADRATURE:
         at, of_points = _QUADRATURE[kind]

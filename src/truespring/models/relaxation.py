@@ -1,4 +1,4 @@
-"""Linear equilibrium of springs near rest, for what is told of them before a solve."""
+"""Linear equilibrium of springs, for effective moduli and findings."""
 
 import numpy as np
 from scipy import linalg, sparse
@@ -16,20 +16,20 @@ from truespring.modes import rigid_body_modes
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
-# Unbalanced forces below this share of E h^(d-1) are rounding: a uniform strain is an equilibrium.
+# Unbalanced force below which a uniform strain is an equilibrium, relative to E h^(d-1): rounding.
 _BALANCED = 1e-8
 
-# To this relative residual displacements are found; their energies are exact to its square.
+# Relative residual of displacements; the relative error of energies is its square.
 _ACCURACY = 1e-6
 
 
 def relaxed_elasticity(
     problem: Problem, springs: SpringsByRule, stiffness: Floats, negative: bool
 ) -> tuple[Floats | None, float]:
-    """Return the elasticity of a body whose boundary is strained uniformly [Pa], and its patch score (see `Moduli`).
+    """Return the elasticity matrix under a uniform strain of the boundary [Pa], and the patch score (see `Moduli`).
 
-    None where nothing relaxes, whose score is 0, or where the body is not stable. `stiffness` is the part of each
-    element in its springs [N/m], shape (n_elements, links), `negative` whether there are negative springs.
+    The matrix is None if the score is 0, so that no node relaxes, or if the body is unstable. `stiffness` is the share
+    of each element in its springs [N/m], shape (n_elements, links); `negative` states whether springs are negative.
     """
     mesh = problem.mesh
     material, section = require_body(problem)
@@ -55,25 +55,25 @@ def relaxed_elasticity(
     if relaxing is None:
         return None, score
     moved = strains + relaxing
-    energy = moved.T @ (K @ moved)  # the least there is: errors of the displacement count by their square
+    energy = moved.T @ (K @ moved)  # at its minimum: of second order in errors of the displacement
     return np.asarray((energy + energy.T) / 2 / (section.thickness * mesh.measures.sum())), score
 
 
 def _unit_strains(mesh: Mesh) -> Floats:
-    """Displacements of unit uniform strains [m], a column each in Voigt's order, shape (n_dof, 3 or 6)."""
+    """Return the displacements of unit uniform strains [m], columns in Voigt's order, shape (n_dof, 3 or 6)."""
     return np.stack([uniform_strain(mesh.nodes, i, j).ravel() for i, j in voigt_pairs(mesh.dim)], axis=1)
 
 
 def _at_rest(problem: Problem, springs: SpringsByRule) -> SparseMatrix:
-    """The stiffness of the body at rest [N/m]."""
+    """Return the stiffness of the undeformed body [N/m]."""
     return springs.allowing_negative().potential(problem).hessian(problem.mesh.nodes)
 
 
 def _forces_by_form(mesh: Mesh, stiffness: Floats) -> Floats:
-    """Nodal forces of springs under unit uniform strains [N/m], shape (n_nodes, dim * strains), right at inner nodes.
+    """Return nodal forces of springs under unit uniform strains [N], shape (n_nodes, dim * strains).
 
-    What a form's first element does holds for all of its elements. A volume term of one modulus, which these
-    meshes have, does nothing at inner nodes: the volume of a body does not depend on them.
+    They are valid at inner nodes. Forces are computed for one element of each form. A volume term of one modulus
+    causes no forces at inner nodes, since the volume of the body does not depend on them.
     """
     forms, links = mesh.forms, np.array(mesh.kind.links)
     across = link_vectors(mesh, forms.first)
@@ -92,10 +92,10 @@ def _forces_by_form(mesh: Mesh, stiffness: Floats) -> Floats:
 
 
 def relaxed(matrix: SparseMatrix, right: Floats, nodes: Floats, held: Bools, definite: bool) -> Floats | None:
-    """Solve matrix x = right on the directions that are not held, columns of shape (n_dof, k); zero elsewhere.
+    """Solve matrix x = right for the free degrees of freedom and return x [m], shape (n_dof, k), zero elsewhere.
 
-    None where the matrix is not seen to be positive definite; one that is known to be `definite` need not be looked
-    at. `nodes` [m] and `held` have shape (n_nodes, dim).
+    Returns None if the matrix is not positive definite, which is not tested if `definite`. `nodes` [m] and `held` have
+    shape (n_nodes, dim).
     """
     try:
         tangent = choose("auto", nodes, held).ready(matrix, nodes)
@@ -108,9 +108,9 @@ def relaxed(matrix: SparseMatrix, right: Floats, nodes: Floats, held: Bools, def
 
 
 def pinned(nodes: Floats) -> Bools:
-    """Return directions that hold a body against rigid motion and no more, shape (n_nodes, dim).
+    """Return whether each degree of freedom is fixed to prevent rigid motion, shape (n_nodes, dim).
 
-    Without them no strain is hindered.
+    The constraints are statically determinate: they do not restrain strain.
     """
     upper, order = linalg.qr(rigid_body_modes(nodes).T, mode="r", pivoting=True)
     sizes = np.abs(np.diag(upper))

@@ -1,4 +1,4 @@
-"""Springs as other programs take them: what a potential of springs hands to the targets of export."""
+"""The springs of a potential as arrays, for export to other programs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,16 +7,16 @@ from typing import Any, Protocol, runtime_checkable
 from truespring.arrays import Floats, Ints
 from truespring.potential import Potential
 
-#: What springs may have beside springs: a modulus on each element's area or volume, or coupled lengths.
+#: Features beyond plain springs: a modulus for the area or volume of each element, or a coupling of lengths.
 VOLUME_TERM, COUPLING = "volume term", "coupling"
 
 
 class PlainSprings(Potential, Protocol):
-    """Springs and nothing else, as a SpringNetwork is."""
+    """A potential of plain springs, such as SpringNetwork."""
 
     @property
     def springs(self) -> Ints:
-        """The two nodes of each spring, shape (n_springs, 2)."""
+        """Node numbers of each spring, shape (n_springs, 2)."""
         ...
 
     @property
@@ -30,7 +30,7 @@ class PlainSprings(Potential, Protocol):
         ...
 
     def stretch(self, positions: Floats) -> Floats:
-        """Return length over rest length of each spring, shape (n_springs,)."""
+        """Return length over rest length of each spring [-], shape (n_springs,)."""
         ...
 
     def spring_data(self) -> "SpringData":
@@ -43,8 +43,8 @@ class SpringData:
     """The springs of a potential.
 
     Attributes:
-        network: the springs alone, without what `beyond` names; None where they do not exist without it.
-        arrays: all numbers by name, in SI units, with springs of shape (n_springs, 2); see docs/export/arrays.md.
+        network: the plain springs, without the feature `beyond`; None if they are not defined without it.
+        arrays: all arrays by name [SI], with springs of shape (n_springs, 2); see docs/export/arrays.md.
         beyond: VOLUME_TERM or COUPLING; empty for plain springs.
     """
 
@@ -58,5 +58,5 @@ class HasSprings(Protocol):
     """A potential that can be exported as springs."""
 
     def spring_data(self) -> SpringData:
-        """Return its springs."""
+        """Return the springs as arrays."""
         ...

@@ -1,4 +1,4 @@
-"""Elements of several kinds on the same nodes: what each kind stores, pulls and resists is added up."""
+"""Potentials of elements of several kinds on the same nodes, as a sum over the kinds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Part = TypeVar("Part", FemPotential, LinkedElements)
 
 
 class _Blocks(NamedTuple):
-    """The blocks of a sum of matrices: as of a BSR matrix, and the place of those of each part among them."""
+    """The blocks of a sum of BSR matrices, and the positions of the blocks of each part among them."""
 
     starts: ShortInts
     columns: ShortInts
@@ -30,11 +30,11 @@ class _Blocks(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Summed(Generic[Part]):
-    """Potentials on the nodes of one problem.
+    """The sum of potentials on the nodes of one problem.
 
     Attributes:
-        parts: one for each kind of element, in the order of `Problem.blocks`.
-        problem: of them together.
+        parts: a potential for each kind of element, in the order of `Problem.blocks`.
+        problem: the whole problem.
     """
 
     parts: tuple[Part, ...]
@@ -47,35 +47,35 @@ class _Summed(Generic[Part]):
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.problem.mesh.nodes
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]; infinite where one of a part is."""
+        """Return the stored energy [J]; infinite if that of a part is."""
         return sum(part.energy(positions) for part in self.parts)
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         return np.asarray(sum(part.gradient(positions) for part in self.parts))
 
     def stress(self, positions: Floats) -> Floats:
-        """What the parts call stress, one after the other, shape (n,)."""
+        """Return the stresses of the parts, one after the other, shape (n,)."""
         return np.concatenate([part.stress(positions).ravel() for part in self.parts])
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """What they carry on linearly along `step` [m], as `stress`."""
+        """Return the stresses extrapolated linearly along `step` [m], as `stress`."""
         return np.concatenate([part.extrapolated_stress(positions, step).ravel() for part in self.parts])
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
+        """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
         if stress is None:
             return self._sum([part.hessian(positions) for part in self.parts])
-        given = np.split(stress, np.cumsum([np.prod(shape) for shape in self._stress_shapes])[:-1])
-        pairs = zip(self.parts, given, self._stress_shapes, strict=True)
+        by_part = np.split(stress, np.cumsum([np.prod(shape) for shape in self._stress_shapes])[:-1])
+        pairs = zip(self.parts, by_part, self._stress_shapes, strict=True)
         return self._sum([part.hessian(positions, own.reshape(shape)) for part, own, shape in pairs])
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The sum of those of the parts, positive semidefinite [N/m]."""
+        """Return the sum of the projected Hessians of the parts, positive semidefinite [N/m]."""
         return self._sum([part.projected_hessian(positions) for part in self.parts])
 
     @cached_property
@@ -83,14 +83,15 @@ class _Summed(Generic[Part]):
         return tuple(part.stress(self.nodes).shape for part in self.parts)
 
     def _sum(self, matrices: Sequence[SparseMatrix]) -> SparseMatrix:
+        """Return the sum of the matrices of the parts."""
         blocks, dim = self._blocks(matrices), self.nodes.shape[1]
         values = np.zeros((len(blocks.columns), dim, dim))
         for matrix, places in zip(matrices, blocks.places, strict=True):
-            values[places] += matrix.data  # a matrix names each of its blocks once
+            values[places] += matrix.data  # each block occurs once in a matrix
         return sparse.bsr_array((values, blocks.columns, blocks.starts), shape=matrices[0].shape)
 
     def _blocks(self, matrices: Sequence[SparseMatrix]) -> _Blocks:
-        """The blocks of the sum, found at the first one: those of a part are always the same."""
+        """Return the blocks of the sum, computed once, since those of a part do not change."""
         if "_found" not in self.__dict__:
             n_nodes = len(self.nodes)
             rows = [np.repeat(np.arange(n_nodes), np.diff(one.indptr)) for one in matrices]
@@ -103,62 +104,62 @@ class _Summed(Generic[Part]):
         return found
 
     def _by_part(self, values: Callable[[Part], dict[str, Floats]]) -> dict[str, Floats]:
-        """Values on the cells of all parts, part after part."""
+        """Return values on the cells of all parts, part by part."""
         found = [values(part) for part in self.parts]
         return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
 
 
 def summed_links(problem: Problem, make: Callable[[Problem], LinkedElements]) -> "LinkedElements | SummedLinks":
-    """Return what `make` makes of a problem; of one of several kinds of elements the sum of what it makes of each."""
+    """Return the potential that `make` returns for a problem; for several kinds of elements, the sum over the kinds."""
     if len(problem.blocks) == 1:
         return make(problem)
     return SummedLinks(tuple(make(part) for _, part in problem.blocks), problem)
 
 
 class SummedElements(_Summed[FemPotential]):
-    """Finite elements of several kinds: where they meet face to face, their displacements do."""
+    """Finite elements of several kinds, conforming at common facets."""
 
     @property
     def law(self) -> Law:
-        """The law of all of them."""
+        """The law, the same for all parts."""
         return self.parts[0].law
 
     @property
     def interpolation(self) -> str:
-        """One of ELEMENTS, of all of them; triangles and tetrahedra have one strain either way."""
+        """The interpolation, one of ELEMENTS, the same for all parts; simplices have a uniform strain."""
         return self.parts[0].interpolation
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The elements by VTK's name of their kind, shape (n_elements, nodes)."""
+        """The elements by VTK name of their kind, shape (n_elements, nodes)."""
         return self.problem.mesh.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """True stress [Pa], 3 by 3 flattened, and strain energy [J] of each element, kind after kind."""
+        """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,), by kind."""
         return self._by_part(lambda part: part.cell_fields(positions))
 
 
 class SummedLinks(_Summed[Any]):
-    """Elements of several kinds that know their links' squared lengths."""
+    """Elements of several kinds whose energy is a function of the squared lengths of links."""
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints]:
-        """Each pair of nodes that a link joins once, and the pair of each line of each part."""
+        """Springs, each pair of nodes once, and the number of the spring of each line of the parts."""
         lines = np.sort(np.concatenate([part.springs for part in self.parts]), axis=1)
         springs, of = np.unique(lines, axis=0, return_inverse=True)
         return springs, of.ravel()
 
     @property
     def springs(self) -> Ints:
-        """Each pair of nodes that a link joins once, shape (n_springs, 2)."""
+        """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
         return self._shared[0]
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length of each element's links, kind after kind."""
+        """Return length over rest length of each element's links [-], kind by kind, shape (n,)."""
         return np.concatenate([part.stretch(positions) for part in self.parts])
 
     def spring_data(self) -> SpringData:
-        """Return the pairs of nodes, and of each kind of element the numbers, links and coupling [J/m^4]."""
+        """Return the springs and, for each kind of element, numbers, links and coupling [J/m^4], as arrays."""
         arrays: dict[str, Any] = {"springs": self.springs}
         for (numbers, block), part in zip(self.problem.mesh.blocks, self.parts, strict=True):
             own = part.spring_data().arrays
@@ -168,11 +169,11 @@ class SummedLinks(_Summed[Any]):
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The links as lines, shape (n_springs, 2)."""
+        """Links as lines, shape (n_springs, 2)."""
         return {"line": self.springs}
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension [N], stretch [-], stiffness at rest [N/m] and strain energy [J] of each link, over all elements."""
+        """Return tension [N], stretch [-], undeformed stiffness [N/m] and strain energy [J], shape (n_springs,)."""
         springs, of = self._shared
         fields = self._by_part(lambda part: part.cell_fields(positions))
         found = {name: np.bincount(of, values, len(springs)).astype(np.float64) for name, values in fields.items()}

@@ -1,4 +1,4 @@
-"""Symmetric tensors as their components in Voigt's order: that axis first, then those of elements and points."""
+"""Symmetric tensors as components in Voigt's order: the component axis first, then axes of elements and points."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from truespring.models.strain import voigt_pairs
 
 
 def voigt_places(dim: int) -> Ints:
-    """Return the component that stands for each pair of directions, shape (dim, dim)."""
+    """Return the number of the component of each pair of axes, shape (dim, dim)."""
     places = np.empty((dim, dim), dtype=np.int64)
     for place, (i, j) in enumerate(voigt_pairs(dim)):
         places[i, j] = places[j, i] = place
@@ -20,13 +20,13 @@ def dimensions(tensor: Floats) -> int:
 
 
 def identity(tensor: Floats) -> Floats:
-    """Return the identity that goes with a symmetric tensor, axes (component, 1, ...)."""
+    """Return the identity with as many axes as a symmetric tensor, axes (component, 1, ...)."""
     ones = np.arange(len(tensor)) < dimensions(tensor)
     return ones.astype(np.float64).reshape(-1, *[1] * (tensor.ndim - 1))
 
 
 def trace(tensor: Floats) -> Floats:
-    """Return the trace of a symmetric tensor."""
+    """Return the trace of a symmetric tensor, axes (...)."""
     return np.asarray(tensor[: dimensions(tensor)].sum(axis=0))
 
 
@@ -60,7 +60,7 @@ def dyad(a: Floats, b: Floats) -> Floats:
 
 
 def determinant(tensor: Floats) -> Floats:
-    """Return the determinant of a symmetric tensor."""
+    """Return the determinant of a symmetric tensor, axes (...)."""
     if len(tensor) == 3:
         xx, yy, xy = tensor
         return np.asarray(xx * yy - xy**2)
@@ -69,7 +69,7 @@ def determinant(tensor: Floats) -> Floats:
 
 
 def inverted(tensor: Floats) -> Floats:
-    """Return the inverse of a symmetric tensor; not finite where it has none, as of an element that has collapsed."""
+    """Return the inverse of a symmetric tensor, axes (component, ...); not finite if singular."""
     if len(tensor) == 3:
         xx, yy, xy = tensor
         return _ratio(np.stack([yy, xx, -xy]), determinant(tensor))

@@ -1,4 +1,4 @@
-"""Terzopoulos' deformable body: the change of the metric tensor, by finite differences on a regular grid."""
+"""The metric-tensor model of Terzopoulos et al., by finite differences on a regular grid."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,27 +16,27 @@ from truespring.models.rules import require_body
 from truespring.models.strain import voigt_pairs
 from truespring.problem import Problem
 
-#: How much a difference at the outside of the body counts: as any other, as in the paper, or by the trapezoidal rule.
+#: Weight of differences at the boundary of the body: that of inner ones, as in the paper, or by the trapezoidal rule.
 BOUNDARIES = ("paper", "trapezoid")
 
-# Places in a cell that differ by less than this share of its size are the same: well above rounding.
+# Largest distance of equal positions in a cell, relative to its size: well above rounding.
 _SAME_PLACE = 1e-6
-# A Poisson's ratio nearer to zero is worth no word.
+# Smallest Poisson's ratio for which a warning is issued.
 _SAME_POISSON = 0.01
 
 
 @dataclass(frozen=True)
 class Terzopoulos(Model):
-    """The metric-tensor model of Terzopoulos, Platt, Barr and Fleischer (SIGGRAPH 1987), of bodies on a regular grid.
+    """The metric-tensor model of Terzopoulos, Platt, Barr and Fleischer (SIGGRAPH 1987) on a regular grid.
 
-    Its energy is the integral of sum eta_ij (G_ij - G0_ij)^2, G_ij = dr/da_i . dr/da_j, by forward differences. With
-    one weight for each component of G the best for a material are eta_ii = E/8 and eta_ij = mu/4: Young's modulus
-    along the axes and the shear modulus are then the material's (in plane strain those of a test in the plane).
-    Poisson's ratio along the axes is 0 for any weights: the energy has no product of two strains.
+    The energy is the integral of sum eta_ij (G_ij - G0_ij)^2, G_ij = dr/da_i . dr/da_j, by forward differences. The
+    weights are eta_ii = E/8 and eta_ij = mu/4: Young's modulus along the axes and the shear modulus are then those of
+    the material (in plane strain, the apparent ones). Poisson's ratio along the axes is 0 for any weights, since the
+    energy has no product of two strains.
 
     Attributes:
-        boundary: "paper" gives every difference that exists the same weight, which makes a body n cells deep
-            (n + 1) / n times as stiff; "trapezoid" halves it at the outside, which is exact for a uniform strain.
+        boundary: "paper" gives all differences the same weight, which makes a body n cells deep (n + 1) / n times as
+            stiff; "trapezoid" halves the weight at the boundary, which is exact for a uniform strain.
     """
 
     boundary: str = "paper"
@@ -50,11 +50,11 @@ class Terzopoulos(Model):
 
     @property
     def label(self) -> str:
-        """How curves and tables call the model."""
+        """Name in figures and tables."""
         return f"Terzopoulos ({self.boundary} boundary)"
 
     def potential(self, problem: Problem) -> MetricPotential:
-        """Return the potential on the problem's mesh; raise ModelError where that is no regular grid along the axes."""
+        """Return the potential; raise ModelError if the mesh is not a regular grid along the axes."""
         cells, size = _grid(problem)
         return MetricPotential(problem, cells, np.concatenate(list(self._weights(problem, cells, size)), axis=1))
 
@@ -71,9 +71,9 @@ class Terzopoulos(Model):
             yield np.broadcast_to(here[:, None] * share, (len(cells), len(one.corners)))
 
     def elasticity(self, problem: Problem) -> Floats:
-        """Return what the body has under a uniform strain [Pa], in Voigt's order, shape (3, 3) or (6, 6).
+        """Return the elasticity matrix of the body under a uniform strain [Pa], in Voigt's order, (3, 3) or (6, 6).
 
-        C_ii = 8 eta_ii and C_ij,ij = 4 eta_ij on its diagonal, times what the boundary makes of them.
+        It is diagonal, C_ii = 8 eta_ii and C_ij,ij = 4 eta_ij, times the factors of the boundary.
         """
         cells, size = _grid(problem)
         _, section = require_body(problem)
@@ -86,10 +86,11 @@ class Terzopoulos(Model):
         return np.diag(diagonal / (len(cells) * float(np.prod(size)) * section.thickness))
 
     def warnings(self, problem: Problem) -> tuple[str, ...]:
-        """Return what should be known before the model is solved: what its weights and its boundary do not realise."""
+        """Return warnings about effective moduli that differ from the material, and about the boundary."""
         return (*self._poisson_warnings(problem), *self._boundary_warnings(problem))
 
     def _poisson_warnings(self, problem: Problem) -> Iterator[str]:
+        """Yield a warning for each material with another Poisson's ratio than zero."""
         _, section = require_body(problem)
         for material in problem.materials:
             young, poisson = section.apparent_moduli(material)
@@ -97,21 +98,22 @@ class Terzopoulos(Model):
                 continue
             double = 2 / young + 1 / section.lame_within(material).mu  # 4 / E at 45 degrees
             yield (
-                f"along the grid's axes Poisson's ratio is 0 where the material has {poisson:.4g}{section.within}, for "
-                "any weights of the metric tensor: its energy has no product of two strains. Young's modulus along the "
-                f"axes ({young:.6g} Pa) and the shear modulus are the material's; at 45 degrees these weights give "
-                f"{4 / double:.6g} Pa and {1 - 4 / young / double:.4g}"
+                f"along the axes of the grid Poisson's ratio is 0, that of the material is {poisson:.4g}"
+                f"{section.within}: the energy has no product of two strains. Young's modulus along the axes "
+                f"({young:.6g} Pa) and the shear modulus are those of the material; at 45 degrees Young's modulus is "
+                f"{4 / double:.6g} Pa and Poisson's ratio {1 - 4 / young / double:.4g}"
             )
 
     def _boundary_warnings(self, problem: Problem) -> Iterator[str]:
+        """Yield a warning about the stiffness that boundary = "paper" adds."""
         if self.boundary != "paper":
             return
         own, exact = (np.diag(one.elasticity(problem)) for one in (self, Terzopoulos("trapezoid")))
         factors = own / exact
         along = [f"{factors[axis]:.4g} along {AXES[axis]}" for axis in range(problem.mesh.dim)]
         yield (
-            'boundary = "paper" counts a difference at the outside of the body as one inside, which multiplies the '
-            "stiffness by (n + 1) / n for each direction across, n cells deep; against stretching: "
+            'boundary = "paper" gives differences at the boundary the weight of inner ones, which multiplies the '
+            "stiffness by (n + 1) / n for each transverse direction of n cells; in stretch: "
             f'{", ".join(along)}; boundary = "trapezoid" has no such factor'
         )
 
@@ -119,38 +121,38 @@ class Terzopoulos(Model):
 def _grid(problem: Problem) -> tuple[Ints, Floats]:
     """Return the nodes of each cell by corner and the size of a cell [m], shapes (n_cells, 2^dim) and (dim,).
 
-    Corners count x first, then y, then z. Raises ModelError where the mesh is no regular grid along the axes.
+    Corners are numbered along x first, then y, then z. Raises ModelError if the mesh is not a regular grid.
     """
     require_body(problem)
     mesh = problem.mesh
-    wants = 'kind = "terzopoulos" takes differences along the axes of a regular grid'
+    required = 'kind = "terzopoulos" requires a regular grid along the axes'
     other = "a model for any mesh, such as springs or fem"
     if mesh.element not in ("quadrilateral", "hexahedron"):
         raise ModelError(
-            f"{wants}; {mesh.element} elements have none: take rectangles or bricks of one size, or {other}"
+            f"{required}, the mesh has {mesh.element} elements: use rectangles or bricks of one size, or {other}"
         )
     at = mesh.nodes[mesh.elements]
     order = np.argsort((at > at.mean(axis=1, keepdims=True)) @ 2 ** np.arange(mesh.dim), axis=1)
     ordered = np.take_along_axis(at, order[:, :, None], axis=1)
     size = np.median(at.max(axis=1) - at.min(axis=1), axis=0)
-    wanted = np.array([corner[::-1] for corner in product((0.0, 1.0), repeat=mesh.dim)]) * size
-    off = np.abs(ordered - ordered[:, :1] - wanted).max(axis=(1, 2)) > _SAME_PLACE * size.min()
+    corners = np.array([corner[::-1] for corner in product((0.0, 1.0), repeat=mesh.dim)]) * size
+    off = np.abs(ordered - ordered[:, :1] - corners).max(axis=(1, 2)) > _SAME_PLACE * size.min()
     if off.any():
         first = int(off.argmax())
         place = ", ".join(f"{coordinate:.6g}" for coordinate in mesh.centres[first])
         cell = " x ".join(f"{length:.6g}" for length in size)
         raise ModelError(
-            f"{wants}: {int(off.sum())} of {len(off)} elements are no {'rectangle' if mesh.dim == 2 else 'brick'} "
-            f"along the axes, of the size {cell} m; the first is element {first} at ({place}) m; "
-            f"take a rectangle or a box, or {other}"
+            f"{required}: {int(off.sum())} of {len(off)} elements are not a "
+            f"{'rectangle' if mesh.dim == 2 else 'brick'} of {cell} m along the axes, the first is element {first} at "
+            f"({place}) m; use a rectangle or a box, or {other}"
         )
     return np.take_along_axis(mesh.elements, order, axis=1), size
 
 
 def _shares(cells: Ints, one: Component, n_nodes: int) -> Floats:
-    """One over the number of cells that have each product of differences in common, shape (n_cells, corners).
+    """Return 1 over the number of cells that share each product of differences [-], shape (n_cells, corners).
 
-    An edge is known by its two nodes, a face by the two at the far ends of its differences.
+    Edges are identified by their two nodes, faces by the two nodes at the ends of the differences.
     """
     start = one.corners if one.i == one.j else one.corners + 2**one.i
     keys = cells[:, start] * n_nodes + cells[:, one.corners + 2**one.j]

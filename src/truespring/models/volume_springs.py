@@ -1,4 +1,4 @@
-"""Springs with an area or volume term, with which an isotropic lattice has any Poisson's ratio from 0 on."""
+"""Springs with an area or volume term, which gives an isotropic lattice any Poisson's ratio from 0 to 0.5."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ from truespring.potential import SparseMatrix
 
 @dataclass(frozen=True, eq=False)
 class VolumeSprings:
-    """A spring network and the area or volume term on the same nodes."""
+    """The potential of a spring network and an area or volume term on the same nodes."""
 
     network: SpringNetwork
     term: VolumeTerm
 
     @property
     def nodes(self) -> Floats:
-        """Reference positions [m], shape (n_nodes, dim)."""
+        """Undeformed positions [m], shape (n_nodes, dim)."""
         return self.network.nodes
 
     @property
@@ -30,57 +30,57 @@ class VolumeSprings:
         return self.network.springs
 
     def energy(self, positions: Floats) -> float:
-        """Stored energy [J]."""
+        """Return the stored energy [J]."""
         return self.network.energy(positions) + float(self.term.element_energies(positions).sum())
 
     def stress(self, positions: Floats) -> Floats:
-        """Tension of the springs [N], then pressure of the elements [Pa], shape (n_springs + n_elements,)."""
+        """Return tensions of springs [N] and pressures of elements [Pa], shape (n_springs + n_elements,)."""
         return np.concatenate([self.network.stress(positions), self.term.pressure(positions)])
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """Tensions [N] and pressures [Pa] carried on linearly along `step` [m], shape (n_springs + n_elements,)."""
+        """Return the stress extrapolated linearly along `step` [m], as `stress`, shape (n_springs + n_elements,)."""
         tension = self.network.extrapolated_stress(positions, step)
         return np.concatenate([tension, self.term.extrapolated_pressure(positions, step)])
 
     def gradient(self, positions: Floats) -> Floats:
-        """Internal force [N], shape (n_nodes, dim)."""
+        """Return the internal force [N], shape (n_nodes, dim)."""
         return self.network.gradient(positions) + self.term.gradient(positions)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
-        """Tangent stiffness [N/m]; `stress` as `stress()` gives it makes the geometric part."""
-        given = self.stress(positions) if stress is None else stress
-        tension, pressure = np.split(given, [len(self.springs)])
+        """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
+        stress = self.stress(positions) if stress is None else stress
+        tension, pressure = np.split(stress, [len(self.springs)])
         matrix = self._checked(self.network.hessian(positions, tension))
         self.term.add_hessian(positions, pressure, matrix.data)
         return matrix
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """The projected springs, and of the term what is positive semidefinite [N/m]."""
+        """Return the projected Hessian of the springs plus the positive semidefinite part of the term [N/m]."""
         matrix = self._checked(self.network.projected_hessian(positions))
         self.term.add_projected_hessian(positions, matrix.data)
         return matrix
 
     def _checked(self, matrix: SparseMatrix) -> SparseMatrix:
-        """Return the network's matrix, to whose values those of the term are then added: it has the same blocks."""
+        """Return the matrix of the network; raise ModelError unless its blocks are those of the volume term."""
         pattern = self.term.pattern
         if not (np.array_equal(matrix.indptr, pattern.starts) and np.array_equal(matrix.indices, pattern.columns)):
-            raise ModelError("the springs do not join the very nodes that share an element of the volume term")
+            raise ModelError("the springs must join all nodes that share an element of the volume term, and no others")
         return matrix
 
     def stretch(self, positions: Floats) -> Floats:
-        """Length over rest length of the springs, shape (n_springs,)."""
+        """Return length over rest length of the springs [-], shape (n_springs,)."""
         return self.network.stretch(positions)
 
     def spring_data(self) -> SpringData:
-        """Return the springs, and kappa of the area or volume term [Pa], shape (n_elements,)."""
+        """Return the springs and `kappa`, the modulus of the volume term [Pa], shape (n_elements,), as arrays."""
         plain = self.network.spring_data()
         return SpringData(self.network, {**plain.arrays, "kappa": self.term.kappa}, VOLUME_TERM)
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The springs as lines, shape (n_springs, 2)."""
+        """Springs as lines, shape (n_springs, 2)."""
         return self.network.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Tension, stretch, stiffness and strain energy of each spring, without the volume term."""
+        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring, without the term."""
         return self.network.cell_fields(positions)

@@ -1,4 +1,4 @@
-"""The paper's Table 1 with numbers: six methods, one body, one solver."""
+"""Table 1 of Lembryk and Ciszkiewicz, measured: six methods, one body, one solver."""
 
 from truespring.table1.page import page as page
 from truespring.table1.run import measure_table as measure_table

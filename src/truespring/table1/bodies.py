@@ -1,4 +1,4 @@
-"""The one body of the table: a cantilever four times as long as deep, under a dead load across its end."""
+"""The body of the table: a cantilever four times as long as deep, with a transverse dead load at its end."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -17,44 +17,44 @@ from truespring.solvers import Newton
 
 LENGTH, DEPTH, YOUNG = 4.0, 1.0, 1.0
 
-#: End loads over E times the area of the section: in the linear range, at a deflection of about half the length, and
-#: the largest that paths are followed to.
+#: End loads over E A, A the area of the section: in the linear range, for a deflection of about half the length, and
+#: the largest load.
 SMALL, LARGE, LARGEST = 1e-4, 0.0107, 0.06
 
-#: The Poisson's ratio that springs have by themselves, by dimension.
+#: Poisson's ratio of an isotropic lattice of plain springs, by dimension.
 POISSON = {2: 1 / 3, 3: 1 / 4}
 
-# Levels of the path to the largest load.
+# Load levels up to the largest load.
 _LEVELS = 28
 
 
 @dataclass(frozen=True)
 class Size:
-    """How finely the body is divided: so many elements deep (and wide), four times as many long."""
+    """Mesh size: number of elements through the depth (and width); the length has four times as many."""
 
     dim: int
     depth: int
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Elements along the axes."""
+        """Number of elements along each axis."""
         return (4 * self.depth, *[self.depth] * (self.dim - 1))
 
     @property
     def words(self) -> str:
-        """The elements along the axes as they are written."""
+        """Number of elements along each axis, as text."""
         return " x ".join(map(str, self.counts))
 
 
 def grid(extents: tuple[float, ...], counts: tuple[int, ...], element: str) -> Mesh:
-    """Return a rectangle or a box; triangles with alternating diagonals, which favour no direction."""
+    """Return the mesh of a rectangle or box; triangles have alternating diagonals, to avoid a preferred direction."""
     if len(extents) == 3:
         return box(extents, counts, element)
     return rectangle(extents, counts, element, "alternating" if element == "triangle" else "right")
 
 
 def cantilever(size: Size, element: str, load: float, poisson: float | None = None) -> Problem:
-    """Return the body under an end load of `load` E A across its end, by elements of a kind."""
+    """Return the body with an end load of `load` times E A, A the area of the section, on elements of a kind."""
     dim, extents = size.dim, (LENGTH, *[DEPTH] * (size.dim - 1))
     return Problem(
         grid(extents, size.counts, element),
@@ -66,7 +66,7 @@ def cantilever(size: Size, element: str, load: float, poisson: float | None = No
 
 
 def end_displacement(path: Solution, state: State) -> Floats:
-    """Return the displacement of the end that does work with the load [m], shape (dim,): a mean with its weights."""
+    """Return the mean displacement of the end, weighted as the load [m], shape (dim,)."""
     potential = path.potential
     refined = isinstance(potential, Refined)
     loading = potential.loading if isinstance(potential, Refined) else path.problem.loading
@@ -78,10 +78,10 @@ def end_displacement(path: Solution, state: State) -> Floats:
 
 @cache
 def reference(dim: int, large: bool) -> Solution:
-    """Return the path of finite elements of second order that all are measured against.
+    """Return the solution of the reference, finite elements of second order.
 
-    Linear at the small load; neo-Hookean up to the largest load. Of as many nodes as 256 x 64 elements in the plane,
-    32 x 8 x 8 in space.
+    The law is linear for the small load, neo-Hookean up to the largest load. The mesh has as many nodes as 256 x 64
+    elements in 2D, 32 x 8 x 8 in 3D.
     """
     size = Size(dim, 32 if dim == 2 else 4)
     element = "triangle" if dim == 2 else "tetrahedron"
@@ -91,5 +91,5 @@ def reference(dim: int, large: bool) -> Solution:
 
 
 def followed() -> Newton:
-    """Return the solver that follows a path through the levels of the reference."""
+    """Return the solver with the load levels of the reference."""
     return Newton(load_steps=_LEVELS, max_cutbacks=3)

@@ -1,4 +1,4 @@
-"""Who is in the table: the six methods of the paper, each by the models that carry its name."""
+"""The entries of the table: the models of the six methods."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from truespring.mesh import Box
 from truespring.models import BemSprings, Fem, Heml, MassTensor, Model, Springs, Terzopoulos
 from truespring.table1.bodies import DEPTH, LENGTH
 
-#: The printed table of Lembryk and Ciszkiewicz: methods, criteria, and their signs.
+#: The printed table of Lembryk and Ciszkiewicz: methods, criteria and signs.
 METHODS = ("FEM", "Terzopoulos", "MSM", "HEML", "BEM + MSM", "mass-tensor")
 CRITERIA = ("computational speed", "material properties", "results accuracy", "large deflection")
 PRINTED = {
@@ -24,11 +24,11 @@ class Entry:
 
     Attributes:
         method: one of METHODS.
-        name: what tells it from others of its method.
-        dims: the dimensions it is measured in.
-        model: from the dimension and Poisson's ratio to the model.
-        simplices: whether its elements are triangles and tetrahedra, else quadrilaterals and hexahedra.
-        chief: whether it stands for its method beside the printed sign.
+        name: name among the entries of the method.
+        dims: dimensions in which it is measured.
+        model: returns the model for a dimension and a Poisson's ratio.
+        simplices: whether the elements are triangles and tetrahedra, else quadrilaterals and hexahedra.
+        chief: whether its sign is compared with the printed sign of the method.
     """
 
     method: str
@@ -39,20 +39,20 @@ class Entry:
     chief: bool = False
 
     def element(self, dim: int) -> str:
-        """Return the kind of its elements."""
+        """Return the kind of elements."""
         if self.simplices:
             return "triangle" if dim == 2 else "tetrahedron"
         return "quadrilateral" if dim == 2 else "hexahedron"
 
 
 def _half(dim: int) -> Box:
-    """The half of the body at its root, which the boundary elements take."""
+    """Return the clamped half of the body, the block of boundary elements."""
     far = (LENGTH / 2, *[DEPTH] * (dim - 1))
     return Box(tuple(-1.0 for _ in far), tuple(value + (0.0 if axis == 0 else 1.0) for axis, value in enumerate(far)))
 
 
 def _lloyd(dim: int) -> Springs:
-    """Lloyd's springs: on squares 5/16 and 7/16; on cubes, where they gave none, the same least-squares fit."""
+    """Return Lloyd's springs: 5/16 and 7/16 on squares; on cubes, which they did not treat, the least-squares fit."""
     return Springs(rule="lloyd") if dim == 2 else Springs(rule="least-squares")
 
 

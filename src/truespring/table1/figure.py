@@ -1,4 +1,4 @@
-"""The picture of the table: four measures, a bar for each entry."""
+"""The figure of the table: four measures, a bar for each entry."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,10 +12,11 @@ from truespring.report.style import BLUE, INK, figure_style
 from truespring.report.words import draw_words, text_width
 from truespring.table1.signs import Row
 
-# Sizes [inch]: a row, a panel and the gap beside it, the head, the margin.
+# Sizes [inch]: height of a row, width of a panel, gap between panels, height of the head, margin.
 _ROW, _PANEL, _GAP, _HEAD, _MARGIN = 0.21, 1.35, 0.75, 0.55, 0.12
 
-# What a panel shows: its title, the value of a row (None where there is none), its share of the panel, its words.
+# A panel: title, and functions that return the value of a row or None, the length of the bar as a share of the panel,
+# and the text.
 _Panel = tuple[str, Callable[[Row], float | None], Callable[[float], float], Callable[[float], str]]
 
 

@@ -1,4 +1,4 @@
-"""What is measured of an entry: speed, material, accuracy, large deflection."""
+"""The measures of an entry: speed, material properties, accuracy, large deflection."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -28,25 +28,25 @@ from truespring.table1.bodies import (
 )
 from truespring.table1.entries import Entry
 
-#: Poisson's ratios at which the realised material is asked for.
+#: Poisson's ratios at which effective moduli are measured.
 RATIOS = (0.0, 0.1, 0.2, 0.25, 0.3, 1 / 3, 0.4, 0.45)
 
-#: Elements through the depth that are tried for an error of 1 %.
+#: Numbers of elements through the depth in the search for an error of 1 %.
 DEPTHS = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 _ONE_PERCENT, _FIVE_PERCENT = 0.01, 0.05
 
 _LOAD_STEPS = (1, 4, 16)
 
-# How often a solve is timed, and for how long a force evaluation [s].
+# Number of timed solves; shortest time for which force evaluations are repeated [s].
 _TIMES, _AT_LEAST = 3, 0.2
 
 
 def speed(entry: Entry, size: Size) -> dict[str, float | int | None]:
-    """Time a cold equilibrium at about half the length of deflection, and a force evaluation there [ms].
+    """Return the times of a solve at a deflection of about half the length, and of a force evaluation there [ms].
 
-    `solve_ms` is from the built mesh to the equilibrium, the best of three, in as few load steps (1, 4 or 16) as lead
-    to a stable one; `setup_ms` of that is what it takes to build the potential. None where none of them does.
+    `solve_ms` is the best of three, from the mesh to the equilibrium, in the fewest load steps (1, 4 or 16) that give
+    a stable equilibrium; `setup_ms` is the part of it that builds the potential. None if no steps do.
     """
     problem = cantilever(size, entry.element(size.dim), LARGE)
     model = entry.model(size.dim, POISSON[size.dim])
@@ -73,7 +73,7 @@ def _timed(work: Callable[[], object]) -> float:
 
 
 def _repeated(work: Callable[[], object]) -> float:
-    """The shortest time of many [s]."""
+    """Return the shortest time of repeated runs [s]."""
     times: list[float] = []
     ends = time.perf_counter() + _AT_LEAST
     while time.perf_counter() < ends or len(times) < _TIMES:
@@ -82,16 +82,16 @@ def _repeated(work: Callable[[], object]) -> float:
 
 
 def material(entry: Entry, dim: int) -> dict[str, object]:
-    """Tell how far the moduli of a block of eight (in space four) elements along each axis are from the material's.
+    """Return the error of the effective moduli of a block of eight (in 3D four) elements along each axis [-].
 
-    The relative Frobenius norm of the difference of the elasticity matrices, in Mandel's form, at each Poisson's
-    ratio; from the energy of uniform strains.
+    This is the relative Frobenius norm of the difference of the elasticity matrices, in Mandel's notation, at each
+    Poisson's ratio; the matrix is computed from the energy of uniform strains. None if the model is not available.
     """
     errors: dict[float, float | None] = {}
     for ratio in RATIOS:
         try:
             errors[ratio] = _moduli_error(entry, dim, ratio)
-        except ModelError:  # a volume term reaches only so far
+        except ModelError:  # such as a ratio that a volume term does not support
             errors[ratio] = None
     return {"moduli_errors": [{"poisson": ratio, "error": error} for ratio, error in errors.items()]}
 
@@ -113,7 +113,7 @@ def _moduli_error(entry: Entry, dim: int, ratio: float) -> float:
 
 
 def _block(entry: Entry, dim: int, ratio: float) -> Problem:
-    """A block that reaches over the same lengths as the body, so that a part of it can be boundary elements."""
+    """Return a block of the same length as the body, so that the same part can be boundary elements."""
     whole = cantilever(Size(dim, 4 if dim == 2 else 2), entry.element(dim), SMALL, ratio)
     counts = (8, 8) if dim == 2 else (4, 4, 4)
     extents = (4.0, 4.0, 4.0)[:dim]
@@ -123,7 +123,7 @@ def _block(entry: Entry, dim: int, ratio: float) -> Problem:
 
 
 def _strains(dim: int) -> Iterator[Floats]:
-    """Uniform strains in Mandel's order, each of size 1: normal ones, then shear."""
+    """Yield displacement gradients of unit strains in Mandel's order, normal, then shear, shape (dim, dim)."""
     for axis in range(dim):
         strain = np.zeros((dim, dim))
         strain[axis, axis] = 1.0
@@ -136,12 +136,12 @@ def _strains(dim: int) -> Iterator[Floats]:
 
 
 def accuracy(entry: Entry, coarse: Size, fine: Size) -> dict[str, float | None]:
-    """Return the relative nodal error at a small load, on a coarse mesh, and on a fine one: what is left there."""
+    """Return the relative root-mean-square nodal error at a small load, on a coarse and on a fine mesh [-]."""
     return {"small_error": _small(entry, coarse)[0], "small_limit": _small(entry, fine)[0]}
 
 
 def _small(entry: Entry, size: Size) -> tuple[float | None, float, float]:
-    """The rms error at the small load, that of the end, and what the solve took [ms]."""
+    """Return the root-mean-square error at the small load [-], that of the end [-], and the time of the solve [ms]."""
     problem = cantilever(size, entry.element(size.dim), SMALL)
     path = solve(problem, entry.model(size.dim, POISSON[size.dim]), Newton(load_steps=1))
     wanted = reference(size.dim, large=False)
@@ -153,7 +153,7 @@ def _small(entry: Entry, size: Size) -> tuple[float | None, float, float]:
 
 
 def to_one_percent(entry: Entry, dim: int = 2) -> dict[str, float | int | None]:
-    """Return the coarsest mesh from which on the end is within 1 % at a small load, and the time of its solve [ms]."""
+    """Return the coarsest mesh from which on the error of the end is below 1 % at a small load, and its time [ms]."""
     tried = [(depth, *_small(entry, Size(dim, depth))[1:]) for depth in DEPTHS]
     enough = None
     for depth, error, milliseconds in reversed(tried):
@@ -169,8 +169,8 @@ def to_one_percent(entry: Entry, dim: int = 2) -> dict[str, float | int | None]:
 def reach(entry: Entry, size: Size) -> dict[str, float | str]:
     """Return the largest deflection over length up to which the end is within 5 % of converged neo-Hookean FEM.
 
-    Contiguous from a small load, through stable states, and interpolated where the error passes 5 %; `ended_by` tells
-    what ended it.
+    All states from a small load on are stable; the deflection is interpolated where the error reaches 5 %. `ended_by`
+    states the reason why it ends there.
     """
     small = solve(
         cantilever(size, entry.element(size.dim), SMALL), entry.model(size.dim, POISSON[size.dim]), followed()
@@ -182,13 +182,13 @@ def reach(entry: Entry, size: Size) -> dict[str, float | str]:
     pairs = [(small.at(1.0), at_small, at_small.states[-1], small)]
     pairs += [(path.at(state.load_factor), at_large, state, path) for state in at_large.states[1:]]
     last, error = 0.0, 0.0
-    for count, (mine, wanted, state, found) in enumerate(pairs):
+    for count, (mine, exact, state, found) in enumerate(pairs):
         if mine is None or mine.negative_eigenvalues or mine.area_ratio <= 0:
             ended = "no stable state" if mine is None or mine.negative_eigenvalues else "an inverted element"
             break
-        given = end_displacement(wanted, state)
-        before, error = error, float(np.linalg.norm(end_displacement(found, mine) - given) / np.linalg.norm(given))
-        here = float(given[1]) / LENGTH
+        end = end_displacement(exact, state)
+        before, error = error, float(np.linalg.norm(end_displacement(found, mine) - end) / np.linalg.norm(end))
+        here = float(end[1]) / LENGTH
         if error >= _FIVE_PERCENT:
             if count:
                 last += (here - last) * (_FIVE_PERCENT - before) / (error - before)

@@ -1,4 +1,4 @@
-"""docs/table1.md: the measured table beside the printed one, and a sentence wherever they differ."""
+"""docs/table1.md: the measured and the printed table, and a sentence for each difference."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from truespring.table1.signs import IF, MEANING, Row, contradictions, sign
 
 
 def page(table: Mapping[str, Any], figures: Mapping[int, str]) -> str:
-    """Return the page of a measured table as Markdown; `figures` are the places of its pictures, by dimension."""
+    """Return the page of a measured table as Markdown; `figures` are the paths of figures by dimension."""
     return "\n".join(_lines(table, figures)) + "\n"
 
 
@@ -21,33 +21,33 @@ def _lines(table: Mapping[str, Any], figures: Mapping[int, str]) -> Iterator[str
     yield "# Table 1 of Lembryk and Ciszkiewicz, measured"
     yield ""
     yield (
-        "Their table judges six methods by signs. Here every method solves the same body by the same solver, and each "
-        "sign has a number. `truespring table1` wrote this page: a cantilever four times as long as deep, under a dead "
-        "load across its end, Poisson's ratio 1/3 in the plane (plane stress) and 1/4 in space, beside finite elements "
-        "of second order."
+        "The published table rates six methods by signs. Here, all methods solve the same problem with the same "
+        "solver, and each sign follows from a measured value. The body is a cantilever four times as long as deep, "
+        "with a transverse dead load at its end; Poisson's ratio is 1/3 in 2D (plane stress) and 1/4 in 3D. The "
+        "reference is finite elements of second order. This page is written by `truespring table1`."
     )
     yield ""
     for dim in sorted({row["dim"] for row in rows}):
         yield from _of_dim(rows, dim, figures[dim])
-    yield "## What was measured"
+    yield "## Measures"
     yield ""
     yield from _definitions(table)
     yield ""
     yield (
         f"Measured {table['measured']} in {table['seconds'] / 60:.0f} minutes on {machine['cores']} cores of "
         f"{machine['processor']}, truespring {table['truespring']}, Python {machine['python']}, "
-        f"NumPy {machine['numpy']}, SciPy {machine['scipy']}, Numba {machine['numba']}. What was read of each "
-        "method's papers, and what was not, is told in [models.md](models.md)."
+        f"NumPy {machine['numpy']}, SciPy {machine['scipy']}, Numba {machine['numba']}. The sources of each method are "
+        "listed in [models.md](models.md)."
     )
 
 
 def _of_dim(rows: list[Row], dim: int, figure: str) -> Iterator[str]:
-    yield f"## In {'the plane' if dim == 2 else 'space'}"
+    yield f"## {dim}D"
     yield ""
     yield f"![Four measures of each method]({figure})"
     yield ""
     chief = {row["method"]: row for row in rows if row["dim"] == dim and row["chief"]}
-    yield "Printed sign and measured one, for the entry in bold below; different ones in bold:"
+    yield "Printed and measured sign, separated by a colon, for the entries in bold below. Differences are in bold."
     yield ""
     yield "| | " + " | ".join(METHODS) + " |"
     yield "|---" * (1 + len(METHODS)) + "|"
@@ -61,11 +61,12 @@ def _of_dim(rows: list[Row], dim: int, figure: str) -> Iterator[str]:
     yield from _figures(rows, dim)
     found = contradictions(rows, dim)
     if found:
-        yield "Where the printed sign was not found, and what would have to be true for it:"
+        yield "Differences, and the conditions under which the printed sign would apply:"
         yield ""
         for criterion, method, printed, measured in found:
             reason = IF.get((criterion, method), "")
-            yield f"* {method}, {criterion}: printed {printed}, measured {measured}. For {printed}, {reason}"
+            signs = f"printed {printed}, measured {measured}"
+            yield f"* {method}, {criterion}: {signs}. The sign {printed} would apply {reason}"
         yield ""
 
 
@@ -73,7 +74,7 @@ def _figures(rows: list[Row], dim: int) -> Iterator[str]:
     heads = ["solve [ms]", "force [ms]"]
     heads += ["1 % from, in [ms]"] if dim == 2 else []
     own = "1/3" if dim == 2 else "1/4"
-    heads += [f"moduli off at ν = 0, {own}, 0.45", "small load", "on a fine mesh", "within 5 % up to"]
+    heads += [f"error of moduli at ν = 0, {own}, 0.45", "small load", "fine mesh", "within 5 % up to"]
     yield "| method | " + " | ".join(heads) + " |"
     yield "|---" * (1 + len(heads)) + "|"
     for row in rows:
@@ -136,23 +137,26 @@ def _definitions(table: Mapping[str, Any]) -> Iterator[str]:
             (one,) = known
             yield (
                 f"* In {dim}D, on {mesh['speed']} elements (solve, force, large deflection), {mesh['accuracy']} (small "
-                f"load) and {mesh['limit']} (on a fine mesh), against {one['elements']:,} "
+                f"load) and {mesh['limit']} (fine mesh); reference: {one['elements']:,} "
                 f"{'triangles' if dim == 2 else 'tetrahedra'} of second order with {one['n_nodes']:,} nodes."
             )
-    yield "* solve: from the built mesh to the equilibrium at a deflection of half the length, cold, best of three."
-    yield "* force: one evaluation of the internal force there."
-    yield "* 1 % from: the coarsest mesh from which on, up to 32 elements deep, the end is within 1 % at a small load."
+    yield "* solve: time from the mesh to the equilibrium at a deflection of half the length, best of three."
+    yield "* force: time of one evaluation of the internal force there."
     yield (
-        "* moduli off: relative Frobenius distance of the elasticity matrix that uniform strains meet, from the "
-        "material's."
+        "* 1 % from: the coarsest mesh from which on the error of the end displacement at small load is below 1 %, up "
+        "to 32 elements deep, and the time of its solve."
     )
-    yield "* small load: root-mean-square nodal error at a deflection of 0.0067 of the length."
     yield (
-        "* within 5 % up to: the largest deflection up to which the end is within 5 % of neo-Hookean FEM, through "
-        "stable states."
+        "* error of moduli: relative difference between the elasticity matrix for uniform strains and that of the "
+        "material, in the Frobenius norm."
+    )
+    yield "* small load, fine mesh: root-mean-square nodal error at a deflection of 0.0067 of the length."
+    yield (
+        "* within 5 % up to: the largest deflection up to which the end is within 5 % of neo-Hookean FEM, with all "
+        "states stable."
     )
     yield ""
-    yield "The measured signs:"
+    yield "Signs:"
     yield ""
     for criterion, meaning in MEANING.items():
         yield f"* {criterion}: {meaning}."

@@ -1,4 +1,4 @@
-"""The table, row by row."""
+"""Measure the table, row by row."""
 
 import os
 import platform
@@ -14,29 +14,29 @@ from truespring.table1.bodies import POISSON, Size, end_displacement, reference
 from truespring.table1.entries import ENTRIES, Entry
 from truespring.table1.measures import RATIOS, accuracy, material, reach, speed, to_one_percent
 
-#: Called with what is measured and the share that is done.
+#: Called with the name of the current measurement and the completed share.
 Progress = Callable[[str, float], None]
 
 
 def measure_table(
     dims: tuple[int, ...] = (2, 3), methods: tuple[str, ...] = (), progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Measure the table in the plane and in space; return it as values that JSON can hold.
+    """Return the measured table in 2D and 3D, as values for JSON.
 
-    `methods` are those to measure, all by default. A measure that an entry refuses is None, with the reason in
-    `refused`.
+    `methods` are the measured ones, all by default. A measure that a model does not support is missing from the row;
+    `refused` has the reason.
     """
     started = time.perf_counter()
-    wanted = [
+    measured = [
         (dim, entry)
         for dim in dims
         for entry in ENTRIES
         if dim in entry.dims and (not methods or entry.method in methods)
     ]
     rows = []
-    for number, (dim, entry) in enumerate(wanted):
+    for number, (dim, entry) in enumerate(measured):
         if progress:
-            progress(f"{dim}D {entry.method}, {entry.name}", number / len(wanted))
+            progress(f"{dim}D {entry.method}, {entry.name}", number / len(measured))
         rows.append(_row(entry, dim))
     if progress:
         progress("done", 1.0)
@@ -56,7 +56,7 @@ def measure_table(
 
 
 def sizes(dim: int) -> dict[str, Size]:
-    """Return the meshes of a dimension: for speed and large deflection, for accuracy, and for its limit."""
+    """Return the mesh sizes of a dimension by measure."""
     if dim == 2:
         return {"speed": Size(2, 16), "accuracy": Size(2, 4), "limit": Size(2, 32), "reach": Size(2, 16)}
     return {"speed": Size(3, 4), "accuracy": Size(3, 4), "limit": Size(3, 8), "reach": Size(3, 4)}
@@ -85,7 +85,7 @@ def _measures(entry: Entry, dim: int, mesh: dict[str, Size]) -> Iterator[Callabl
 
 
 def _reference(dim: int) -> dict[str, Any]:
-    """What all were measured against, and how far that is from the same on half as fine a mesh."""
+    """Return mesh, label and end displacements [m] of the reference."""
     path = reference(dim, large=True)
     small = reference(dim, large=False)
     return {

@@ -1,4 +1,4 @@
-"""What the measured figures say in the signs of the printed table, and where they contradict it."""
+"""Signs from the measured values, and their differences from the printed table."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,28 +7,28 @@ from truespring.table1.entries import CRITERIA, METHODS, PRINTED
 
 Row = Mapping[str, Any]
 
-#: What a sign stands for here, by criterion; what is neither + nor - is +/-.
+#: Definition of the signs by criterion; +/- otherwise.
 MEANING = {
     "computational speed": (
-        "+ where an equilibrium takes at most half as long as FEM on the same mesh, - where more than twice "
-        "as long or where no stable one is found; FEM itself is +/-"
+        "+ if a solve takes at most half the time of FEM on the same mesh, - if it takes more than twice the time or "
+        "finds no stable equilibrium; FEM is +/-"
     ),
     "material properties": (
-        "+ where the moduli are within 5 % of the material's at every Poisson's ratio from 0 to 0.45, - where at none"
+        "+ if the effective moduli are within 5 % of the material at every Poisson's ratio from 0 to 0.45, - if at none"
     ),
     "results accuracy": (
-        "+ where the small-load error is below 5 % on 4 elements through the depth and below 1 % on a fine "
-        "mesh, - where neither holds"
+        "+ if the error at small load is below 5 % on 4 elements through the depth and below 1 % on a fine mesh, - if "
+        "neither"
     ),
     "large deflection": (
-        "+ where the end is within 5 % of converged neo-Hookean FEM up to a deflection of half the length, "
-        "- where not up to a fifth"
+        "+ if the end is within 5 % of converged neo-Hookean FEM up to a deflection of half the length, - if not up to "
+        "a fifth"
     ),
 }
 
 
 def sign(criterion: str, row: Row, finite: Row) -> str:
-    """Return +, +/- or - for what was measured of an entry; `finite` is the row of FEM in the same dimension."""
+    """Return the sign +, +/- or - of an entry by a criterion; `finite` is the row of FEM in the same dimension."""
     match criterion:
         case "computational speed":
             return _of(_faster(row, finite, 0.5), not _faster(row, finite, 2.0)) if row is not finite else "+/-"
@@ -58,7 +58,7 @@ def _below(value: float | None, limit: float) -> bool:
 
 
 def contradictions(rows: list[Row], dim: int) -> list[tuple[str, str, str, str]]:
-    """Return criterion, method, printed and measured sign where the chief entry of a method has another sign."""
+    """Return criterion, method, printed and measured sign where the chief entry of a method has a different sign."""
     chief = {row["method"]: row for row in rows if row["dim"] == dim and row["chief"]}
     found = []
     for criterion in CRITERIA:
@@ -70,75 +70,66 @@ def contradictions(rows: list[Row], dim: int) -> list[tuple[str, str, str, str]]
     return found
 
 
-#: What would have to be true for a printed sign that was not found.
+#: Condition under which a printed sign would apply, by criterion and method, after the words "... would apply".
 IF = {
-    ("computational speed", "FEM"): ("FEM would have to be coded as loops over Gauss points that an interpreter runs."),
+    ("computational speed", "FEM"): ("if FEM were implemented as interpreted loops over Gauss points."),
     ("computational speed", "Terzopoulos"): (
-        "the force would have to be all that counts, as where time is stepped explicitly: one is cheap. An "
-        "equilibrium is not, and in the plane a fine grid with his boundary has many that are unstable."
+        "if only force evaluations counted, which are cheap, as in explicit time integration. An equilibrium is "
+        "expensive, and in 2D a fine grid with the boundary of the paper has many unstable ones."
     ),
     ("computational speed", "MSM"): (
-        "the force evaluation alone would have to be compared, which is many times cheaper; in an "
-        "equilibrium the linear solver, which is the same for all, takes most of the time."
+        "if only force evaluations were compared, which are many times cheaper. In a solve, most of the time is spent "
+        "in the linear solver, which is the same for all."
     ),
-    ("computational speed", "HEML"): ("HEML would have to be compared with finite elements coded plainly."),
+    ("computational speed", "HEML"): ("if HEML were compared with a plain implementation of finite elements."),
     ("computational speed", "BEM + MSM"): (
-        "the boundary elements would have to be set up once and loaded many times, and their dense block be small."
+        "if the boundary elements were set up once for many loads, and the dense block were small."
     ),
     ("computational speed", "mass-tensor"): (
-        "its nonlinear form would have to be meant: its linear form takes one linear solve, as linear FEM "
-        "does, and is the fastest of all."
+        "to its nonlinear form. Its linear form requires one linear solve, as linear FEM does, and is the fastest."
     ),
     ("material properties", "Terzopoulos"): (
-        "one weight for each component of the metric would have to be all it may have; then it has no "
-        "Poisson's ratio along its axes."
+        "if it had only one weight for each component of the metric; Poisson's ratio along the axes is then 0."
     ),
     ("material properties", "MSM"): (
-        "the isotropic rule would have to be meant, which realises one Poisson's ratio; with a volume term "
-        "springs realise all of them."
+        "to the isotropic rule, which has one Poisson's ratio. With a volume term, springs have that of the material."
     ),
-    ("material properties", "HEML"): ("the law of the links would have to be fitted, not derived."),
+    ("material properties", "HEML"): ("if the law of the links were fitted, not derived."),
     ("material properties", "BEM + MSM"): (
-        "the boundary elements would have to be the whole body: its springs realise one Poisson's ratio."
+        "if the whole body were boundary elements. Its springs have one Poisson's ratio."
     ),
-    ("material properties", "mass-tensor"): ("its tensors would have to be others than those of linear elasticity."),
-    ("results accuracy", "FEM"): (
-        "finer or better elements would have to be taken: four through the depth are 3.6 % off."
-    ),
+    ("material properties", "mass-tensor"): ("if its tensors were not those of linear elasticity."),
+    ("results accuracy", "FEM"): ("to finer or better elements: four through the depth have an error of 3.6 %."),
     ("results accuracy", "Terzopoulos"): (
-        "it would have to be judged with his own boundary rule, which is too stiff by (n + 1) / n for each "
-        "direction across."
+        "with the boundary of the paper, which is too stiff by a factor (n + 1) / n for each transverse direction."
     ),
     ("results accuracy", "MSM"): (
-        "springs would have to be judged in the plane on one mesh only: Lloyd's error at four elements through the "
-        "depth is two errors that cancel there. On fine meshes none vanishes, and on cubes nothing cancels."
+        "in 2D on one mesh: with Lloyd's rule, two errors cancel at four elements through the depth. They remain on "
+        "fine meshes, and on cubes they do not cancel."
     ),
     ("results accuracy", "HEML"): (
-        "HEML would have to be something else than finite elements: with the same law on the same elements "
-        "it is the same function, to rounding."
+        "if HEML differed from finite elements. With the same law on the same elements it is the same function, to "
+        "rounding."
     ),
-    ("results accuracy", "BEM + MSM"): ("the springs would have to be few beside the boundary elements."),
+    ("results accuracy", "BEM + MSM"): ("if the springs were few compared with the boundary elements."),
     ("results accuracy", "mass-tensor"): (
-        "finer meshes would have to be taken: triangles and tetrahedra of first order lock in bending."
+        "to finer meshes: triangles and tetrahedra of first order are too stiff in bending."
     ),
     ("large deflection", "FEM"): (
-        "a law would have to be taken that resists compression: St. Venant-Kirchhoff loses its solution, "
-        "neo-Hookean does not."
+        "to a law that resists compression: the solution ends with St. Venant-Kirchhoff, but not with neo-Hookean."
     ),
-    ("large deflection", "Terzopoulos"): (
-        "it would have to be linear; the metric tensor is not, it follows any rotation."
-    ),
+    ("large deflection", "Terzopoulos"): ("if it were linear. The metric tensor is not, it follows any rotation."),
     ("large deflection", "MSM"): (
-        "squares three or four deep would have to be taken, where Lloyd's springs bend right. On finer ones, "
-        "and on cubes, they are more than 5 % off from the start; the isotropic rule in the plane is not."
+        "to squares three or four deep, where the bending stiffness of Lloyd's springs is accurate. On finer meshes "
+        "and on cubes their error is above 5 % at any load; that of the isotropic rule in 2D is not."
     ),
     ("large deflection", "HEML"): (
-        "more would have to be asked than half the length: with St. Venant-Kirchhoff's law it ends between that and "
-        "the whole length, as finite elements of that law do."
+        "to a limit above half the length: with the St. Venant-Kirchhoff law the solution ends between half the length "
+        "and the whole, as that of finite elements does."
     ),
     ("large deflection", "BEM + MSM"): (
-        "a little more would have to be asked: a block that may not turn is 5 % off at about a quarter of the "
-        "length. Let to turn as a whole, it follows."
+        "to a slightly higher limit: with a block that cannot rotate, the error is 5 % at about a quarter of the "
+        "length. A corotated block follows large rotations."
     ),
-    ("large deflection", "mass-tensor"): ("its linear form would have to be meant."),
+    ("large deflection", "mass-tensor"): ("to its linear form."),
 }

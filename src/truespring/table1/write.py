@@ -1,4 +1,4 @@
-"""What `truespring table1` leaves: the figures as JSON, the page, its pictures."""
+"""Write the results of `truespring table1`: values as JSON, the page and its figures."""
 
 import json
 from collections.abc import Mapping
