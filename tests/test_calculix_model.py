@@ -246,7 +246,7 @@ def test_a_pressure_on_a_sheet_whose_thickness_changes_is_told() -> None:
         [ts.Pressure("top", 200.0)],
     )
     told = CalculiX().run(problem, ts.Newton(load_steps=4))
-    assert any("thickness as it becomes" in warning for warning in told.warnings)
+    assert any("thickness" in warning for warning in told.warnings)
     assert 7e-3 < gap(told, ts.solve(problem, ts.Fem("saint-venant-kirchhoff"), ts.Newton(load_steps=4))) < 2e-2
     linear = CalculiX("linear").run(problem, ts.Newton(load_steps=4))
     assert not any("thickness" in warning for warning in linear.warnings)
@@ -355,7 +355,7 @@ def test_levels_reached_are_kept_where_it_does_not_converge(tmp_path: Path, caps
     found = json.loads(printed.out)["models"]["calculix"]
     assert found["status"] == "not-converged" and 0 < found["load_factor"] < 1
     warning = found["warnings"][0]
-    assert f"last good load factor: {found['load_factor']:g}" in warning
+    assert f"last converged load factor: {found['load_factor']:g}" in warning
     assert "increment size smaller than minimum" in warning and "load less" in warning
     assert "model 'calculix' is not-converged" in printed.err
     with (tmp_path / "study" / "curves.csv").open() as stream:
@@ -470,7 +470,7 @@ def test_a_run_without_a_step_is_a_path_that_says_why(
     program(tmp_path, monkeypatch, *lines)
     path = CalculiX().run(moved(displacement=(0.01, 0.0, 0.0)), ts.Newton(load_steps=2))
     assert path.status is ts.Status.NOT_CONVERGED and path.load_factor == 0 and len(path.states) == 1
-    assert re.search(f"load factor 0.5 was not reached.*CalculiX says.*{words}", path.warnings[0])
+    assert re.search(f"load factor 0.5 was not reached.*message of CalculiX.*{words}", path.warnings[0])
 
 
 def test_a_failing_program_does_not_take_the_rest_of_a_study_along(

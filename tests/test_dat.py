@@ -27,7 +27,7 @@ def test_energy_is_the_work_of_the_load_and_force_the_reaction(tmp_path: Path) -
         force = scale * np.array(FORCE)
         assert level.energy == pytest.approx(force @ level.displacement[pulled] / 2, rel=1e-5)
         assert level.force is not None and level.force == pytest.approx(-force, rel=1e-5)
-    assert record.notes == ("force is the total force of set HELD as printed: of supports the reaction",)
+    assert record.notes == ("force is the total force of set HELD: for a set of supports the reaction",)
 
 
 @needs_ccx
@@ -65,7 +65,7 @@ def test_energies_of_sets_that_share_the_body_are_summed(tmp_path: Path) -> None
     assert record.cells["line"].tolist() == [[0, 1], [1, 2]] and record.names == ("1", "2", "3")
     part = TWO.replace("*EL PRINT, ELSET=bar, TOTALS=ONLY\nELSE\n", "")
     record = read_dat(run(part, tmp_path, "part").with_suffix(".dat"))
-    assert record.levels[0].energy is None and "internal energy is printed of SPRING: not once" in record.notes[0]
+    assert record.levels[0].energy is None and "SPRING" in record.notes[0]
 
 
 @needs_ccx
@@ -91,10 +91,10 @@ def test_the_deck_is_beside_or_given(tmp_path: Path) -> None:
     stem = run(element_deck("CPS4"), tmp_path)
     other = (tmp_path / "elsewhere").with_suffix(".inp")
     stem.with_suffix(".inp").rename(other)
-    with pytest.raises(ReferenceFileError, match=r"put the deck body.inp beside it, or give it"):
+    with pytest.raises(ReferenceFileError, match=r"body.inp .*--mesh"):
         read_dat(stem.with_suffix(".dat"))
     assert len(read_dat(stem.with_suffix(".dat"), mesh=other).levels) == 3
-    with pytest.raises(ReferenceFileError, match=r"are read from the deck, a \.inp file"):
+    with pytest.raises(ReferenceFileError, match=r"are read from its deck, a \.inp file"):
         read_dat(stem.with_suffix(".dat"), mesh=stem.with_suffix(".frd"))
     other.write_text(other.read_text().replace("TYPE=CPS4", "TYPE=DASHPOTA"))
     with pytest.raises(ReferenceFileError, match=r"elsewhere.inp: .*1 DASHPOTA makes none"):
@@ -107,7 +107,7 @@ def test_the_deck_is_beside_or_given(tmp_path: Path) -> None:
 @needs_ccx
 def test_what_a_refused_deck_leaves_is_said(tmp_path: Path) -> None:
     stem = run(element_deck("CPS4").replace("100., 0.3", "100., zero"), tmp_path, fails=True)
-    with pytest.raises(ReferenceFileError, match=r"body.dat is empty: CalculiX leaves it so where it refuses the deck"):
+    with pytest.raises(ReferenceFileError, match=r"body.dat is empty: CalculiX rejected the deck"):
         read_dat(stem.with_suffix(".dat"))
 
 
@@ -138,13 +138,13 @@ DAMAGED = {
     "a letter in a number": (rb"(?m)^(         5.*)\d\.", rb"\1x.", r"line 8: 'x.* is no number"),
     "a row is shorter": (rb"(?m)^(         5.*)\d$", rb"\1", "line 8: .* is shorter or longer"),
     "a row is missing": (rb"(?m)^         5.*\n", b"", "set NALL at time 0.5 has 8 nodes in the deck, 7 are printed"),
-    "a node twice": (rb"(?m)^         5", b"         4", "set NALL at time 0.5: node 4 is there twice"),
-    "a node too many": (rb"(?m)^         5", b"        55", "names node 55"),
-    "no time": (rb"time  0.5", b"time  x.5", "line 2: 'x.*' is no time"),
+    "a node twice": (rb"(?m)^         5", b"         4", "set NALL at time 0.5: node 4 is repeated"),
+    "a node too many": (rb"(?m)^         5", b"        55", "node 55"),
+    "no time": (rb"time  0.5", b"time  x.5", "line 2: 'x.*' is not a time"),
     "no energy": (rb"(?m)(energy.*\n\n) .*$", rb"\1 nothing", "line 1[45]: 'nothing' is no row"),
     "binary": (rb"(?s).*", bytes(range(256)) * 9 + b"\n", "it is binary, not text"),
-    "another text": (rb"(?s).*", b"Results\n 1 2 3\n", "holds no table 'displacements"),
-    "another quantity": (rb"displacements", b"velocities", "holds no table 'displacements"),
+    "another text": (rb"(?s).*", b"Results\n 1 2 3\n", "no table 'displacements"),
+    "another quantity": (rb"displacements", b"velocities", "no table 'displacements"),
     "all lost": (rb"(?m)^( .{9}).{42}$", rb"\1" + b"           NaN" * 3, "level 1 of 3 .time 0.5. has no finite"),
 }
 

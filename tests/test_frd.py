@@ -122,13 +122,13 @@ def test_all_layers_of_a_composite_shell_are_read(tmp_path: Path) -> None:
         record = read_frd(file)
         cells = record.cells["hexahedron20"]
         assert np.ptp(record.points[cells], axis=1) == pytest.approx(np.array([[1, 1, h] for h in (0.05, 0.05, 0.02)]))
-        assert record.notes == ("elements (3C): 1 are announced, 3 are there and were taken",)
+        assert record.notes == ("elements (3C): 1 are announced, 3 were found and read",)
         assert np.abs(record.levels[0].displacement[:, 2]).max() > 0.01
     data = text.read_bytes()
     begin, end = data.index(b"    3C"), data.index(b" -3", data.index(b"    3C"))
     for at in range(begin + 80, end + 3, 7):
         text.write_bytes(data[:at])
-        with pytest.raises(ReferenceFileError, match=r"cut off|no record|wanted"):
+        with pytest.raises(ReferenceFileError, match=r"cut off|not a|-3|expected"):
             read_frd(text)
 
 
@@ -171,18 +171,18 @@ LOST = "level 3 of 3 .time 2. has no finite displacement"
 DAMAGED = {
     "a digit": (rb"(?m)^( -1 +1[ -]\d\.\d)", rb"\1x", "cut|longer|no row"),
     "a letter in a number": (rb"(?m)^( -1 +5.)\d(?=\.\d{5}E)", rb"\1x", "line 1[78]: 'x.* is no number"),
-    "a node twice": (rb"(?m)^ -1         2(?=.*E.*E)", b" -1         1", "node 1 is there twice"),
-    "an unknown node": (rb"(?s)(DISP.*?\n -1)         7", rb"\1        77", "names node 77"),
-    "an element's node": (rb"(?m)^ -2         1", b" -2        99", "a hexahedron20 names node 99"),
-    "an unknown element": (rb"(?m)^ -1         1    4", b" -1         1   15", r"element type 15 is not read; 1, 2"),
+    "a node twice": (rb"(?m)^ -1         2(?=.*E.*E)", b" -1         1", "node 1 is repeated"),
+    "an unknown node": (rb"(?s)(DISP.*?\n -1)         7", rb"\1        77", "node 77"),
+    "an element's node": (rb"(?m)^ -2         1", b" -2        99", "a hexahedron20 .*node 99"),
+    "an unknown element": (rb"(?m)^ -1         1    4", b" -1         1   15", r"element type 15 .*: 1, 2"),
     "fewer nodes of an element": (rb"(?m)^ -1         1    4", b" -1         1    2", "has 6"),
-    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are announced, after 19 comes '-3'"),
-    "more rows than announced": (rb"(?m)^( -1         4.*\n)", rb"\1\1", "-3 is wanted|there twice"),
-    "an unknown format": (rb"(?m)^(    2C.*)1$", rb"\g<1>7", "format 7 is not read"),
-    "no number of rows": (rb"(?m)^(    2C +)20", rb"\1xx", "does not say how many rows"),
-    "no time": (rb"100CL  101 \d", b"100CL  101 x", "the head of 'DISP' cannot be read"),
-    "components": (rb"(?m)^ -5  D3.*\n", b"", "4 rows '-5' are wanted"),
-    "a strange record": (rb"(?m)^    1PSTEP", b"    7PSTEP", "is no record of a .frd file"),
+    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are announced, after 19 follows '-3'"),
+    "more rows than announced": (rb"(?m)^( -1         4.*\n)", rb"\1\1", "-3|repeated"),
+    "an unknown format": (rb"(?m)^(    2C.*)1$", rb"\g<1>7", "format 7 "),
+    "no number of rows": (rb"(?m)^(    2C +)20", rb"\1xx", "number of rows"),
+    "no time": (rb"100CL  101 \d", b"100CL  101 x", "the header of 'DISP' cannot be read"),
+    "components": (rb"(?m)^ -5  D3.*\n", b"", "4 rows '-5'"),
+    "a strange record": (rb"(?m)^    1PSTEP", b"    7PSTEP", "record of a .frd file"),
     "a second mesh": (rb"(?s)(    2C.*?-3\n)", rb"\1\1", "a second block of nodes"),
     "a zero byte": (rb"(?m)^( -1 +3.*)0$", rb"\1" + b"\0", "is no row of this block"),
     "coordinates without end": (
@@ -209,10 +209,10 @@ def test_what_is_damaged_is_refused_with_its_place(name: str, sample: bytes, tmp
 
 OTHERS = {
     "empty": (b"", "is empty"),
-    "text": (b"Nodes and elements\n1 2 3\n", "line 1: this is no .frd file of CalculiX: it begins with 'Nodes and el"),
-    "binary": (bytes(range(256)) * 20, "line 1: this is no .frd file"),
-    "one line without an end": (b"    1C" + b"x" * 5000, "is no record of a .frd file"),
-    "no mesh": (b"    1C\n 9999\n", "holds no nodes"),
+    "text": (b"Nodes and elements\n1 2 3\n", "line 1: not a .frd file of CalculiX: it begins with 'Nodes and el"),
+    "binary": (bytes(range(256)) * 20, "line 1: not a .frd file"),
+    "one line without an end": (b"    1C" + b"x" * 5000, "record of a .frd file"),
+    "no mesh": (b"    1C\n 9999\n", "no nodes"),
 }
 
 
@@ -233,7 +233,7 @@ def test_a_binary_file_that_is_cut_is_refused_by_its_byte(tmp_path: Path) -> Non
         with pytest.raises(ReferenceFileError, match=r"byte \d+: the file is cut off"):
             read_frd(file)
     file.write_bytes(data.replace(b"\1\0\0\0\1\0\0\0\0\0\0\0\1\0\0\0", b"\1\0\0\0\0\0\0\1\0\0\0\0\1\0\0\0"))
-    with pytest.raises(ReferenceFileError, match="element type 16777216 is not read"):
+    with pytest.raises(ReferenceFileError, match="element type 16777216 "):
         read_frd(file)
 
 
@@ -247,7 +247,7 @@ def test_modes_and_stopped_runs_are_told(tmp_path: Path) -> None:
     record = read_frd(run(stopped, tmp_path, "stopped", fails=True).with_suffix(".frd"))
     assert [level.time for level in record.levels] == [0.5] and "the run was stopped" in record.notes[0]
     record = read_frd(run(element_deck("C3D6", loose=True), tmp_path, "diverged", fails=True).with_suffix(".frd"))
-    assert "may be a best guess, no equilibrium" in record.notes[0]
+    assert "may not be an equilibrium" in record.notes[0]
 
 
 @needs_ccx

@@ -121,7 +121,7 @@ WRONG = {
     "cut off": (MARKERS[:-5], None, "markers.csv:3: 4 values.* 5 columns"),
     "twice": (MARKERS.replace("b,", "a,"), None, "markers.csv:3: marker 'a' is there twice, first in line 2"),
     "all lost": (MARKERS.replace(",1,0.002", ",nan,0").replace("-1,0", "0,nan"), None, "no finite displacement"),
-    "place lost": (MARKERS.replace("10", "nan"), None, "have no finite coordinates, the first is a"),
+    "place lost": (MARKERS.replace("10", "nan"), None, "have no finite coordinates.*the first is a"),
     "only names": ("marker,x,y,ux,uy\n", None, "at least one row"),
     "empty": ("", None, "is empty"),
     "binary": ("\0\1\2\n\3\4", None, "not a CSV file|unknown"),

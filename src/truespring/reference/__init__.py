@@ -1,4 +1,4 @@
-"""Paths from elsewhere: results of other programs."""
+"""Results of other programs, read as solutions."""
 
 from truespring.reference.calculix import CalculiX as CalculiX
 from truespring.reference.placing import Placing as Placing

@@ -1,4 +1,4 @@
-"""CalculiX as a model: the problem's deck is written, solved by ccx, and its results are read as a path."""
+"""CalculiX as a model: write the deck of a problem, run ccx, and read its results as a solution."""
 
 import math
 import tempfile
@@ -31,12 +31,12 @@ from truespring.solvers import Reporter, Solver
 
 @dataclass(frozen=True)
 class CalculiX(Program):
-    """The problem in CalculiX: finite elements, or the SPRINGA twin of a spring model.
+    """A model solved by CalculiX: finite elements, or a spring model as SPRINGA elements.
 
     Attributes:
-        law: "linear", or "saint-venant-kirchhoff", the default, which is NLGEOM; None where there are springs.
-        springs: a model or network of springs instead of a continuum.
-        element: "linear", or "quadratic" on triangles and tetrahedra, where it is the default; not of springs.
+        law: "linear", or "saint-venant-kirchhoff" (NLGEOM), the default; None for springs.
+        springs: a spring model or network instead of a continuum.
+        element: "linear", or "quadratic" for triangles and tetrahedra, where it is the default; not for springs.
     """
 
     law: str | None = None
@@ -51,10 +51,10 @@ class CalculiX(Program):
         elif self.law is None:
             object.__setattr__(self, "law", "saint-venant-kirchhoff")
         elif self.law not in LAWS:
-            raise ModelError(f"law = '{self.law}': CalculiX has {' and '.join(LAWS)} in common with truespring")
+            raise ModelError(f"law = '{self.law}' is not available in CalculiX; allowed: {', '.join(LAWS)}")
 
     def label_on(self, problem: Problem) -> str:
-        """Return the label, with the type of the elements."""
+        """Return the label, with the element types."""
         if self.springs is not None:
             return "CalculiX SPRINGA NLGEOM"
         return f"CalculiX {fem_element(problem, self._element(problem))} {'NLGEOM' if self.finite else 'linear'}"
@@ -68,34 +68,34 @@ class CalculiX(Program):
         return self.element or usual_element(problem)
 
     def _finer(self, problem: Problem) -> QuadraticPotential | None:
-        """Elements of second order that have the nodes of CalculiX's."""
+        """Return the second-order potential whose nodes are those of the deck; None for first-order elements."""
         return None if self.springs is not None else second_order(problem, self._element(problem))
 
     @property
     def finite(self) -> bool:
-        """Whether strains are finite: false for the linear law."""
+        """Whether the model has finite strain: False for the linear law."""
         return self.springs is not None or self.law != "linear"
 
     @property
     def element_is_open(self) -> bool:
-        """Whether the mesh decides on the elements."""
+        """Whether the element is chosen by the mesh."""
         return self.springs is None and self.element is None
 
     def second_order(self, problem: Problem) -> Fem | None:
-        """Return finite elements of second order of the same law, to which the elements of CalculiX converge too."""
+        """Return second-order finite elements of the same law, which have the same limit; None for other models."""
         first = self.springs is None and self._element(problem) == "linear"
         return Fem(self._law) if first else None
 
     def check_run(self, problem: Problem, solver: Solver) -> None:
-        """Raise ModelError without ccx and under another control than load, ExportError for what it cannot say."""
+        """Raise ModelError without ccx or load control, ExportError if CalculiX does not support the problem."""
         if not solver.follows_load:
-            raise ModelError('CalculiX follows the load only: take control = "load", or leave this model out')
+            raise ModelError('CalculiX supports only control = "load": change it, or remove this model')
         find_ccx()
         if self._network(problem) is None:
             check_fem(problem, self._law, self._element(problem))
 
     def _network(self, problem: Problem) -> PlainSprings | None:
-        """The springs; refused where they are more than SPRINGA elements can be."""
+        """Return the springs, None for a continuum; raise ExportError if SPRINGA elements do not support them."""
         if self.springs is None:
             return None
         springs = spring_data(self.springs.potential(problem))
@@ -105,11 +105,10 @@ class CalculiX(Program):
     def run(
         self, problem: Problem, solver: Solver, report: Reporter | None = None, timeout: float | None = None
     ) -> Solution:
-        """Run ccx in a folder of its own and return the states that it reached, those at rest first.
+        """Run ccx in a temporary folder and return the states reached, the undeformed one first.
 
-        A run that does not converge is not an exception, nor is one that takes longer than `timeout` seconds, by
-        default an hour: the path ends at the last level reached. Raises ModelError
-        and ExportError as `check_run` does.
+        If a run does not converge, or takes longer than `timeout` [s], by default one hour, the solution ends at the
+        last level reached. Raises ModelError and ExportError as `check_run` does.
         """
         self.check_run(problem, solver)
         levels = [(number + 1) / solver.load_steps for number in range(solver.load_steps)]
@@ -120,7 +119,7 @@ class CalculiX(Program):
             deck = spring_deck(problem, network, levels)
         finer = self._finer(problem)
         nodes = problem.mesh.nodes if finer is None else finer.nodes
-        before = int(network is not None and is_led_aside(problem, network))  # steps that are no load level
+        before = int(network is not None and is_led_aside(problem, network))  # steps that are not load levels
 
         def reached(step: int, share: float) -> None:
             place = step - before - 1
@@ -134,7 +133,7 @@ class CalculiX(Program):
             finished = run_ccx(file, reached=reached, timeout=timeout)
             try:
                 found = _results(file.with_suffix(".dat"), len(nodes))
-            except ReferenceFileError as error:  # as where ccx was ended while it wrote
+            except ReferenceFileError as error:  # ccx was terminated while writing
                 found, finished = [], replace(finished, errors=(*finished.errors, str(error)))
         still = np.zeros((len(nodes), 3))
         states = [self._state(problem, 0.0, Level(0.0, still, 0.0), still, None, network, finer)]
@@ -156,7 +155,7 @@ class CalculiX(Program):
             status = Status.INVERTED
             first = next(state for state in states if state.area_ratio <= 0)
             warnings.append(
-                f"inverted from load factor {first.load_factor:.6g} on (smallest ratio "
+                f"inverted from load factor {first.load_factor:.6g} (smallest ratio "
                 f"{min(state.area_ratio for state in states):.3g}): {status.advice}"
             )
         if len(states) <= len(levels) or finished.code:
@@ -164,23 +163,23 @@ class CalculiX(Program):
             missed = levels[min(len(states), len(levels)) - 1]
             warnings.insert(
                 0,
-                f"load factor {missed:.6g} was not reached; last good load factor: {states[-1].load_factor:.6g}; "
-                f"CalculiX says: {_said(finished)}; {status.advice}. `truespring export` writes the deck to look into",
+                f"load factor {missed:.6g} was not reached; last converged load factor: {states[-1].load_factor:.6g}; "
+                f"message of CalculiX: {_message(finished)}; {status.advice}. `truespring export` writes the deck",
             )
         unknown = [state.load_factor for state in states if math.isnan(state.energy)]
         if unknown:
             warnings.append(
-                f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints that of the last "
-                "increment only, and took several to a level"
+                f"the stored energy is not known at load factor {unknown[0]:.6g}: CalculiX prints only that of the "
+                "last increment, and used several for this level"
             )
         cards = [card for load in problem.loads for card in load.cards(problem.mesh)]
         pressed = any(isinstance(card, FacePressure) for card in cards)
         if pressed and problem.section is not None and problem.section.free_thickness and self.finite:
             warnings.append(
-                "the pressure acts on the thickness as it becomes, in truespring's own models on that at rest: plane "
-                "strain has no such difference"
+                "in CalculiX the pressure acts on the deformed thickness, in truespring on the undeformed one; in plane "
+                "strain there is no difference"
             )
-        warnings.append("stability not proven: CalculiX does not tell it")
+        warnings.append("stability not proven: CalculiX does not report it")
         return Solution(
             problem=problem,
             label=self.label_on(problem),
@@ -205,7 +204,7 @@ class CalculiX(Program):
         network: PlainSprings | None,
         finer: QuadraticPotential | None,
     ) -> State:
-        """A state of what was read: displacement, energy, and the internal force in each node [N]."""
+        """Return the state of a level; `internal` is the internal force at each node [N], shape (n_nodes, 3)."""
         mesh, loading = problem.mesh, problem.loading if finer is None else finer.loading
         nodes = mesh.nodes if finer is None else finer.nodes
         everywhere = nodes + level.displacement[:, : mesh.dim]
@@ -232,26 +231,30 @@ class CalculiX(Program):
         )
 
 
-def _said(finished: Finished) -> str:
+def _message(finished: Finished) -> str:
+    """Return the error message of a run."""
     if finished.timeout is not None:
-        return f"nothing, the time limit of {finished.timeout:g} s was reached (--timeout)"
+        return f"none, the time limit of {finished.timeout:g} s was reached (--timeout)"
     if finished.errors:
         return f"'{finished.errors[-1]}'"
-    return f"nothing (exit code {finished.code}); are its equations singular at rest, a part of the body free to move?"
+    return f"none (exit code {finished.code}); is the stiffness singular at rest, or a part of the body free to move?"
 
 
 def _results(file: Path, n_nodes: int) -> list[tuple[Level, Floats]]:
-    """The levels of a .dat file and the forces in all nodes at each [N], zero where they are not printed."""
-    if not file.is_file() or not file.stat().st_size:  # no step was done
+    """Return the levels of a .dat file, each with the forces at all nodes [N], zero where they are not printed."""
+    if not file.is_file() or not file.stat().st_size:  # no step was completed
         return []
     levels = [
         replace(one, energy=None if one.energy is None else FORCE_UNIT * one.energy) for one in read_dat(file).levels
     ]
-    return list(zip(levels, _forces(file, n_nodes), strict=False))  # of a level cut off there are no forces
+    return list(zip(levels, _forces(file, n_nodes), strict=False))  # a truncated level has no forces
 
 
 def _forces(file: Path, n_nodes: int) -> Iterator[Floats]:
-    """The tables of forces, which include loads; see *NODE PRINT, RF in CalculiX's manual [N], shape (n_nodes, 3)."""
+    """Yield the printed forces of each step, external loads included [N], shape (n_nodes, 3).
+
+    Source: *NODE PRINT, RF in the CalculiX manual.
+    """
     with scanning(file, None) as scan:
         while line := scan.line():
             if line.startswith(b" forces (fx,fy,fz) for set HELD"):

@@ -1,4 +1,4 @@
-"""ccx, the solver of CalculiX: whether it is there, running it as a process, and what it says of a run."""
+"""Run ccx, the solver of CalculiX, as a process, and read its progress and errors."""
 
 import os
 import shutil
@@ -11,26 +11,26 @@ from typing import NamedTuple
 
 from truespring.errors import ModelError
 
-#: Called with the number of the step and the share of it that is done.
+#: Called with the number of the step and its completed fraction.
 Reached = Callable[[int, float], None]
 
-#: After so long ccx is ended where no other limit is given [s].
+#: Default time limit [s].
 TIMEOUT = 3600.0
 
-# How long to wait before looking again how far ccx is [s].
+# Interval at which progress is read [s].
 _PATIENCE = 0.2
-# Lines of what ccx says of an error that are told.
+# Number of lines of an error message that are kept.
 _LINES = 3
 
 _MISSING = (
     "CalculiX is not installed: no program ccx is on the path. Debian and Ubuntu: apt-get install calculix-ccx; macOS "
     "and Windows: conda install -c conda-forge calculix; macOS with Homebrew: brew install "
-    "costerwi/calculix/calculix-ccx, whose program has the version in its name: link it as ccx. Or leave this model out"
+    "costerwi/calculix/calculix-ccx, whose program has the version in its name: link it as ccx. Or remove this model"
 )
 
 
 class Effort(NamedTuple):
-    """What a step took: its increments, and iterations with those of attempts that were given up."""
+    """The effort of a step: converged increments, and iterations, including those of abandoned attempts."""
 
     increments: int
     iterations: int
@@ -38,14 +38,14 @@ class Effort(NamedTuple):
 
 @dataclass(frozen=True)
 class Finished:
-    """A run of ccx that has ended.
+    """A finished run of ccx.
 
     Attributes:
-        code: its exit code; 201 for a deck that it refuses and for increments that do not converge alike.
-        seconds: wall time.
-        errors: what it says of each error, in its words.
-        efforts: of the steps that it began, by their number from 1; empty without geometric nonlinearity.
-        timeout: the limit that ended it [s], None where it ended by itself.
+        code: exit code; 201 both for an invalid deck and for increments that do not converge.
+        seconds: wall time [s].
+        errors: the error messages of ccx.
+        efforts: effort of each started step by its number from 1; empty without geometric nonlinearity.
+        timeout: the time limit that ended the run [s], None if it was not reached.
     """
 
     code: int
@@ -56,7 +56,7 @@ class Finished:
 
 
 def find_ccx() -> str:
-    """Return the program; raise ModelError, which tells how to install it, where it is not on the path."""
+    """Return the path of ccx; raise ModelError, with instructions to install it, if it is not found."""
     found = shutil.which("ccx")
     if found is None:
         raise ModelError(_MISSING)
@@ -66,17 +66,17 @@ def find_ccx() -> str:
 def run_ccx(
     deck: Path, threads: int | None = None, reached: Reached | None = None, timeout: float | None = None
 ) -> Finished:
-    """Run ccx on a deck in its own folder, which gets what ccx writes, for `timeout` seconds at most.
+    """Run ccx on a deck, in the folder of the deck, for at most `timeout` seconds.
 
-    `threads` are by default as many as truespring takes. Raises ModelError where ccx is not installed.
+    `threads` is by default the number that truespring uses. Raises ModelError if ccx is not installed.
     """
     from truespring.kernels.threads import n_threads
 
-    program, said = find_ccx(), deck.with_suffix(".txt")
+    program, log = find_ccx(), deck.with_suffix(".txt")
     environment = os.environ | {"OMP_NUM_THREADS": str(threads or n_threads())}
     started, limit = time.perf_counter(), TIMEOUT if timeout is None else timeout
     ended = None
-    with said.open("wb") as stream:
+    with log.open("wb") as stream:
         process = subprocess.Popen(
             [program, "-i", deck.stem], cwd=deck.parent, env=environment, stdout=stream, stderr=subprocess.STDOUT
         )
@@ -92,14 +92,14 @@ def run_ccx(
                     if reached and (done := [row for row in _increments(deck) if row.converged]):
                         reached(done[-1].step, done[-1].share)
         finally:
-            process.kill()  # does nothing where it has ended
+            process.kill()  # no effect if it has ended
             process.wait()
     seconds = time.perf_counter() - started
     efforts: dict[int, Effort] = {}
     for row in _increments(deck):
         before = efforts.get(row.step, Effort(0, 0))
         efforts[row.step] = Effort(before.increments + row.converged, before.iterations + row.iterations)
-    errors = tuple(_errors(said.read_text(encoding="utf-8", errors="replace").splitlines()))
+    errors = tuple(_errors(log.read_text(encoding="utf-8", errors="replace").splitlines()))
     return Finished(process.returncode, seconds, errors, efforts, ended)
 
 
@@ -111,10 +111,10 @@ class _Increment(NamedTuple):
 
 
 def _increments(deck: Path) -> Iterator[_Increment]:
-    """The lines of the .sta file: step, increment, attempt (with a U if given up), iterations, and times."""
+    """Yield the rows of the .sta file: step, increment, attempt (with U if abandoned), iterations and times."""
     try:
         lines = deck.with_suffix(".sta").read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError:  # not begun yet
+    except OSError:  # not started yet
         return
     for line in lines:
         parts = line.split()
@@ -125,9 +125,9 @@ def _increments(deck: Path) -> Iterator[_Increment]:
 def _errors(lines: list[str]) -> Iterator[str]:
     for number, line in enumerate(lines):
         if line.lstrip().startswith("*ERROR"):
-            told = [line.strip()]
+            message = [line.strip()]
             for further in lines[number + 1 : number + _LINES]:
                 if not further.strip() or further.lstrip().startswith("*"):
                     break
-                told.append(further.strip())
-            yield " ".join(told)
+                message.append(further.strip())
+            yield " ".join(message)

@@ -1,4 +1,4 @@
-"""What is asked of every result, whatever its format."""
+"""Checks of result files and records of any format."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,44 +11,44 @@ from truespring.mesh.files.contents import places
 from truespring.opening import open_file
 from truespring.reference.record import Level, Record
 
-# A coordinate beyond this was damaged; its square still is a number.
+# Larger coordinates are taken as damaged; the square is still finite.
 _FAR = 1e30
 
 
 def refuse_unreadable(file: Path) -> None:
-    """Raise ReferenceFileError for what is not there, is no regular file or is empty."""
+    """Raise ReferenceFileError if a file does not exist, is not a regular file, or is empty."""
     with open_file(file, ReferenceFileError) as stream:
         is_empty = not stream.read(1)
     if is_empty:
         raise ReferenceFileError(f"{file} is empty: did the other program stop with an error?")
 
 
-def rows_of(numbers: Ints, wanted: Ints, what: str, file: Path) -> Ints:
-    """Return where `wanted` nodes stand among `numbers`; raise ReferenceFileError where one does not."""
-    if wanted.shape == numbers.shape and np.array_equal(wanted, numbers):
+def rows_of(numbers: Ints, nodes: Ints, what: str, file: Path) -> Ints:
+    """Return the index in `numbers` of each of `nodes`, of their shape; raise ReferenceFileError if one is missing."""
+    if nodes.shape == numbers.shape and np.array_equal(nodes, numbers):
         return np.arange(len(numbers))
-    rows = places(numbers, wanted)
+    rows = places(numbers, nodes)
     lost = rows < 0
     if lost.any():
-        raise ReferenceFileError(f"{file}: {what} names node {wanted[lost][0]}, which is not among the nodes")
+        raise ReferenceFileError(f"{file}: {what} refers to node {nodes[lost][0]}, which does not exist")
     return rows
 
 
 def refuse_repeated(numbers: Ints, what: str, file: Path) -> None:
-    """Raise ReferenceFileError where a node is there twice."""
+    """Raise ReferenceFileError if a node number is repeated."""
     distinct, counts = np.unique(numbers, return_counts=True)
     if (counts > 1).any():
-        raise ReferenceFileError(f"{file}: {what}: node {distinct[counts > 1][0]} is there twice")
+        raise ReferenceFileError(f"{file}: {what}: node {distinct[counts > 1][0]} is repeated")
 
 
 def checked(record: Record) -> Record:
-    """Return the record, with a note on levels where some points did not move; raise where one has no displacement."""
+    """Return the record, with a note on points without displacement; raise ReferenceFileError if a level has none."""
     if not record.levels:
-        raise ReferenceFileError(f"{record.file} holds no displacement: ask the other program to write it")
+        raise ReferenceFileError(f"{record.file} has no displacement: request it as output of the other program")
     lost = ~np.asarray((np.abs(record.points) < _FAR).all(axis=1))
     if lost.any():
         name = record.names[lost.argmax()] if record.names else int(lost.argmax())
-        raise ReferenceFileError(f"{record.file}: {lost.sum()} points have no finite coordinates, the first is {name}")
+        raise ReferenceFileError(f"{record.file}: {lost.sum()} points have no finite coordinates; the first is {name}")
     partial = []
     for number, level in enumerate(record.levels, 1):
         is_lost = np.asarray(~np.isfinite(level.displacement).all(axis=1))
@@ -74,11 +74,11 @@ def checked(record: Record) -> Record:
 
 
 def without_modes(levels: Sequence[Level], is_mode: Sequence[bool]) -> tuple[tuple[Level, ...], tuple[str, ...]]:
-    """Return the levels that are no mode shapes, and what to say of it; the modes where there is nothing else."""
+    """Return the levels that are not mode shapes, with notes; if all are mode shapes, return them."""
     modes = sum(is_mode)
     if not modes:
         return tuple(levels), ()
     if modes == len(levels):
-        return tuple(levels), ("all levels are mode shapes, whose size is arbitrary: they are no displacement",)
+        return tuple(levels), ("all levels are mode shapes, whose scale is arbitrary, not displacements",)
     kept = tuple(level for level, mode in zip(levels, is_mode, strict=True) if not mode)
     return kept, (f"{modes} mode shapes of a frequency or buckling step were left out",)

@@ -1,11 +1,11 @@
-"""Names that other programs give to the parts of a vector: "u", "v", "w", "Displacement 1", "disp:0", "U_x"."""
+"""Names of vector components in other programs: "u", "v", "w", "Displacement 1", "disp:0", "U_x"."""
 
 import re
 from collections.abc import Iterable
 
-#: What the displacement is called, in small letters.
+#: Names of the displacement, in lower case.
 DISPLACEMENTS = ("displacement", "displacements", "u", "disp", "deformation")
-#: What places are called.
+#: Names of positions, in lower case.
 PLACES = ("points", "point", "coordinates", "coordinate", "coords", "coord", "position", "pos")
 
 _AXES = "xyz"
@@ -14,18 +14,18 @@ _PART_FIRST = re.compile(r"(?P<part>[xyz])[\s_:.\-]+(?P<base>[a-z]+)")
 
 
 def components(names: Iterable[str], bases: Iterable[str], alone: str = "") -> dict[str, str]:
-    """Return which of some names is the part of a vector along each axis, by axis: {"x": "disp:0", "y": "disp:1"}.
+    """Find the components of a vector among names; return them by axis, such as {"x": "disp:0", "y": "disp:1"}.
 
-    Parts that are counted begin at 0 where one is numbered 0, else at 1.
+    Numbered components count from 0 if one is numbered 0, else from 1.
 
     Args:
-        names: those that are there, in any spelling.
-        bases: what the vector may be called.
-        alone: names that stand for its parts without a base: "uvw".
+        names: the available names, in any spelling.
+        bases: possible names of the vector, in lower case.
+        alone: names of components without a base, one letter each, such as "uvw".
 
-    Returns nothing where less than two axes have a name, or one axis has several.
+    Returns an empty dictionary if fewer than two axes are named, or one axis is named twice.
     """
-    found: list[tuple[str, str]] = []  # the part as it is written, and the name
+    found: list[tuple[str, str]] = []  # component as written, and name
     for name in names:
         low = name.strip().lower()
         read = _PART.fullmatch(low) or _PART_FIRST.fullmatch(low)

@@ -1,6 +1,6 @@
-"""Results of CalculiX, .dat: what *NODE PRINT and *EL PRINT wrote; the mesh stands in the deck.
+"""CalculiX results in .dat files, the output of *NODE PRINT and *EL PRINT; the mesh is in the deck.
 
-Source: files of CalculiX 2.20, and *NODE PRINT and *EL PRINT in its manual, https://www.dhondt.de
+Source: *NODE PRINT and *EL PRINT in the CalculiX manual, https://www.dhondt.de, and files of CalculiX 2.20.
 """
 
 import re
@@ -29,28 +29,28 @@ _ID_WIDTH, _REAL_WIDTH = 10, 14
 
 
 def is_dat(head: bytes) -> bool:
-    """Whether one of the first lines of a file heads a table of CalculiX."""
+    """Return whether one of the first lines of a file is the title of a CalculiX table."""
     return any(_HEAD.fullmatch(line) for line in head.splitlines())
 
 
 def read_dat(file: Path, reading: Reading | None = None, mesh: Path | None = None) -> Record:
     """Read the displacements in a .dat file of CalculiX.
 
-    Several sets that are printed at one time are one level. `total internal energy` of element sets that make up the
-    whole body is the level's energy, `total force` of a single set its force: of a set of supports the reaction.
+    Sets printed at the same time form one level. Its energy is `total internal energy` of the element sets, if they
+    make up the body; its force is `total force`, if there is one set: for a set of supports the reaction.
 
     Args:
         file: the result.
-        reading: is called with the share that is read.
-        mesh: the deck, .inp; by default that of the same name beside `file`.
+        reading: called with the fraction that has been read.
+        mesh: the deck, .inp; default: the one with the name of `file` in the same folder.
 
-    Returns a record of kind "dat", names being the numbers of nodes. Raises ReferenceFileError with the line where
-    the file is damaged or cut off within a block, does not belong to the deck, or holds no displacement.
+    Returns a record of kind "dat", whose names are the node numbers. Raises ReferenceFileError, with the line, if the
+    file is damaged or truncated within a table, does not belong to the deck, or has no displacement.
     """
     if file.is_file() and not file.stat().st_size:
         raise ReferenceFileError(
-            f"{file} is empty: CalculiX leaves it so where it refuses the deck (see what it said on the screen), or "
-            "where nothing asks for *NODE PRINT and a line U"
+            f"{file} is empty: CalculiX rejected the deck (see its messages), or the deck has no *NODE PRINT with a "
+            "line U"
         )
     refuse_unreadable(file)
     deck = _deck(file, mesh)
@@ -63,10 +63,10 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
     deck = file.with_suffix(".inp") if mesh is None else mesh
     if mesh is None and not deck.is_file():
         raise ReferenceFileError(
-            f"{file} holds no nodes and elements: put the deck {deck.name} beside it, or give it (--mesh)"
+            f"{file} has no nodes and elements: put the deck {deck.name} into the same folder, or give it (--mesh)"
         )
     if deck.suffix.lower() != ".inp":
-        raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from the deck, a .inp file")
+        raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from its deck, a .inp file")
     refuse_unreadable(deck)
     try:
         contents = read_inp(read_file(deck, ReferenceFileError), deck.parent)
@@ -78,7 +78,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
 
 @dataclass
 class _Increment:
-    """What is printed at one time."""
+    """The tables printed at one time."""
 
     time: float
     is_mode: bool
@@ -90,7 +90,7 @@ class _Increment:
 
 
 class _Printed:
-    """Reads the tables of a file one after another."""
+    """Reader of the tables of a file."""
 
     def __init__(self, scan: Scan, deck: Contents) -> None:
         self._scan, self._deck = scan, deck
@@ -98,12 +98,12 @@ class _Printed:
         self._increments: list[_Increment] = []
 
     def increments(self) -> list[_Increment]:
-        """Return what is printed, in the file's order."""
+        """Return the increments in the order of the file."""
         scan = self._scan
         is_mode = False
         while line := scan.line():
             if b"\0" in line:
-                scan.refuse("this is no .dat file of CalculiX: it is binary, not text")
+                scan.refuse("not a .dat file of CalculiX: it is binary, not text")
             if not line.endswith(b"\n"):
                 scan.refuse(f"the file is cut off: {scan.shown(line)} has no line end")
             if _MODE.fullmatch(line):
@@ -121,10 +121,10 @@ class _Printed:
         try:
             time = float(head[3])
         except ValueError:
-            scan.refuse(f"{scan.shown(head[3])} is no time")
+            scan.refuse(f"{scan.shown(head[3])} is not a time")
         increment = self._increment(time, is_mode, (quantity, name))
         if scan.line().strip():
-            scan.refuse(f"an empty line is wanted below the head of {quantity}")
+            scan.refuse(f"an empty line is expected below the title of {quantity}")
         match quantity:
             case "displacements":
                 self._add_displacement(increment, name)
@@ -134,7 +134,7 @@ class _Printed:
                 increment.energy[name] = float(self._total(quantity, 1)[0])
 
     def _increment(self, time: float, is_mode: bool, table: tuple[str, str]) -> _Increment:
-        """Return the increment that a table belongs to: a time begins anew where a set is printed again."""
+        """Return the increment of a table; a new one starts if the time changes or the table is already in the last."""
         last = self._increments[-1] if self._increments else None
         if last is None or last.time != time or table in last.sets or is_mode:
             points = self._deck.points
@@ -146,7 +146,7 @@ class _Printed:
     def _total(self, quantity: str, width: int) -> Floats:
         line = self._scan.line()
         if not line.endswith(b"\n"):
-            self._scan.refuse(f"the file is cut off: {width} numbers of {quantity} are wanted")
+            self._scan.refuse(f"the file is cut off: {width} numbers of {quantity} are expected")
         return np.asarray(self._scan.columns([line], 6, (width, _REAL_WIDTH, "float"))[0][0])
 
     def _add_displacement(self, increment: _Increment, name: str) -> None:
@@ -178,7 +178,7 @@ class _Printed:
 
     def _rows(self, lines: Sequence[bytes], more: bool) -> tuple[Ints, Floats]:
         scan = self._scan
-        if not more:  # the line read last is the blank one behind
+        if not more:  # the last line read is the blank one after the table
             scan.line_number -= 1
         if not lines[-1].endswith(b"\n"):
             scan.refuse(f"the file is cut off: {scan.shown(lines[-1])} has no line end")
@@ -187,14 +187,14 @@ class _Printed:
         return nodes[:, 0], values
 
 
-# --- from tables to levels ------------------------------------------------------------------------
+# --- levels ---------------------------------------------------------------------------------------
 
 
 def _record(file: Path, deck: Contents, increments: Sequence[_Increment]) -> Record:
     moved = [increment for increment in increments if increment.is_known.any()]
     if not moved:
         raise ReferenceFileError(
-            f"{file} holds no table 'displacements (vx,vy,vz) for set ...': ask for it by *NODE PRINT and a line U"
+            f"{file} has no table 'displacements (vx,vy,vz) for set ...': request it by *NODE PRINT with a line U"
         )
     body = {name.upper(): np.unique(group) for name, group in deck.cell_groups.items()}
     elements = np.concatenate([block.numbers for block in deck.cells])
@@ -210,7 +210,7 @@ def _record(file: Path, deck: Contents, increments: Sequence[_Increment]) -> Rec
 
 
 def _energy(printed: Mapping[str, float], body: Mapping[str, Ints], elements: Ints) -> float | None:
-    """Return the energy of a set of all elements, or of sets that share them; None where these are not there."""
+    """Return the energy of the body: of a set of all elements, or the sum over sets that partition them; else None."""
     members = {name: body.get(name.upper(), np.zeros(0, dtype=np.int64)) for name in printed}
     for name, value in printed.items():
         if len(members[name]) == len(elements):
@@ -221,7 +221,7 @@ def _energy(printed: Mapping[str, float], body: Mapping[str, Ints], elements: In
 
 
 def _loaded(increment: _Increment, deck: Contents) -> list[str]:
-    """Return the sets with a total force that are not all nodes: on these, loads and reactions balance."""
+    """Return the sets with a total force, without sets of all nodes, on which loads and reactions balance."""
     sizes = {name.upper(): len(np.unique(group)) for name, group in deck.node_groups.items()}
     return [name for name in increment.force if sizes.get(name.upper()) != len(deck.points)]
 
@@ -236,11 +236,11 @@ def _notes(increments: Sequence[_Increment], levels: Sequence[Level], deck: Cont
     energies = sorted({name for one in increments for name in one.energy})
     if energies and any(level.energy is None for level in levels):
         notes.append(
-            f"internal energy is printed of {', '.join(energies)}: not once of the whole body, so it is left out"
+            f"internal energy is ignored: it is printed for {', '.join(energies)}, which do not partition the body"
         )
     forces = sorted({name for one in increments for name in _loaded(one, deck)})
     if len(forces) == 1:
-        notes.append(f"force is the total force of set {forces[0]} as printed: of supports the reaction")
+        notes.append(f"force is the total force of set {forces[0]}: for a set of supports the reaction")
     elif forces:
-        notes.append(f"total force is printed of several sets ({', '.join(forces)}): which is the load is not known")
+        notes.append(f"total force is ignored: it is printed for several sets ({', '.join(forces)})")
     return notes
