@@ -355,8 +355,8 @@ def test_levels_reached_are_kept_where_it_does_not_converge(tmp_path: Path, caps
     found = json.loads(printed.out)["models"]["calculix"]
     assert found["status"] == "not-converged" and 0 < found["load_factor"] < 1
     warning = found["warnings"][0]
-    assert f"last converged load factor: {found['load_factor']:g}" in warning
-    assert "increment size smaller than minimum" in warning and "load less" in warning
+    assert f"last good load factor: {found['load_factor']:g}" in warning
+    assert "increment size smaller than minimum" in warning and "load_steps" in warning
     assert "model 'calculix' is not-converged" in printed.err
     with (tmp_path / "study" / "curves.csv").open() as stream:
         levels = [float(row["load_factor"]) for row in csv.DictReader(stream) if row["model"] == "calculix"]

@@ -163,7 +163,7 @@ class CalculiX(Program):
             missed = levels[min(len(states), len(levels)) - 1]
             warnings.insert(
                 0,
-                f"load factor {missed:.6g} was not reached; last converged load factor: {states[-1].load_factor:.6g}; "
+                f"load factor {missed:.6g} was not reached; last good load factor: {states[-1].load_factor:.6g}; "
                 f"message of CalculiX: {_message(finished)}; {status.advice}. `truespring export` writes the deck",
             )
         unknown = [state.load_factor for state in states if math.isnan(state.energy)]
@@ -176,8 +176,8 @@ class CalculiX(Program):
         pressed = any(isinstance(card, FacePressure) for card in cards)
         if pressed and problem.section is not None and problem.section.free_thickness and self.finite:
             warnings.append(
-                "in CalculiX the pressure acts on the deformed thickness, in truespring on the undeformed one; in plane "
-                "strain there is no difference"
+                "in CalculiX the pressure acts on the deformed thickness, in truespring on the undeformed one; in "
+                "plane strain there is no difference"
             )
         warnings.append("stability not proven: CalculiX does not report it")
         return Solution(
