@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import truespring as ts
 from tests.names import words
 from truespring.arrays import Floats
+from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.models import RULES
 from truespring.models.lattices import LATTICES
@@ -268,14 +269,7 @@ def random_element(element: str, seed: int) -> ts.Problem:
     """One element of a random shape, not inverted."""
     kind = ELEMENT_KINDS[element]
     generator = np.random.default_rng(seed)
-    regular = {
-        "triangle": np.array([[0.0, 0], [1, 0], [0, 1]]),
-        "quadrilateral": ts.rectangle((1.0, 1.0), (1, 1)).nodes[[0, 1, 3, 2]],
-        "tetrahedron": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
-        "pyramid": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.7]]),
-        "wedge": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]),
-        "hexahedron": ts.box((1.0, 1.0, 1.0), (1, 1, 1)).nodes[[0, 1, 3, 2, 4, 5, 7, 6]],
-    }[element]
+    regular = CELL_SHAPES[kind.vtk].places
     stretched = regular * generator.uniform(0.6, 1.6, kind.dim)
     return one_element(
         stretched + generator.uniform(-0.15, 0.15, regular.shape), element, float(generator.uniform(0.0, 0.4))
@@ -286,12 +280,9 @@ def random_element(element: str, seed: int) -> ts.Problem:
 
 
 REGULAR = {
-    "triangle": one_element([[0.0, 0], [1, 0], [0, 1]], "triangle", 0.3),
-    "quadrilateral": brick(1.0, 1.0, poisson=0.3),
-    "tetrahedron": tetrahedron(1.0, 0.3),
-    "pyramid": random_element("pyramid", 1),
-    "wedge": random_element("wedge", 1),
-    "hexahedron": brick(1.0, 1.0, 1.0, poisson=0.3),
+    element: one_element(CELL_SHAPES[kind.vtk].places, element, 0.3)
+    for element, kind in ELEMENT_KINDS.items()
+    if element != "line"
 }
 SHAPES = {
     "square": brick(1.3, 1.3, poisson=0.3),
