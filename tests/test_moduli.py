@@ -123,6 +123,10 @@ def test_isotropic_rectangles_are_isotropic(aspect: float, length: float, degree
 def test_plane_strain_wants_the_moduli_seen_within_the_plane() -> None:
     told = ts.moduli(block(poisson=0.25, section=ts.PlaneStrain(1.0), young=3.0), ts.Springs(rule="projected"))
     assert (told.material_young, told.material_poisson) == pytest.approx((3 * 16 / 15, THIRD))
+    with pytest.warns(DeprecationWarning, match="material_young"):
+        assert told.young_wanted == told.material_young
+    with pytest.warns(DeprecationWarning, match="material_poisson"):
+        assert told.poisson_wanted == told.material_poisson
     assert told.young() == pytest.approx(15 / 17 * 3 * 16 / 15)
 
 
