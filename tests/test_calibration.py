@@ -427,6 +427,11 @@ def test_what_does_not_fit_is_refused() -> None:
         with pytest.raises(error, match=said):
             call()
     assert ts.calibrate(case, ts.Springs("lloyd"), evaluations=1).objectives["rule"] > 0
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    tilted = ts.Mesh(problem.mesh.nodes @ turn, problem.mesh.elements, "quadrilateral")
+    aslant = replace(problem, mesh=tilted, supports=ts.Fixed([0, 1]), loads=ts.Force([5], (0.0, 1.0)))
+    with pytest.raises(ModelError, match="along the axes"):
+        make_unknowns(aslant, ts.Springs("isotropic"), "direction-row")
     stiffer = replace(problem, material=ts.Material(20e3, 1 / 3))
     for other, what in ((cantilever((16, 4)), "mesh"), (stiffer, "material")):
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")

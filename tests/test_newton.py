@@ -1,6 +1,7 @@
 """The solver: buckling, scale invariance, prescribed motion, failure with the best state, supports that do not hold."""
 
 import math
+from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from scipy import sparse
 
 import truespring as ts
 from tests.closed_forms import bending_factor, buckled_column_tip
-from truespring.solvers.line_search import _candidates
+from truespring.solvers.line_search import Step, _candidates, _search
 
 SOFT = ts.Material(young=1.0, poisson=1 / 3)
 THIN = ts.PlaneStress(1.0)
@@ -469,3 +470,29 @@ def test_an_indefinite_tangent_is_shifted_by_ever_more_of_its_diagonal() -> None
     assert all(share == pytest.approx(share[0], rel=1e-6) for share in shares)
     assert all(before[0] < 0.5 * share[0] for before, share in pairwise(shares))
     assert shares[0][0] < 1e-4 < 1 < shares[-1][0]
+
+
+@pytest.mark.parametrize(
+    ("energy", "slope", "newton", "length"),
+    [
+        (lambda t: (t - 0.3) ** 2, lambda t: 2 * (t - 0.3), True, 0.3),  # by interpolation to the bottom at once
+        (lambda t: (t - 0.05) ** 2, lambda t: 2 * (t - 0.05), True, 0.05),  # a tenth, then half of it
+        (lambda t: (t - 0.9) ** 2, lambda t: 2 * (t - 0.9), False, 1.0),
+        (lambda t: -t if t < 0.9 else math.inf, lambda t: -1.0, True, 0.1),
+        (lambda t: -t if t < 0.9 else math.inf, lambda t: -1.0, False, 0.1),  # what was cut is not doubled
+        (lambda t: -t + (t / 40) ** 2, lambda t: -1 + t / 800, True, 1.0),
+        (lambda t: -t + (t / 40) ** 2, lambda t: -1 + t / 800, False, 512.0),  # while it goes down at its end too
+        (lambda t: -t, lambda t: -1.0, False, 1024.0),
+        (lambda t: t, lambda t: 1.0, True, None),
+    ],
+)
+def test_a_search_ends_where_the_energy_says(
+    energy: Callable[[float], float], slope: Callable[[float], float], newton: bool, length: float | None
+) -> None:
+    balance: Any = SimpleNamespace(
+        total_energy=lambda positions, level: (energy(positions[0, 0]), 1e-3),
+        force=lambda positions, level: np.array([[slope(positions[0, 0])]]),
+    )
+    step = Step(np.ones((1, 1)), -abs(slope(0.0)), newton)
+    found = _search(balance, 1.0, np.zeros((1, 1)), step)
+    assert found == (None if length is None else pytest.approx(np.array([[length]])))

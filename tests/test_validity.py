@@ -9,6 +9,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from truespring.validity.lines import polylines, spans
 from truespring.validity.loads import LOAD_TYPES, Bar
 from truespring.validity.refine import LINES, Cells, Rows, crossings
 from truespring.validity.sentences import headline, verdict
-from truespring.validity.solving import Task, run_task
+from truespring.validity.solving import SMALL, Solved, Task, run_task
 
 LATTICES = {"lloyd": (5 / 16, 7 / 16), "isotropic": (3 / 8, 3 / 8)}
 # One third, as a material has it whose springs need no term of volume.
@@ -137,6 +138,7 @@ def test_the_reference_is_converged_and_says_to_what(bent: Validity, study: Path
     apart = _two_refinements_finer(found, Body.of(read_study(study)))
     assert 0.2 * found.error < apart < found.error  # what it still was off is what it had told
     assert found.reached == pytest.approx(0.3, rel=0.02)
+    assert found.elements == 2 ** len(found.n_nodes)  # through the depth, of two on the first mesh
 
 
 def _two_refinements_finer(found: reference.Reference, body: Body) -> float:
@@ -178,6 +180,27 @@ def test_a_reference_says_why_it_ends_only_where_it_ends_early(asked: float) -> 
     for share, end in ((0.97, "why"), (0.99, ""), (1.0, "")):
         one = SimpleNamespace(solved=SimpleNamespace(end="why"), reached=share * asked, asked=asked)
         assert reference.Reference.end.fget(one) == end
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "finite", "kept"),
+    [
+        ({"area_ratio": -0.5}, True, 2),
+        ({"area_ratio": -0.5}, False, 4),  # of a linear model only a warning
+        ({"negative_eigenvalues": 1}, False, 2),
+        ({"branched": True}, True, 2),
+        ({}, True, 4),
+    ],
+)
+def test_no_state_beyond_the_first_that_is_unsound_is_mapped(spoilt: dict[str, Any], finite: bool, kept: int) -> None:
+    sound: dict[str, Any] = {"negative_eigenvalues": 0, "branched": False, "area_ratio": 0.9}
+    states = [SimpleNamespace(**sound, level=k / 3, loaded=k > 0) for k in range(4)]
+    states[2] = SimpleNamespace(**{**sound, **spoilt}, level=2 / 3, loaded=True)
+    small: Any = SimpleNamespace(at=lambda level: states[3])
+    path: Any = SimpleNamespace(states=states, finite=finite)
+    found = Solved(path, small, 0.0)
+    assert len(found.states) == kept
+    assert found.levels == pytest.approx([SMALL, *(k / 3 for k in range(1, kept))])
 
 
 def test_richardson_and_roache_to_the_letter() -> None:
@@ -512,6 +535,29 @@ def test_workers_find_what_one_process_finds(bent: Validity, study: Path) -> Non
     for one, other in zip(bent.maps, several.maps, strict=True):
         assert one.deviations.keys() == other.deviations.keys()
         assert other.errors == pytest.approx(one.errors, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ({"workers": 2}, (2, None)),
+        ({"workers": None}, (None, None)),
+        ({"scheduler": "tcp://there:1"}, (None, "tcp://there:1")),
+    ],
+)
+def test_other_processes_solve_where_they_are_asked(
+    study: Path, monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any], expected: tuple[Any, ...]
+) -> None:
+    class StartedError(Exception):
+        pass
+
+    def started(*arguments: Any, **more: Any) -> None:
+        raise StartedError(*arguments)
+
+    monkeypatch.setattr("truespring.validity.mapping.Pool", started)
+    with pytest.raises(StartedError) as caught:
+        map_validity(study, loads=["bend"], rules=["lloyd"], **asked)
+    assert caught.value.args == expected
 
 
 def test_lines_of_one_row_are_points(bent: Validity) -> None:
