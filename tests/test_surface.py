@@ -170,7 +170,7 @@ def test_triangles_without_area_hold_nothing() -> None:
         ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 3]], "0 to 2"),
         ([[0.0, 0.0], [1.0, 0.0], [0.0, np.nan]], [[0, 1, 2]], "not finite"),
         ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2], [0, 2, 1]], "no outline"),
-        ([[0.0, 0.0, 0.0]], [[0, 0, 0]], "wanted"),
+        ([[0.0, 0.0, 0.0]], [[0, 0, 0]], "expected"),
     ],
 )
 def test_what_is_no_surface_is_refused(points: list[list[float]], triangles: list[list[int]], word: str) -> None:
