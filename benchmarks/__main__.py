@@ -1,4 +1,4 @@
-"""Measure everything and rebuild docs/performance.md: python -m benchmarks [--small], or make bench."""
+"""Measure all programs and rebuild docs/performance.md: python -m benchmarks [--small], or make bench."""
 
 import argparse
 import json
@@ -9,13 +9,13 @@ from benchmarks import machine, runs
 from benchmarks.cases import LADDER, REFERENCE, SIZES
 from benchmarks.page import build
 
-# While something is being written: the small meshes, once each, and pages that do not replace the real ones.
+# Meshes of --small, for development: each is measured once, and the page is written elsewhere.
 _SMALL = {2: SIZES[2][:2], 3: SIZES[3][:2]}
 _SMALL_LADDER = {2: LADDER[2][:6], 3: LADDER[3][:4]}
 
 
 def measured(small: bool) -> dict:
-    """Return all that the page shows."""
+    """Return all measurements of the page."""
     sizes, ladder = (_SMALL, _SMALL_LADDER) if small else (SIZES, LADDER)
     limits = runs.bandwidth()
     found = runs.measure_all(runs.jobs(sizes, ladder), 1 if small else runs.REPEATS)
@@ -37,7 +37,7 @@ def measured(small: bool) -> dict:
 
 
 def main() -> None:
-    """Parse the command line, measure, write."""
+    """Measure the programs and write results and page."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--small", action="store_true", help="small meshes, once each, written to out/bench")
     small = parser.parse_args().small

@@ -1,4 +1,4 @@
-"""The figure docs/performance.svg: time over nodes, one line a program."""
+"""Draw docs/performance.svg: time over number of nodes, one line for each program."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from benchmarks.cases import SIZES, SPRINGS
 from benchmarks.runs import PROGRAMS, Measured
 
-# Springs in the colours of truespring, finite elements of its own in greys, peers in others; the dash tells the law.
+# Color and dash: springs in blue, finite elements of truespring in grey, peers in other colors; the dash shows the law.
 _STYLES = {
     "lloyd": ("#1f5fa8", "-"),
     "isotropic": ("#0b3c75", "-"),
@@ -21,7 +21,7 @@ _STYLES = {
 
 
 def draw(runs: Iterable[Measured], file: Path) -> None:
-    """Draw bending in 2D and 3D side by side."""
+    """Draw times in bending, 2D and 3D side by side, to an SVG file."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -43,6 +43,6 @@ def draw(runs: Iterable[Measured], file: Path) -> None:
         ax.spines[["top", "right"]].set_visible(False)
     figure.legend(labelled.values(), labelled.keys(), loc="outside right center", frameon=False, fontsize=9)
     figure.axes[0].set_ylabel("seconds from the mesh to equilibrium")
-    figure.suptitle("Bent by a force that moves the end of the springs by half the length", fontsize=11)
+    figure.suptitle("Bending by a force that moves the end of the springs by half the length", fontsize=11)
     with matplotlib.rc_context({"svg.hashsalt": "performance", "svg.fonttype": "path"}):
         FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None})

@@ -1,6 +1,6 @@
-"""The loops in which springs are solved, beside the bytes that they must move.
+"""Time the kernels of a spring solution against the bytes that they must move.
 
-python -m benchmarks.kernels CASE.npz RULE prints them, and without a case the bandwidth of memory.
+python -m benchmarks.kernels CASE.npz RULE prints them as JSON; without arguments, it prints the memory bandwidth.
 """
 
 import json
@@ -23,13 +23,13 @@ from truespring.kernels import threads
 from truespring.linear.iterative import Multigrid, Preconditioned
 from truespring.linear.multigrid import Hierarchy, Level
 
-# How much of a copy of the vectors conjugate gradients read and write an iteration beside product and preconditioner:
-# x, r, p, q read and x, r, p written, and to and from single precision.
+# Number of vectors that an iteration of conjugate gradients reads and writes besides product and preconditioner: reads
+# x, r, p, q, writes x, r, p, and converts to and from single precision.
 _VECTORS = 9
 
 
 def kernels(potential: ts.SpringNetwork, positions: np.ndarray, ready: Preconditioned) -> Iterator[Kernel]:
-    """Yield assembly, product and V-cycle at a state of a network."""
+    """Yield assembly, matrix product and V-cycle at positions [m] of a network."""
     stress = potential.stress(positions)
     matrix = potential.hessian(positions, stress)
     springs = potential.springs.size * 4 + potential.stiffness.nbytes + stress.nbytes
@@ -47,12 +47,12 @@ def kernels(potential: ts.SpringNetwork, positions: np.ndarray, ready: Precondit
 
 
 def _once(level: Level) -> int:
-    """The bytes of a matrix as it is read once for a product."""
+    """Return the bytes of a matrix that a product reads."""
     return level.columns.nbytes + level.lower.nbytes + level.rest.nbytes
 
 
 def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
-    """What a V-cycle reads: each matrix twice, once down and once up, each transfer once each way."""
+    """Return the bytes that a V-cycle reads: each matrix twice (down and up), each transfer once each way."""
     levels = [finest, *coarse.levels]
     matrices = sum(2 * (level.columns.nbytes + level.lower.nbytes + level.inverse.nbytes) for level in levels)
     return matrices + sum(transfer.n_bytes for transfer in coarse.transfers) + coarse.inverse.nbytes
@@ -60,11 +60,12 @@ def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
 
 @contextmanager
 def profile() -> Iterator[Counter[str]]:
-    """Count the seconds that each kernel takes, the hand-over to threads included."""
+    """Yield a counter of the time of each kernel [s], including the overhead of threads."""
     taken: Counter[str] = Counter()
     run = threads.run
 
     def timed(function: Any, *arguments: Any, **options: Any) -> list[Any]:
+        """Run a kernel and count its time."""
         started = time.perf_counter()
         found = run(function, *arguments, **options)
         module = function.__module__.rpartition(".")[2] if hasattr(function, "py_func") else "assembly"
@@ -79,7 +80,7 @@ def profile() -> Iterator[Counter[str]]:
 
 
 def measured(case: Case, rule: str) -> tuple[list[Moved], Counter[str]]:
-    """Return the kernels at the equilibrium of a case and the whole solve, and where its time goes."""
+    """Return times of the kernels at the equilibrium of a case and of the whole solution, and its time by kernel."""
     problem = problem_of(case)
     model, newton = ts.Springs(rule), ts.Newton(load_steps=1, tolerance=TOLERANCE, linear="multigrid")
     ts.solve(problem, model, newton)
@@ -98,7 +99,7 @@ def measured(case: Case, rule: str) -> tuple[list[Moved], Counter[str]]:
 
 
 def main() -> None:
-    """Print the rows of a case as JSON, or without one the bandwidth."""
+    """Print the measurements of a case as JSON, or without one the bandwidth."""
     if len(sys.argv) == 1:
         found = bandwidth()
     else:

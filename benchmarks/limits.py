@@ -1,4 +1,4 @@
-"""The limit: how fast this machine's memory is, and how near to it compiled loops come that do little but move it."""
+"""Memory bandwidth of this machine, and the time of kernels relative to it."""
 
 import os
 import statistics
@@ -10,17 +10,20 @@ from functools import partial
 
 import numpy as np
 
-# Of each array [bytes]: far larger than any cache.
+# Size of each array [bytes]: much larger than any cache.
 _ARRAY = 2**29
 _REPEATS = 7
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """A loop to be timed: `run` does it once, and has to move `bytes_moved` to and from memory to do so.
+    """A loop to time.
 
-    What must move is every input once and every output once; what an input or output that fits into a
-    cache is read again is not counted, nor what the hardware reads of a line before it is written.
+    Attributes:
+        name: name in the table.
+        run: runs it once.
+        bytes_moved: bytes that must move: each input and each output once. Repeated reads from cache, and reads of
+            cache lines before they are written, do not count.
     """
 
     name: str
@@ -30,27 +33,27 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Moved:
-    """What a kernel took: the median of several runs [s], and the bytes it must move."""
+    """Median time of several runs of a kernel [s], and the bytes that it must move."""
 
     name: str
     seconds: float
     bytes_moved: int
 
     def over(self, bandwidth: float) -> float:
-        """How many times longer than the bytes alone at `bandwidth` [bytes/s]."""
+        """Return the time relative to that of moving the bytes at `bandwidth` [bytes/s]."""
         return self.seconds * bandwidth / self.bytes_moved
 
 
 def measure(kernel: Kernel, repeats: int = _REPEATS) -> Moved:
-    """Time a kernel, after a run that is not counted."""
+    """Return the time of a kernel after a warm-up run."""
     kernel.run()
     return Moved(kernel.name, statistics.median(_timed(kernel.run) for _ in range(repeats)), kernel.bytes_moved)
 
 
 def bandwidth() -> dict[str, float]:
-    """Return the bytes a second that can be read, and read and written, by one thread and by all: the best of several.
+    """Return the bandwidth [bytes/s] of reading and of copying, by one thread and by all: the best of several runs.
 
-    Of a copy both what is read and what is written counts.
+    Of a copy, both bytes read and bytes written count.
     """
     n, cores = _ARRAY // 8, os.cpu_count() or 1
     source, target = np.ones(n), np.zeros(n)
@@ -69,11 +72,12 @@ def bandwidth() -> dict[str, float]:
 
 
 def _all(pool: ThreadPoolExecutor, function: Callable[..., object], arrays: Sequence[list[np.ndarray]]) -> None:
-    """Call a function on the pieces of arrays, each in a thread."""
+    """Call a function on pieces of arrays, each in a thread."""
     list(pool.map(function, *arrays))
 
 
 def _timed(function: Callable[[], object]) -> float:
+    """Return the wall time of a call [s]."""
     started = time.perf_counter()
     function()
     return time.perf_counter() - started

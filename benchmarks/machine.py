@@ -1,4 +1,4 @@
-"""What machine and which programs the numbers are of: no names, no places."""
+"""Hardware, versions, commit and date of measurements, without names and paths of the machine."""
 
 import os
 import platform
@@ -25,9 +25,10 @@ def hardware() -> dict[str, str | int]:
 
 
 def _processor() -> str:
-    told = Path("/proc/cpuinfo")
-    if told.is_file():
-        lines = dict(line.split(":", 1) for line in told.read_text().split("\n\n")[0].splitlines() if ":" in line)
+    """Return model, family and cache of the processor."""
+    file = Path("/proc/cpuinfo")
+    if file.is_file():
+        lines = dict(line.split(":", 1) for line in file.read_text().split("\n\n")[0].splitlines() if ":" in line)
         fields = {name.strip(): value.strip() for name, value in lines.items()}
         parts = [fields.get("model name", "")]
         parts += [f"family {fields['cpu family']} model {fields['model']}"] if "cpu family" in fields else []
@@ -37,24 +38,24 @@ def _processor() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Return the version of Python and of what truespring computes with."""
+    """Return the versions of Python and of the numerical packages."""
     found = {"Python": platform.python_version()}
     for name in _OURS:
         try:
             found[name] = version(name)
-        except ModuleNotFoundError:  # rslab may be absent
+        except ModuleNotFoundError:  # rslab is optional
             continue
     return found
 
 
 def commit() -> str:
-    """Return the commit that is measured, empty outside of a repository."""
-    told = subprocess.run(
+    """Return the commit of the code, empty outside of a repository."""
+    done = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
     )
-    return told.stdout.strip()
+    return done.stdout.strip()
 
 
 def today() -> str:
-    """Return the date, in universal time."""
+    """Return the date in UTC."""
     return datetime.now(UTC).date().isoformat()

@@ -1,4 +1,4 @@
-"""Record the programs that are too slow to be measured each time: python -m benchmarks.record PYTHON.
+"""Measure the programs that are too slow for each run: python -m benchmarks.record PYTHON.
 
 PYTHON is an interpreter with torch-fem, pypardiso and JAX. Writes recorded.json, which the page shows.
 """
@@ -9,8 +9,8 @@ import sys
 from benchmarks import machine
 from benchmarks.runs import HERE, Job, in_process
 
-# Module, label, what matter is, dimension, elements over the height.
-_WANTED = (
+# Module, label, material law, dimension, elements over the height.
+_RECORDED = (
     ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 2, 12),
     ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 3, 6),
     ("jax_springs", "JAX with SciPy's L-BFGS", "the springs of Lloyd's rule", 2, 12),
@@ -19,9 +19,9 @@ _WANTED = (
 
 
 def main() -> None:
-    """Run them once each."""
+    """Run each program once and write the results."""
     runs = []
-    for module, label, matter, dim, depth in _WANTED:
+    for module, label, matter, dim, depth in _RECORDED:
         job = Job(label, dim, "bending", depth)
         found = in_process(f"programs.{module}", job, (), sys.argv[1])
         if "failure" in found:

@@ -1,4 +1,4 @@
-"""Runs: each program on each case in a process of its own; results are kept, so that a break costs little."""
+"""Run programs on cases, each in a separate process; results are cached, so that an interrupted run can resume."""
 
 import hashlib
 import json
@@ -22,28 +22,28 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 CACHE = HERE / ".cache"
 
-#: What a solve may take [s]; larger meshes of that load are then not given to the program.
+#: Time limit of a solution [s]; beyond it the program does not solve larger meshes of that load.
 LIMIT = 120.0
 
-# Failing attempts, warming up and reading come on top of what is timed.
+# Time limit of a process [s], with reading, warm-up and failed attempts.
 _PROCESS_LIMIT = 3 * LIMIT
 
-# Solves shorter than this [s] are run REPEATS times, for their median; those of the LADDER once.
+# Solutions faster than this [s] are repeated REPEATS times, for the median; those of LADDER run once.
 _SHORT, REPEATS = 20.0, 3
 
 
 @dataclass(frozen=True)
 class Program:
-    """What is run.
+    """A program to measure.
 
     Attributes:
-        label: how tables and the figure call it.
-        law: what it takes matter for.
-        module: of benchmarks.programs.
-        arguments: after the case.
-        dims: of the bodies whose SIZES it is run on.
-        ladder: of the bodies whose LADDER it is run on, bending only.
-        peer: whether it lives in the environment of the peers.
+        label: name in tables and the figure.
+        law: material law.
+        module: module of benchmarks.programs.
+        arguments: command-line arguments after the case.
+        dims: dimensions of the bodies whose SIZES it runs on.
+        ladder: dimensions of the bodies whose LADDER it runs on, in bending only.
+        peer: whether it needs the environment of the peers.
     """
 
     label: str
@@ -74,7 +74,7 @@ PROGRAMS = {
 
 @dataclass(frozen=True)
 class Job:
-    """One program on one mesh."""
+    """One program on one mesh under one load."""
 
     program: str
     dim: int
@@ -83,15 +83,22 @@ class Job:
 
     @property
     def n_nodes(self) -> int:
-        """Of the mesh."""
+        """The number of nodes of the mesh."""
         return n_nodes(self.dim, self.depth)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What all runs of a job gave: `seconds` has one value a run, and none where `failure` says why.
+    """Results of a job.
 
-    The other values are of the last run, `peak_bytes` over that of an empty Python process.
+    Attributes:
+        program, dim, load, depth, n_nodes: the job.
+        seconds: time of each run [s], empty after a failure.
+        tip: displacement of the loaded end [m].
+        iterations, linear_iterations, lanczos_iterations: numbers of iterations of the last run.
+        peak_bytes: peak memory of the last run beyond that of an empty Python process [bytes].
+        version, notes: version of the program, and remarks on the run.
+        failure: why there is no result, else empty.
     """
 
     program: str
@@ -111,37 +118,37 @@ class Measured:
 
     @property
     def median(self) -> float:
-        """Of the seconds."""
+        """The median of the times [s]."""
         return statistics.median(self.seconds)
 
 
 def jobs(sizes: dict[int, tuple[int, ...]], ladder: dict[int, tuple[int, ...]]) -> Iterator[Job]:
     """Yield all jobs; those of one program and load from small to large."""
-    for dim, load in sorted(LOADS, key=lambda one: one[1]):  # what is bent first
+    for dim, load in sorted(LOADS, key=lambda one: one[1]):  # bending first
         largest = STRETCHED[dim] if load == "stretching" else max(sizes[dim])
         for name, program in PROGRAMS.items():
             rungs = ladder[dim] if load == "bending" and dim in program.ladder else ()
             elements = name.startswith("fem") or (dim == 3 and name == "biquadratic")
             most = min(largest, REFERENCE[dim]) if elements else largest
-            wanted = [depth for depth in sizes[dim] if depth <= most] if dim in program.dims else []
-            yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *wanted}))
+            depths = [depth for depth in sizes[dim] if depth <= most] if dim in program.dims else []
+            yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *depths}))
 
 
-def measure_all(wanted: Iterable[Job], repeats: int = REPEATS) -> list[Measured]:
-    """Run jobs, from the cache where they were run before; leave out what would take longer than LIMIT."""
+def measure_all(planned: Iterable[Job], repeats: int = REPEATS) -> list[Measured]:
+    """Return the results of jobs, cached ones without running; skip jobs that would exceed LIMIT."""
     empty, last, found = empty_process(), None, []
-    for job in wanted:
+    for job in planned:
         same = last is not None and (last.program, last.dim, last.load) == (job.program, job.dim, job.load)
         reason = too_slow(last, job) if same else ""
         last = _nothing(job, reason) if reason else measure(job, repeats if job.depth in SIZES[job.dim] else 1)
         found.append(replace(last, peak_bytes=max(0, last.peak_bytes - empty)))
-        told = f"{last.median:.3g} s, tip {last.tip:.7g} m {last.notes}" if last.seconds else last.failure
-        sys.stderr.write(f"{job.program:12} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {told}\n")
+        result = f"{last.median:.3g} s, tip {last.tip:.7g} m {last.notes}" if last.seconds else last.failure
+        sys.stderr.write(f"{job.program:12} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {result}\n")
     return found
 
 
 def too_slow(last: Measured, job: Job) -> str:
-    """Return why a job is left out after what a smaller mesh took, if it is: the time at best grows with the nodes."""
+    """Return why a job would exceed LIMIT, judged by a smaller mesh and time proportional to nodes; else empty."""
     if not last.seconds:
         return last.failure
     if last.median * job.n_nodes / last.n_nodes > LIMIT:
@@ -150,7 +157,7 @@ def too_slow(last: Measured, job: Job) -> str:
 
 
 def measure(job: Job, repeats: int) -> Measured:
-    """Run a job once, and again where that was short."""
+    """Return the results of a job, repeated if it is fast."""
     runs: list[dict] = []
     while len(runs) < repeats and (not runs or runs[0]["seconds"] < _SHORT):
         name = f"{job.program}-{job.dim}d-{job.load}-{job.depth}-{len(runs)}"
@@ -163,11 +170,12 @@ def measure(job: Job, repeats: int) -> Measured:
 
 
 def _nothing(job: Job, failure: str) -> Measured:
+    """Return the result of a job that failed."""
     return Measured(**asdict(job), n_nodes=job.n_nodes, failure=failure)
 
 
 def cached(name: str, code: str, run: Callable[[], Any]) -> Any:
-    """Return what `run` gives, from the cache if it is there under the same digest of its code."""
+    """Return the result of `run`, from the cache if it has one for the same digest of the code."""
     file = CACHE / f"{name}-{code}.json"
     if not file.is_file():
         found = run()
@@ -177,7 +185,7 @@ def cached(name: str, code: str, run: Callable[[], Any]) -> Any:
 
 
 def fingerprint(name: str) -> str:
-    """A digest of what the times of a program depend on: its code here, the cases, the machine."""
+    """Return a digest of the code of a program, the cases and the machine, which the times depend on."""
     program = PROGRAMS[name]
     peers = [HERE / "peers.txt", *HERE.glob("programs/neo_hooke.py")]
     files = [HERE / "cases.py", HERE / "programs" / "common.py", HERE / "programs" / f"{program.module}.py"]
@@ -189,13 +197,13 @@ def fingerprint(name: str) -> str:
 
 
 def execute(job: Job) -> dict[str, Any]:
-    """Run a job in a process of its own; return what it printed, or {"failure": why}."""
+    """Run a job in a separate process; return its output, or {"failure": why}."""
     program = PROGRAMS[job.program]
     return in_process(f"programs.{program.module}", job, program.arguments, python(program.peer))
 
 
 def in_process(module: str, job: Job, arguments: tuple[str, ...], interpreter: str = sys.executable) -> Any:
-    """Give the case of a job to a module of benchmarks; return what it prints, or {"failure": why}."""
+    """Run a module of benchmarks on the case of a job; return its output, or {"failure": why}."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.npz"
         bar(job.dim, job.load, job.depth).write(file)
@@ -208,7 +216,7 @@ def in_process(module: str, job: Job, arguments: tuple[str, ...], interpreter: s
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
-            except BaseException:  # also of the user, who stops all
+            except BaseException:  # KeyboardInterrupt included
                 os.killpg(process.pid, signal.SIGKILL)
                 raise
     if process.returncode:
@@ -217,7 +225,7 @@ def in_process(module: str, job: Job, arguments: tuple[str, ...], interpreter: s
 
 
 def bandwidth() -> dict[str, float]:
-    """Return the bandwidth of the machine's memory [bytes/s], see `limits.bandwidth`; measured anew each time."""
+    """Return the memory bandwidth [bytes/s], see `limits.bandwidth`; never cached."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.kernels"], cwd=ROOT, env=environment(), stdout=PIPE, text=True, check=True
     )
@@ -225,7 +233,7 @@ def bandwidth() -> dict[str, float]:
 
 
 def kernels(dim: int, depth: int) -> dict[str, Any]:
-    """Return the kernels of springs on the bent body, see `kernels.measured`; no rows if that failed."""
+    """Return the times of the kernels of springs in bending, see `kernels.measured`; no rows after a failure."""
     rule = SPRINGS[dim]
     job = Job(rule, dim, "bending", depth)
     found = cached(
@@ -235,26 +243,26 @@ def kernels(dim: int, depth: int) -> dict[str, Any]:
 
 
 def python(peer: bool) -> str:
-    """Return the interpreter of the peers' environment or of this one."""
+    """Return the Python interpreter of the peers' environment, or the current one."""
     return str(ROOT / ".venv-peers" / "bin" / "python") if peer else sys.executable
 
 
 def environment() -> dict[str, str]:
-    """Return what processes see: every core, and no choice of kernels made for another program."""
-    unwanted = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "PYTHONPATH")
-    kept = {name: value for name, value in os.environ.items() if name not in unwanted}
+    """Return the environment variables of processes: all cores, and no settings of BLAS or Python paths."""
+    removed = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "PYTHONPATH")
+    kept = {name: value for name, value in os.environ.items() if name not in removed}
     return kept | {"OMP_NUM_THREADS": str(os.cpu_count())}
 
 
 def empty_process() -> int:
     """Return the peak memory of a Python process that imports nothing [bytes]."""
-    told = "print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')).split()[1])"
-    done = subprocess.run([sys.executable, "-I", "-S", "-c", told], capture_output=True, text=True, check=False)
+    code = "print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')).split()[1])"
+    done = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, check=False)
     return int(done.stdout or 0) * 1024
 
 
 def command_line(repeats: int = REPEATS) -> dict[str, float]:
-    """Return the wall times [s] of two commands, from a warm cache: medians."""
+    """Return the median wall times of two commands [s], with warm caches."""
     program = str(Path(sys.executable).parent / "truespring")
     study = str(ROOT / "examples" / "bending.toml")
     found = {}

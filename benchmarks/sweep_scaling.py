@@ -1,6 +1,6 @@
-"""How a sweep of equal points grows with its workers, and what a point costs beside its solve.
+"""Measure the speedup of a sweep by its workers, and the overhead of a point.
 
-`python -m benchmarks.sweep_scaling [POINTS]`, by default 200, prints its figures and writes sweep_scaling.json here.
+`python -m benchmarks.sweep_scaling [POINTS]`, by default 200, prints the results and writes sweep_scaling.json.
 """
 
 import json
@@ -18,19 +18,19 @@ from truespring.sweeping import Pool, plan_sweep, run_sweep
 
 _STUDY = Path(__file__).parents[1] / "examples" / "bending.toml"
 
-# A pause that takes no core: what a sweep adds to it is its own [s].
+# A task that sleeps uses no core: the rest of its time is overhead of the sweep [s].
 _PAUSE = 0.05
 
 
 def pause(seconds: float) -> float:
-    """A task without work."""
+    """Sleep, and return the time [s]."""
     time.sleep(seconds)
     return seconds
 
 
 def main(n_points: int) -> int:
-    """Measure, print and write."""
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None  # of others: they make all of this slower
+    """Measure, print and write the results; return the exit code."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None  # other processes slow the measurement
     alone = {workers: _pauses(workers, n_points) for workers in (1, 2)}
     overhead = {workers: (alone[workers] - n_points * _PAUSE / workers) / n_points * workers for workers in alone}
     swept = {workers: _sweep(workers, n_points) for workers in (1, 2)}
@@ -54,14 +54,14 @@ def main(n_points: int) -> int:
 
 
 def _pauses(workers: int, n_points: int) -> float:
-    """Seconds for so many pauses, by workers that are up and have been asked once."""
+    """Return the time of `n_points` pauses on workers that have already started [s]."""
     with Pool(workers) as pool:
         list(pool.run(dict.fromkeys(range(4 * workers), 0.01), pause))
         return _timed(lambda: list(pool.run(dict.fromkeys(range(n_points), _PAUSE), pause)))
 
 
 def _sweep(workers: int, n_points: int) -> dict[str, float]:
-    """Seconds for a sweep of equal points, with the start of its workers and without: from the first record on."""
+    """Return the time of a sweep of equal points [s]: `whole`, and `warm` without the start of the workers."""
     vary = {"material.density": [1000.0 + number for number in range(n_points)], "mesh.elements": [[32, 8]]}
     plan = plan_sweep(_STUDY, vary)
     came: list[float] = []
@@ -69,11 +69,12 @@ def _sweep(workers: int, n_points: int) -> dict[str, float]:
         whole = _timed(
             lambda: run_sweep(plan, Path(folder), workers, progress=lambda *_: came.append(time.perf_counter()))
         )
-    first = 1 + workers  # the progress of nothing, then a point a worker, which compiles and loads
+    first = 1 + workers  # the first report has no points; the first point of each worker loads and compiles
     return {"whole": whole, "warm": (came[-1] - came[first]) * n_points / (n_points - workers)}
 
 
 def _timed(call: Callable[[], Any]) -> float:
+    """Return the wall time of a call [s]."""
     begun = time.perf_counter()
     call()
     return time.perf_counter() - begun

@@ -1,4 +1,4 @@
-"""Rows of docs/verification.md on loads that follow, paths past limit points, and columns that buckle."""
+"""Rows of docs/verification.md on following loads, paths past limit points, and buckling columns."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -10,12 +10,12 @@ from tests.test_network import FORCE, LIMITS, dome, shallow_truss
 
 import truespring as ts
 
-#: What, measured, wanted, source; and of finite elements how far they are from their own limit.
+#: Quantity, computed value, exact value, source; and for finite elements their discretisation error.
 Found = tuple[str, float, float, str] | tuple[str, float, float, str, ts.OwnError]
 
 
 def trusses() -> Iterator[Found]:
-    """Limit loads of the truss of von Mises and of the star dome."""
+    """Yield limit loads of the von Mises truss and of the star dome."""
     for rise in LIMITS:
         limit = shallow_truss_limit(1.0, rise, 1 / math.hypot(1.0, rise))[1]
         network = shallow_truss(rise)
@@ -23,8 +23,8 @@ def trusses() -> Iterator[Found]:
         path = ts.solve(problem, network, ts.DisplacementControl([1], "y", to=-2.4 * rise, steps=24))
         first, second = (state.load_factor * limit for state in path.states if state.critical == "limit point")
         source = "2 EA (1 - r)^(3/2), r = (c / L)^(2/3)"
-        yield f"truss of von Mises, rise {rise:g}: limit load over EA", first, limit, source
-        yield f"truss of von Mises, rise {rise:g}: second limit load", second, -limit, source
+        yield f"von Mises truss, rise {rise:g}: limit load over EA", first, limit, source
+        yield f"von Mises truss, rise {rise:g}: second limit load", second, -limit, source
     network = dome(published=True)
     supports, load = ts.Fixed(list(range(7, 13))), ts.Force([0], (0.0, 0.0, -FORCE))
     problem = ts.Problem(network.mesh, supports=supports, loads=load)
@@ -37,17 +37,17 @@ def trusses() -> Iterator[Found]:
 
 
 def columns() -> Iterator[Found]:
-    """Buckling loads of clamped columns by Lloyd's springs, over Euler's of the material."""
+    """Yield buckling loads of clamped columns of Lloyd's springs over Euler's load of the material."""
     for depth in (2, 4):
         path = column(depth, 40)
         first = next(state for state in path.states if state.critical == "bifurcation")
-        wanted = bending_factor(5 / 16, 7 / 16, depth)
+        exact = bending_factor(5 / 16, 7 / 16, depth)
         what = f"column, L/H = 40, {depth} elements deep: buckling load over pi^2 E I / 4 L^2"
-        yield what, 1.2 * first.load_factor, wanted, "EI of the springs, closed form"
+        yield what, 1.2 * first.load_factor, exact, "EI of the springs, closed form"
 
 
 def column(depth: int, slender: int) -> ts.Solution:
-    """A clamped column of Lloyd's springs, pressed along its axis by 1.2 times Euler's load of its material."""
+    """Return the path of a clamped column of Lloyd's springs, compressed by 1.2 times Euler's load of its material."""
     load = -1.2 * math.pi**2 / (4 * slender**2) / 12
     problem = ts.Problem(
         ts.rectangle((float(slender), 1.0), (slender * depth, depth)),
@@ -60,7 +60,7 @@ def column(depth: int, slender: int) -> ts.Solution:
 
 
 def circles() -> Iterator[Found]:
-    """A strip bent to a full circle by a moment that follows its end; and Sze, Liu, Lo's cantilever under end shear."""
+    """Yield a strip bent to a full circle by a following moment, and the cantilever under end shear of Sze, Liu, Lo."""
     for depth in (2, 4):
         problem, path = circle(depth)
         end = problem.mesh.nodes[:, 0] == 40.0
@@ -79,7 +79,7 @@ def circles() -> Iterator[Found]:
 
 
 def circle(depth: int) -> tuple[ts.Problem, ts.Solution]:
-    """A strip of isotropic springs, L/H = 40, under M = 2 pi EI(n) / L at its end."""
+    """Return problem and solution of a strip of isotropic springs, L/H = 40, under M = 2 pi EI(n) / L at its end."""
     moment = 2 * math.pi * bending_factor(3 / 8, 3 / 8, depth) / 12 / 40
     problem = ts.Problem(
         ts.rectangle((40.0, 1.0), (40 * depth, depth)),
@@ -92,13 +92,13 @@ def circle(depth: int) -> tuple[ts.Problem, ts.Solution]:
 
 
 def loads() -> Iterator[Found]:
-    """A pipe under pressure and a hanging bar, by finite elements."""
+    """Yield a pipe under pressure and a hanging bar, by finite elements."""
     exact = 1.3 / (1000 * 3) * (0.4 + 4)
     once, steps = ts.Newton(load_steps=1), ts.Newton(load_steps=20)
     for n in (8, 16, 32):
         problem, model = pipe(n), ts.Fem("linear")
         state = ts.solve(problem, model, once).states[-1]
-        what = f"pipe, b = 2 a, under pressure, {n} elements through the wall: widening"
+        what = f"pipe, b = 2 a, under pressure, {n} elements through the wall: radial displacement"
         yield what, float(state.displacement[0, 0]), exact, "Lame", ts.reference_error(problem, model, once)
     _, energy = pressed_pipe(150.0, 1000.0, 0.3, 1.0, 2.0)
     for n in (4, 8, 16):
@@ -116,8 +116,8 @@ def loads() -> Iterator[Found]:
     )
     state = ts.solve(problem, ts.Fem("linear"), once).states[-1]
     own = ts.reference_error(problem, ts.Fem("linear"), once)
-    wanted = 1000 * 9.81 * 0.2**2 / 2e5
-    yield "hanging bar: lengthening", float(state.displacement[-1, 0]), wanted, "rho g L^2 / 2 E", own
+    exact = 1000 * 9.81 * 0.2**2 / 2e5
+    yield "hanging bar: elongation", float(state.displacement[-1, 0]), exact, "rho g L^2 / 2 E", own
 
 
 ROWS: tuple[Callable[[], Iterator[Found]], ...] = (trusses, columns, circles, loads)

@@ -99,5 +99,5 @@ class Pattern:
 
         result = np.zeros((self.n_nodes, self.dim))
         by_node = np.ascontiguousarray(values).reshape(-1, self.dim)
-        run(sparsity.add_rows, self.n_nodes, self.elements.shape[1], self.at_starts, self.at, by_node, result)
+        run(sparsity.add_rows, self.n_nodes, self.at_starts, self.at, by_node, result)
         return result

@@ -1,13 +1,16 @@
-"""Loops over the rows of a symmetric matrix of node blocks, in the form in which it is iterated with.
+"""Loops over the rows of a symmetric matrix of node blocks, in the form that iterative solvers use.
 
-Only blocks left of the diagonal are kept, in single precision: each serves its own row, and transposed that
-of its column, while it is at hand. The diagonal is kept as `rest`, the sum of a row's blocks, in double: A x at
-node i is rest_i x_i + sum A_ij (x_j - x_i). A body moved as a whole has exactly the forces that it should,
-however many nodes it has; rounding a spring's block is a spring a little different.
+Only blocks left of the diagonal are stored, in single precision: each acts on its row and, transposed, on the row of
+its column. Instead of the diagonal, the sum `rest` of a row's blocks is stored in double precision: A x at node i is
+rest_i x_i + sum A_ij (x_j - x_i). A rigid translation then has exact forces for any number of nodes; rounding a block
+only changes the stiffness of a spring slightly.
 
-Rows are cut into one piece a thread. A block whose row and column are in different pieces is crossing: the
-loops over pieces pass it over where two threads could write to one row, and those over `bounds`, where pieces
-begin and the last one ends, see to it.
+Each thread has a piece of the rows. A block whose row and column are in different pieces is crossing: loops over pieces
+skip it where two threads could write to one row, and the loops over `bounds` (first row of each piece, then the number
+of rows, shape (n_pieces + 1,)) add it.
+
+Unless stated, `starts`, `columns` and `lower` are of the blocks left of the diagonal. `zero` has length k, the number
+of unknowns per node.
 """
 
 from typing import Any
@@ -20,7 +23,10 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def count_lower(first: int, last: int, starts: Any, columns: Any, counts: Any) -> None:
-    """Count the blocks left of the diagonal of each row, whose columns ascend; -1 where there is no diagonal one."""
+    """Count the blocks left of the diagonal of each row, -1 if the diagonal block is missing.
+
+    Shapes: starts (n + 1,), columns (n_blocks,) of all blocks; counts (n,).
+    """
     for i in range(first, last):
         p = starts[i]
         while p < starts[i + 1] and columns[p] < i:
@@ -30,7 +36,10 @@ def count_lower(first: int, last: int, starts: Any, columns: Any, counts: Any) -
 
 @kernel
 def take_lower(first: int, last: int, starts: Any, columns: Any, lower_starts: Any, lower_columns: Any) -> None:
-    """Write the columns of those blocks."""
+    """Write the columns of the blocks left of the diagonal.
+
+    Shapes: starts (n + 1,), columns (n_blocks,) of all blocks; lower_starts (n + 1,), lower_columns (n_lower,).
+    """
     for i in range(first, last):
         for q in range(lower_starts[i], lower_starts[i + 1]):
             lower_columns[q] = columns[starts[i] + q - lower_starts[i]]
@@ -53,12 +62,14 @@ def condense(
     added: Any,
     zero: Any,
 ) -> int:
-    """Bring rows to that form, times `scale`, held directions replaced by ones on the diagonal.
+    """Convert rows to the form of this module, times `scale`, with ones on the diagonal for held directions.
 
-    Before it is inverted half the sizes of the crossing blocks are `added` to the diagonal: so the smoother is positive
-    wherever pieces are cut (l1 Gauss-Seidel; Baker, Falgout, Kolev, Yang, SIAM J. Sci. Comput. 33, 2011).
+    Half the sizes of the crossing blocks are `added` to the diagonal before it is inverted: the smoother is then
+    positive for any pieces (l1 Gauss-Seidel; Baker, Falgout, Kolev, Yang, SIAM J. Sci. Comput. 33, 2011).
 
-    Returns how many diagonal blocks are not positive definite.
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), held (n, k); bounds (n_pieces + 1,),
+    lower_starts (n + 1,), lower (n_lower, k, k), rest, inverse (n, k, k), added (n, k).
+    Returns the number of diagonal blocks that are not positive definite.
     """
     size = len(zero)  # known when compiled
     work, total = np.empty((size, 2 * size)), np.empty((size, size))
@@ -84,13 +95,13 @@ def condense(
                 for c in range(size):
                     for e in range(size):
                         value = 0.0 if held[i, c] or held[unsigned(j), e] else scale * data[unsigned(p), c, e]
-                        total[c, e] += value  # not as rounded: the sum of a row stays what it is
+                        total[c, e] += value  # in double precision: the sum of a row stays exact
                         if crossing:
                             work[c, c] += 0.5 * abs(value)
                             added[i, c] += 0.5 * abs(value)
                         if p < own:
                             lower[unsigned(p + shift), c, e] = value
-        for c in range(size):  # Gauss and Jordan; the pivots of a positive block are positive
+        for c in range(size):  # Gauss-Jordan elimination; the pivots of a positive definite block are positive
             pivot = work[c, c]
             if not pivot > 0.0:
                 bad += 1
@@ -113,7 +124,10 @@ def condense(
 
 @kernel
 def product(first: int, last: int, starts: Any, columns: Any, lower: Any, rest: Any, x: Any, y: Any, zero: Any) -> None:
-    """y = A x, but for what crossing blocks give to the rows of other pieces."""
+    """Write y = A x without the contributions of crossing blocks to rows of other pieces.
+
+    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), rest (n, k, k), x, y (n, k).
+    """
     for i in range(first, last):
         here = row(x, i, zero)
         s = times(rest, i, here, zero)
@@ -128,7 +142,10 @@ def product(first: int, last: int, starts: Any, columns: Any, lower: Any, rest: 
 
 @kernel
 def product_across(bounds: Any, starts: Any, columns: Any, lower: Any, x: Any, y: Any, zero: Any) -> None:
-    """Add that."""
+    """Add to y the contributions of crossing blocks to rows of other pieces, which `product` omits.
+
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), x, y (n, k).
+    """
     for piece in range(1, len(bounds) - 1):
         for i in range(bounds[piece], bounds[piece + 1]):
             for p in range(starts[i], starts[i + 1]):
@@ -141,7 +158,10 @@ def product_across(bounds: Any, starts: Any, columns: Any, lower: Any, x: Any, y
 
 @kernel
 def rounding(first: int, last: int, starts: Any, columns: Any, data: Any, size: Any, held: Any, zero: Any) -> float:
-    """The sum of the squares of |A| |x| over the free directions."""
+    """Return the sum of the squares of |A| |x| over the free directions.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k) of all blocks; size = |x|, held (n, k).
+    """
     total = 0.0
     for i in range(first, last):
         for c in range(data.shape[1]):
@@ -156,7 +176,10 @@ def rounding(first: int, last: int, starts: Any, columns: Any, data: Any, size: 
 
 @kernel
 def dense(first: int, last: int, matrix: Any, x: Any, result: Any) -> None:
-    """Write matrix x, the matrix small and symmetric; numpy would wake all threads for it."""
+    """Write the product of a small symmetric matrix and x; NumPy would start all threads for it.
+
+    Shapes: matrix (n, n), x, result (n,).
+    """
     for i in range(first, last):
         result[i] = 0.0
     for j in range(len(x)):
@@ -164,7 +187,7 @@ def dense(first: int, last: int, matrix: Any, x: Any, result: Any) -> None:
             result[i] += matrix[j, i] * x[j]
 
 
-# Gauss and Seidel within the rows of one thread, Jacobi between threads: symmetric, and the same every time.
+# Gauss-Seidel within the rows of one thread, Jacobi between threads: symmetric and reproducible.
 
 
 @kernel
@@ -181,7 +204,10 @@ def sweep_forward(
     left: Any,
     zero: Any,
 ) -> None:
-    """z = (D + L)^-1 r, D with what is added, and the residual that this leaves, but for crossing blocks."""
+    """Write z = (D + L)^-1 r, with `added` in D, and the residual `left` of z, without crossing blocks.
+
+    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k), added, r, z, left (n, k).
+    """
     for i in range(first, last):
         s = row(r, i, zero)
         for p in range(starts[i], starts[i + 1]):
@@ -201,10 +227,13 @@ def sweep_forward(
 def sweep_backward(
     first: int, last: int, starts: Any, columns: Any, lower: Any, inverse: Any, added: Any, r: Any, z: Any, zero: Any
 ) -> None:
-    """z becomes z + (D + U)^-1 (r - A z), D with what is added, r less the crossing blocks; r is used up."""
+    """Add (D + U)^-1 (r - A z) to z, with `added` in D; r excludes the crossing blocks and is overwritten.
+
+    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k), added, r, z (n, k).
+    """
     for i in range(last - 1, first - 1, -1):
         s = plus(row(r, i, zero), each(row(added, i, zero), row(z, i, zero)))
-        # Backwards through memory all the way: so it is fetched ahead.
+        # Backwards through memory without exception, so that the processor prefetches.
         for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
             j = columns[unsigned(p)]
             if j >= first:
@@ -219,7 +248,10 @@ def sweep_backward(
 
 @kernel
 def subtract_across(bounds: Any, starts: Any, columns: Any, lower: Any, z: Any, r: Any, zero: Any) -> None:
-    """Subtract from r what the crossing blocks make of z."""
+    """Subtract from r the product of the crossing blocks and z.
+
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), z, r (n, k).
+    """
     for piece in range(1, len(bounds) - 1):
         for i in range(bounds[piece], bounds[piece + 1]):
             for p in range(starts[i], starts[i + 1]):

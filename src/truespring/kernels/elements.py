@@ -1,7 +1,7 @@
-"""Loops over finite elements: shape functions, deformation, forces and matrices at the Gauss points of a slice.
+"""Loops over finite elements: shape functions, deformation gradients, forces and stiffness matrices.
 
-Tensors have their axes first, then those of elements and points, as laws take them; symmetric ones
-have one axis in Voigt's order, `voigt` telling the component of each pair of directions.
+Tensors have their own axes first, then elements and points, as in laws. Symmetric tensors have one axis of n_strains =
+dim (dim + 1) / 2 components in Voigt order; `voigt`, shape (dim, dim), is the component of each pair of directions.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def _invert(A: Any, inverse: Any, zero: Any) -> Any:
-    """Write the inverse of a matrix and return its determinant."""
+    """Write the inverse of a matrix, shape (dim, dim), and return its determinant."""
     if len(zero) == 2:
         det = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
         inverse[0, 0], inverse[0, 1] = A[1, 1] / det, -A[0, 1] / det
@@ -44,10 +44,13 @@ def quadrature(
     volumes: Any,
     zero: Any,
 ) -> None:
-    """The gradients of the shape functions, axes (element, point, node, direction), and each point's volume.
+    """Write the gradients of the shape functions at the Gauss points, and the volume of each point.
 
-    `places` are those of the elements' corners, axes (element, corner, direction); `slopes` are derivatives on the
-    reference element, `corner_slopes` of the functions that place it in space, axes (point, node, direction).
+    `slopes` are the derivatives of the shape functions on the parent element, `corner_slopes` those of the functions
+    that map it to space.
+
+    Shapes: places (n_elements, corners, dim), corner_slopes (points, corners, dim), slopes (points, k, dim), weights
+    (points,); gradients (n_elements, points, k, dim), volumes (n_elements, points).
     """
     dim = len(zero)
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
@@ -70,7 +73,10 @@ def quadrature(
 
 @kernel
 def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero: Any) -> None:
-    """The gradient of a vector field from its values at the elements' nodes, axes (i, j, element, point)."""
+    """Write the gradient of a vector field from its values at the elements' nodes.
+
+    Shapes: values (n_elements, k, dim), slopes (n_elements, points, k, dim), result (dim, dim, n_elements, points).
+    """
     dim = len(zero)
     for e in range(first, last):
         slopes_here = slopes[e]
@@ -87,7 +93,11 @@ def gradients(first: int, last: int, values: Any, slopes: Any, result: Any, zero
 def forces(
     first: int, last: int, F: Any, S: Any, voigt: Any, gradients: Any, volumes: Any, force: Any, zero: Any
 ) -> None:
-    """The sum over the points of F S : grad v, shape (n_elements, k * dim)."""
+    """Write the element forces, the sum over the points of F S : grad v.
+
+    Shapes: F (dim, dim, n_elements, points), S (n_strains, n_elements, points), voigt (dim, dim), gradients
+    (n_elements, points, k, dim), volumes (n_elements, points), force (n_elements, k * dim).
+    """
     dim, k = len(zero), gradients.shape[2]
     P = np.empty((dim, dim))
     for e in range(first, last):
@@ -118,10 +128,13 @@ def stiffnesses(
     zero: Any,
     square: Any,
 ) -> None:
-    """The sum over the points of F^T grad u : D : F^T grad v + S : (grad u^T grad v), shape (n, k * dim, k * dim).
+    """Write the element stiffnesses, the sum over the points of F^T grad u : D : F^T grad v + S : (grad u^T grad v).
 
-    A is the derivative of F S by F: A_mn,ij = F_il D_lm,on F_jo + S_mn I_ij, m and n directions at rest; `square`
-    has a zero for each pair i, j.
+    The derivative of F S by F is A_mn,ij = F_il D_lm,on F_jo + S_mn I_ij, with undeformed directions m and n.
+
+    Shapes: F (dim, dim, n_elements, points), S (n_strains, n_elements, points), D (n_strains, n_strains, n_elements,
+    points), voigt (dim, dim), gradients (n_elements, points, k, dim), volumes (n_elements, points), blocks (n_elements,
+    k * dim, k * dim); `square` is a tuple of dim^2 zeros.
     """
     dim, n_points, k = len(zero), gradients.shape[1], gradients.shape[2]
     n_strains = dim * (dim + 1) // 2  # len(D), known when compiled

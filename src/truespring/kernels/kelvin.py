@@ -1,4 +1,4 @@
-"""Integrals of Kelvin's solution, the displacement and traction of a point force, over the panels of a surface."""
+"""Integrals of Kelvin's solution (displacement and traction of a point force) over the panels of a surface."""
 
 import math
 from typing import Any
@@ -26,13 +26,17 @@ def integrate(
     U: Any,
     T: Any,
 ) -> None:
-    """Add what panels do at the points first to last: U over each panel, T times the functions of its corners.
+    """Add the integrals of U, and of T times the shape functions of the corners, over panels, for points first to last.
 
-    Of panels whose middle is as far from the point as `nearest` times their radius, but not `furthest` times.
-    With e the direction from the point to a place at distance r and n the normal there, U_ij and T_ij along j of a
-    unit force along i are, but for their factors, (3 - 4 nu) s delta_ij + e_i e_j, with s = -ln(r / length) in the
-    plane and 1 in space, and (1 - 2 nu) (e_i n_j - e_j n_i - e . n delta_ij) - dim (e . n) e_i e_j. `law` is mu, nu
-    and that length.
+    Only panels count whose centre is at least `nearest` and less than `furthest` times their radius away. With e the
+    direction from the point to an integration point at distance r, and n the normal there, the displacement U_ij and
+    traction T_ij along j of a unit force along i are, up to constant factors, (3 - 4 nu) s delta_ij + e_i e_j, with
+    s = -ln(r / length) in the plane and 1 in space, and (1 - 2 nu) (e_i n_j - e_j n_i - e . n delta_ij)
+    - dim (e . n) e_i e_j.
+
+    Shapes, with c corners and q integration points per panel: points (n_points, dim), law (mu, nu, length), middles
+    (n_panels, dim), radii (n_panels,), places, normals (n_panels, q, dim), shape (n_panels, q, c), measures
+    (n_panels, q), corners (n_panels, c); U (n_points, dim, n_panels, dim), T (n_points, dim, n_corners, dim).
     """
     dim, n_points = points.shape[1], places.shape[1]
     mu, nu, length = law

@@ -1,6 +1,6 @@
-"""Loops over elements and their links, one for every pair of an element's nodes, whose squared lengths are coupled.
+"""Loops over elements whose links, one for each pair of nodes, have coupled squared lengths.
 
-`number` tells the link of each pair of an element's nodes, shape (k, k).
+An element has n_links = k (k - 1) / 2 links; `number`, shape (k, k), is the link of each pair of its nodes.
 """
 
 from typing import Any
@@ -14,7 +14,10 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def squared_lengths(first: int, last: int, x: Any, elements: Any, number: Any, squared: Any, zero: Any) -> None:
-    """The squared length of each link, shape (n_elements, links)."""
+    """Write the squared length of each link.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), number (k, k), squared (n_elements, n_links).
+    """
     for e in range(first, last):
         for a in range(elements.shape[1]):
             for b in range(a):
@@ -24,7 +27,10 @@ def squared_lengths(first: int, last: int, x: Any, elements: Any, number: Any, s
 
 @kernel
 def changes(first: int, last: int, x: Any, rest: Any, elements: Any, number: Any, change: Any, zero: Any) -> None:
-    """The change of each link's squared length from `rest` to `x`."""
+    """Write the change of each link's squared length from `rest` to `x`.
+
+    Shapes: x, rest (n_nodes, dim), elements (n_elements, k), number (k, k), change (n_elements, n_links).
+    """
     for e in range(first, last):
         for a in range(elements.shape[1]):
             for b in range(a):
@@ -36,7 +42,10 @@ def changes(first: int, last: int, x: Any, rest: Any, elements: Any, number: Any
 
 @kernel
 def growths(first: int, last: int, x: Any, step: Any, elements: Any, number: Any, growth: Any, zero: Any) -> None:
-    """The change of each link's squared length that is linear in a step."""
+    """Write the change of each link's squared length that is linear in a step.
+
+    Shapes: x, step (n_nodes, dim), elements (n_elements, k), number (k, k), growth (n_elements, n_links).
+    """
     for e in range(first, last):
         for a in range(elements.shape[1]):
             for b in range(a):
@@ -47,7 +56,10 @@ def growths(first: int, last: int, x: Any, step: Any, elements: Any, number: Any
 
 @kernel
 def couple(first: int, last: int, coupling: Any, change: Any, pull: Any) -> None:
-    """2 M q of each element; there is one symmetric M, or each has its own."""
+    """Write 2 M q for each element, with one symmetric M for all or one for each.
+
+    Shapes: coupling M (1 or n_elements, n_links, n_links), change q, pull (n_elements, n_links).
+    """
     for e in range(first, last):
         M = coupling[e % len(coupling)]
         pull[e] = 0.0
@@ -58,7 +70,11 @@ def couple(first: int, last: int, coupling: Any, change: Any, pull: Any) -> None
 
 @kernel
 def forces(first: int, last: int, x: Any, elements: Any, number: Any, pull: Any, force: Any, zero: Any) -> None:
-    """The derivative of each element's energy by its nodes, shape (n_elements, k * dim)."""
+    """Write the derivative of each element's energy by its nodes.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), number (k, k), pull (n_elements, n_links), force (n_elements,
+    k * dim).
+    """
     dim, k = len(zero), elements.shape[1]
     for e in range(first, last):
         force[e] = 0.0
@@ -82,10 +98,12 @@ def stiffnesses(
     blocks: Any,
     zero: Any,
 ) -> None:
-    """Write J^T 2M J, J the derivative of the squared lengths, and the geometric part, shape (n, k * dim, k * dim).
+    """Write the stiffness of each element: J^T 2M J, J the derivative of the squared lengths, plus the geometric part.
 
-    By each link J has but the vectors to both its nodes, so that M J is summed over the links at each node, and
-    J^T (M J) likewise.
+    J of a link has entries at its two nodes only; M J and J^T (M J) are therefore sums over the links at each node.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), number (k, k), coupling M (1 or n_elements, n_links, n_links),
+    pull (n_elements, n_links), blocks (n_elements, k * dim, k * dim).
     """
     dim, k = len(zero), elements.shape[1]
     vectors, coupled = np.empty((k, k, dim)), np.empty((coupling.shape[1], k, dim))
@@ -121,7 +139,10 @@ def stiffnesses(
 
 @kernel
 def strain(first: int, last: int, change: Any, strains: Any, result: Any) -> None:
-    """The change of C that goes with the change of the squared lengths, axes (component, element, 1)."""
+    """Write the change of C that corresponds to the change of the squared lengths.
+
+    Shapes: change (n_elements, n_links), strains (n_elements, n_links, n_strains), result (n_strains, n_elements, 1).
+    """
     for e in range(first, last):
         for component in range(strains.shape[2]):
             total = 0.0
@@ -132,7 +153,10 @@ def strain(first: int, last: int, change: Any, strains: Any, result: Any) -> Non
 
 @kernel
 def work(first: int, last: int, stress: Any, works: Any, pull: Any) -> None:
-    """What a stress, axes (component, element, 1), makes of each squared length: the sum over its components."""
+    """Write the derivative of the energy by each squared length, from a stress.
+
+    Shapes: stress (n_strains, n_elements, 1), works (n_elements, n_links, n_strains), pull (n_elements, n_links).
+    """
     for e in range(first, last):
         for s in range(works.shape[1]):
             total = 0.0
@@ -143,7 +167,11 @@ def work(first: int, last: int, stress: Any, works: Any, pull: Any) -> None:
 
 @kernel
 def couplings(first: int, last: int, elasticity: Any, works: Any, share: Any, coupling: Any) -> None:
-    """The sum of works_s D works_t times an element's share; D has axes (component, component, element, 1)."""
+    """Write works_s D works_t times `share` for each pair of links s, t of an element.
+
+    Shapes: elasticity D (n_strains, n_strains, n_elements, 1), works (n_elements, n_links, n_strains), share
+    (n_elements,), coupling (n_elements, n_links, n_links).
+    """
     n_strains = works.shape[2]
     row = np.empty(n_strains)
     for e in range(first, last):

@@ -1,7 +1,7 @@
 """Products of finite differences in the cells of a grid.
 
-A product is of two differences that lead from one corner of its cell to two others, which may be the same: `ends` has
-these three corners of each product, the origin first, shape (n_products, 3).
+Each product is that of two differences, from one corner of a cell to two others (which may be equal): `ends`, shape
+(n_products, 3), has these three corners, the common one first.
 """
 
 from typing import Any
@@ -12,7 +12,10 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def products(first: int, last: int, x: Any, cells: Any, ends: Any, found: Any, zero: Any) -> None:
-    """Each product, shape (n_cells, n_products)."""
+    """Write each product.
+
+    Shapes: x (n_nodes, dim), cells (n_cells, corners), ends (n_products, 3), found (n_cells, n_products).
+    """
     for e in range(first, last):
         for s in range(len(ends)):
             o = row(x, cells[e, ends[s, 0]], zero)
@@ -22,7 +25,10 @@ def products(first: int, last: int, x: Any, cells: Any, ends: Any, found: Any, z
 
 @kernel
 def growths(first: int, last: int, x: Any, step: Any, cells: Any, ends: Any, growth: Any, zero: Any) -> None:
-    """The change of each product that is linear in a step."""
+    """Write the change of each product that is linear in a step.
+
+    Shapes: x, step (n_nodes, dim), cells (n_cells, corners), ends (n_products, 3), growth (n_cells, n_products).
+    """
     for e in range(first, last):
         for s in range(len(ends)):
             i, j, k = cells[e, ends[s, 0]], cells[e, ends[s, 1]], cells[e, ends[s, 2]]
@@ -34,7 +40,11 @@ def growths(first: int, last: int, x: Any, step: Any, cells: Any, ends: Any, gro
 
 @kernel
 def forces(first: int, last: int, x: Any, cells: Any, ends: Any, pull: Any, force: Any, zero: Any) -> None:
-    """The derivative of each cell's energy by its corners, shape (n_cells, corners * dim)."""
+    """Write the derivative of each cell's energy by its corners; `pull` is that by each product.
+
+    Shapes: x (n_nodes, dim), cells (n_cells, corners), ends (n_products, 3), pull (n_cells, n_products), force
+    (n_cells, corners * dim).
+    """
     dim = len(zero)
     for e in range(first, last):
         force[e] = 0.0
@@ -52,7 +62,11 @@ def forces(first: int, last: int, x: Any, cells: Any, ends: Any, pull: Any, forc
 def stiffnesses(
     first: int, last: int, x: Any, cells: Any, ends: Any, weights: Any, pull: Any, blocks: Any, zero: Any
 ) -> None:
-    """Tangent stiffness of each cell: 2 w dq dq^T, and p times the second derivative of the product."""
+    """Write the stiffness of each cell: 2 w dq dq^T plus p times the second derivative of q, for each product q.
+
+    Shapes: x (n_nodes, dim), cells (n_cells, corners), ends (n_products, 3), weights w, pull p (n_cells, n_products),
+    blocks (n_cells, corners * dim, corners * dim).
+    """
     dim = len(zero)
     for e in range(first, last):
         blocks[e] = 0.0

@@ -1,7 +1,7 @@
-"""Loops that build and use the levels of smoothed aggregation.
+"""Loops that build and use the levels of smoothed aggregation (Vanek, Mandel, Brezina, Computing 56, 1996).
 
-Vanek, Mandel, Brezina, Computing 56 (1996). Rows of a prolongation are nodes, its columns aggregates, its
-blocks of shape (directions, modes).
+Rows of a prolongation are nodes, columns are aggregates, blocks have shape (k, n_modes), with k unknowns per node. A
+matrix has blocks of shape (k, k): starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), held (n, k).
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def _size(data: Any, p: int, i: int, j: int, held: Any) -> float:
-    """The sum of the squares of a block's entries between directions that are free."""
+    """Return the sum of the squares of the entries of block p, in row i and column j, between free directions."""
     total = 0.0
     for c in range(data.shape[1]):
         for e in range(data.shape[1]):
@@ -25,7 +25,10 @@ def _size(data: Any, p: int, i: int, j: int, held: Any) -> float:
 
 @kernel
 def diagonal_sizes(first: int, last: int, starts: Any, columns: Any, data: Any, held: Any, sizes: Any) -> None:
-    """The size of each block on the diagonal, that of a held direction being one of no strength."""
+    """Write the size of each diagonal block: the sum of the squares of its entries between free directions.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), held (n, k), sizes (n,).
+    """
     for i in range(first, last):
         for p in range(starts[i], starts[i + 1]):
             if columns[p] == i:
@@ -36,7 +39,10 @@ def diagonal_sizes(first: int, last: int, starts: Any, columns: Any, data: Any, 
 def strong(
     first: int, last: int, starts: Any, columns: Any, data: Any, held: Any, sizes: Any, share: float, keep: Any
 ) -> None:
-    """Mark blocks beside the diagonal of at least `share` of the geometric mean of the diagonal ones' size."""
+    """Mark off-diagonal blocks of at least `share` of the geometric mean of the two diagonal blocks.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), held (n, k), sizes (n,), keep (n_blocks,).
+    """
     for i in range(first, last):
         for p in range(starts[i], starts[i + 1]):
             j = columns[p]
@@ -48,7 +54,11 @@ def strong(
 def tentative(
     first: int, last: int, member_starts: Any, members: Any, modes: Any, basis: Any, coarse_modes: Any
 ) -> None:
-    """Orthonormal modes within each aggregate, and the modes in terms of these: modes = basis coarse_modes."""
+    """Write orthonormal modes of each aggregate, and the coefficients of modes = basis coarse_modes.
+
+    Shapes: member_starts (n_aggregates + 1,), members (n_members,), modes, basis (n, k, n_modes), coarse_modes
+    (n_aggregates, n_modes, n_modes).
+    """
     size, n_modes = modes.shape[1], modes.shape[2]
     for aggregate in range(first, last):
         begin, end = member_starts[aggregate], member_starts[aggregate + 1]
@@ -59,7 +69,7 @@ def tentative(
                     value = modes[members[q], c, k]
                     basis[members[q], c, k] = value
                     whole += value * value
-            for _ in range(2):  # twice is enough
+            for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
                 for m in range(k):
                     s = 0.0
                     for q in range(begin, end):
@@ -73,7 +83,7 @@ def tentative(
             for q in range(begin, end):
                 for c in range(size):
                     left += basis[members[q], c, k] ** 2
-            # A mode that the aggregate cannot tell from the former ones has no column: a node does not turn.
+            # A mode that depends linearly on the previous ones has no column: a single node has no rotation.
             scale = 1.0 / np.sqrt(left) if left > 1e-12 * whole else 0.0
             coarse_modes[aggregate, k, k] = np.sqrt(left) if scale > 0.0 else 0.0
             for q in range(begin, end):
@@ -85,7 +95,10 @@ def tentative(
 def count_smoothed(
     first: int, last: int, starts: Any, columns: Any, aggregate: Any, n_aggregates: int, counts: Any
 ) -> None:
-    """Count the aggregates that the neighbours of each node belong to."""
+    """Count the aggregates of the neighbours of each node.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), aggregate (n,), counts (n,).
+    """
     seen = np.full(n_aggregates, -1, np.int32)
     for i in range(first, last):
         count = 0
@@ -115,7 +128,11 @@ def smooth(
     p_data: Any,
     zero: Any,
 ) -> None:
-    """Write the rows of P = (I - omega D^-1 A) T, T the basis; those of held directions are zero."""
+    """Write the rows of P = (I - omega D^-1 A) T, with T given by `basis`; rows of held directions are zero.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), held (n, k), inverse (n, k, k), aggregate (n,),
+    basis (n, k, n_modes), p_starts (n + 1,), p_columns (n_p,), p_data (n_p, k, n_modes); `zero` has length n_modes.
+    """
     size, n_modes = basis.shape[1], basis.shape[2]
     where = np.full(n_aggregates, -1, np.int32)
     total = np.empty((1, n_modes))
@@ -163,7 +180,10 @@ def smooth(
 
 @kernel
 def transpose(p_starts: Any, p_columns: Any, p_data: Any, n_aggregates: int) -> Any:
-    """The rows of P^T: starts, the node of each block, and the transposed blocks in single precision."""
+    """Return the rows of P^T: starts (n_aggregates + 1,), nodes (n_p,), blocks (n_p, n_modes, k) in single precision.
+
+    Shapes: p_starts (n + 1,), p_columns (n_p,), p_data (n_p, k, n_modes).
+    """
     starts = np.zeros(n_aggregates + 1, np.int32)
     for q in range(len(p_columns)):
         starts[p_columns[q] + 1] += 1
@@ -187,7 +207,10 @@ def transpose(p_starts: Any, p_columns: Any, p_data: Any, n_aggregates: int) -> 
 def count_product(
     first: int, last: int, a_starts: Any, a_columns: Any, b_starts: Any, b_columns: Any, n: int, counts: Any
 ) -> None:
-    """Count the blocks in each row of a product of two sparse matrices, the second of `n` columns."""
+    """Count the blocks in each row of a product A B of sparse matrices; B has `n` columns.
+
+    Shapes: a_starts (n_rows + 1,), a_columns (n_a,), b_starts (n_b_rows + 1,), b_columns (n_b,), counts (n_rows,).
+    """
     seen = np.full(n, -1, np.int32)
     for i in range(first, last):
         count = 0
@@ -213,7 +236,11 @@ def fill_product(
     starts: Any,
     columns: Any,
 ) -> None:
-    """Write the columns of these rows, ascending."""
+    """Write the ascending columns of the rows of a product A B of sparse matrices; B has `n` columns.
+
+    Shapes: a_starts (n_rows + 1,), a_columns (n_a,), b_starts (n_b_rows + 1,), b_columns (n_b,), starts (n_rows + 1,),
+    columns (n_blocks,).
+    """
     seen = np.full(n, -1, np.int32)
     for i in range(first, last):
         begin = starts[i]
@@ -249,7 +276,12 @@ def multiply(
     ap_data: Any,
     zero: Any,
 ) -> None:
-    """Rows begin + first to begin + last of A P, stored from row `begin` on."""
+    """Write rows begin + first to begin + last of A P; `ap_data` begins at row `begin`.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), data (n_blocks, k, k), p_starts (n + 1,), p_columns (n_p,), p_data
+    (n_p, k, n_modes), ap_starts (n + 1,), ap_columns (n_ap,), ap_data (blocks of the slice, k, n_modes); `n` is the
+    number of aggregates, `zero` has length n_modes.
+    """
     size = p_data.shape[1]
     where = np.empty(n, np.int32)
     for i in range(begin + first, begin + last):
@@ -284,7 +316,12 @@ def add_transposed(
     data: Any,
     zero: Any,
 ) -> None:
-    """Add what the rows `begin` to `end` of A P make of the rows low + first to low + last of P^T (A P)."""
+    """Add the contributions of rows `begin` to `end` of A P to rows low + first to low + last of P^T (A P).
+
+    Shapes: p_starts (n + 1,), p_columns (n_p,), p_data (n_p, k, n_modes), ap_starts (n + 1,), ap_columns (n_ap,),
+    ap_data (blocks of the slice, k, n_modes), starts (n_aggregates + 1,), columns (n_blocks,), data (n_blocks, n_modes,
+    n_modes); `zero` has length n_modes.
+    """
     size, n_modes = p_data.shape[1], p_data.shape[2]
     for i in range(begin, end):
         for t in range(p_starts[i], p_starts[i + 1]):
@@ -304,7 +341,11 @@ def add_transposed(
 def restrict(
     first: int, last: int, r_starts: Any, r_node: Any, r_data: Any, fine: Any, coarse: Any, zero: Any, none: Any
 ) -> None:
-    """P^T fine; `none` is a fine row of zeros, `zero` a coarse one."""
+    """Write coarse = P^T fine.
+
+    Shapes: r_starts (n_aggregates + 1,), r_node (n_p,), r_data (n_p, n_modes, k), fine (n, k), coarse (n_aggregates,
+    n_modes); `zero` has length n_modes, `none` length k.
+    """
     for c in range(first, last):
         s = zero
         for p in range(r_starts[c], r_starts[c + 1]):
@@ -316,7 +357,11 @@ def restrict(
 def prolong(
     first: int, last: int, p_starts: Any, p_columns: Any, p_data: Any, coarse: Any, fine: Any, zero: Any, none: Any
 ) -> None:
-    """Add P coarse."""
+    """Add P coarse to fine.
+
+    Shapes: p_starts (n + 1,), p_columns (n_p,), p_data (n_p, k, n_modes), coarse (n_aggregates, n_modes), fine (n, k);
+    `zero` has length n_modes, `none` length k.
+    """
     for i in range(first, last):
         s = row(fine, i, none)
         for p in range(p_starts[i], p_starts[i + 1]):
@@ -337,7 +382,11 @@ def prolong_turned(
     zero: Any,
     none: Any,
 ) -> None:
-    """Add Q P coarse."""
+    """Add Q P coarse to fine, with the rotations Q of the nodes.
+
+    Shapes: p_starts (n + 1,), p_columns (n_p,), p_data (n_p, k, n_modes), turns (n, k, k), coarse (n_aggregates,
+    n_modes), fine (n, k); `zero` has length n_modes, `none` length k.
+    """
     for i in range(first, last):
         s = none
         for p in range(p_starts[i], p_starts[i + 1]):
@@ -347,14 +396,14 @@ def prolong_turned(
 
 @kernel
 def turn_back(first: int, last: int, turns: Any, x: Any, zero: Any) -> None:
-    """x = Q^T x at each node."""
+    """Replace x by Q^T x at each node. Shapes: turns Q (n, k, k), x (n, k)."""
     for i in range(first, last):
         put(x, i, times_transposed(turns, i, row(x, i, zero), zero))
 
 
 @kernel
 def smoothed(first: int, last: int, inverse: Any, x: Any, result: Any, zero: Any) -> None:
-    """D^-1 x."""
+    """Write D^-1 x. Shapes: inverse D^-1 (n, k, k), x, result (n, k)."""
     for i in range(first, last):
         put(result, i, times(inverse, i, row(x, i, zero), zero))
 
@@ -363,10 +412,12 @@ def smoothed(first: int, last: int, inverse: Any, x: Any, result: Any, zero: Any
 def rotations(
     first: int, last: int, starts: Any, columns: Any, rest: Any, x: Any, held: Any, turns: Any, zero: Any
 ) -> None:
-    """The rotation Q of each node: the orthogonal factor of the sum of d D^T over the nodes joined to it.
+    """Write the rotation Q of each node: the orthogonal polar factor of the sum of d D^T over its neighbours.
 
-    D is the vector to the other node at rest, d now. In three dimensions by Newton's iteration for the polar
-    factor (Higham 1986). Rows of held directions are zero: what is brought up from coarser levels does not move them.
+    D is the undeformed vector to the neighbour, d the deformed one. In space by Newton's iteration (Higham 1986). Rows
+    of held directions are zero, so that coarse corrections do not move them.
+
+    Shapes: starts (n + 1,), columns (n_blocks,), rest, x, held (n, dim), turns (n, dim, dim).
     """
     dim = len(zero)  # known when compiled
     F = np.empty((dim, dim))
@@ -400,7 +451,7 @@ def rotations(
                     for e in range(3):
                         size += F[c, e] ** 2
                         other += G[c, e] ** 2
-                if not det > 1e-9 * size**1.5:  # flat or turned inside out: no rotation to be had
+                if not det > 1e-9 * size**1.5:  # flat or inverted: use the identity
                     for c in range(3):
                         for e in range(3):
                             F[c, e] = 1.0 if c == e else 0.0

@@ -1,6 +1,6 @@
 """Rows of three-dimensional arrays as tuples, which stay in registers while they are summed.
 
-A local array would go through memory, and an index that is not a constant would be looked up.
+Local arrays would be stored in memory, and indices that are not constants would be computed.
 """
 
 from numba.extending import overload
@@ -9,7 +9,7 @@ from truespring.kernels.small import unsigned
 
 
 def add_times(total, factor, rows, i, j):
-    """`total` + factor times the row i, j, which is as long."""
+    """Return `total` + factor times row i, j of an array of shape (m, n, len(total))."""
 
 
 @overload(add_times)
@@ -45,7 +45,7 @@ def _add_times(total, factor, rows, i, j):
 
 
 def write(rows, i, j, v):
-    """Write v to the row i, j."""
+    """Write v to row i, j of an array of shape (m, n, len(v))."""
 
 
 @overload(write)

@@ -1,19 +1,21 @@
 """Vectors of two, three or six numbers, and small matrices, as tuples: compiled code keeps them in registers.
 
-The length is known from the type, so that one kernel serves every dimension: it is given a `zero`
-such as (0.0, 0.0) and compiled once for each kind. The loops of numba over short arrays would go
-through memory instead, and an index that is not a constant would be looked up.
+The length is part of the type: a kernel with an argument `zero`, such as (0.0, 0.0), is compiled once for each
+dimension. Loops over short arrays would be slower: they are stored in memory, with indices computed at run time.
+
+`blocks` are arrays of shape (n, k, l); p is the number of a block. Symmetric matrices are tuples of their upper
+triangle by rows.
 """
 
 import numpy as np
 from numba.extending import overload
 
-#: An index that could be negative is looked at before it is used: that is half the time of a short loop.
+#: Type of indices: of a signed index numba checks the sign, which takes half the time of a short loop.
 unsigned = np.uint64
 
 
 def row(x, i, zero):
-    """Row i of an array of shape (n, len(zero))."""
+    """Return row i of an array of shape (n, len(zero))."""
 
 
 @overload(row)
@@ -33,7 +35,7 @@ def _row(x, i, zero):
 
 
 def plus(a, b):
-    """a + b."""
+    """Return a + b."""
 
 
 @overload(plus)
@@ -46,7 +48,7 @@ def _plus(a, b):
 
 
 def minus(a, b):
-    """a - b."""
+    """Return a - b."""
 
 
 @overload(minus)
@@ -59,7 +61,7 @@ def _minus(a, b):
 
 
 def dot(a, b):
-    """The scalar product of a and b."""
+    """Return the scalar product of a and b."""
 
 
 @overload(dot)
@@ -72,7 +74,7 @@ def _dot(a, b):
 
 
 def along(blocks, p, i, v):
-    """Row i of block p times v."""
+    """Return the scalar product of row i of block p and v."""
 
 
 @overload(along)
@@ -102,7 +104,7 @@ def _along(blocks, p, i, v):
 
 
 def across(blocks, p, j, v):
-    """Column j of block p times v."""
+    """Return the scalar product of column j of block p and v."""
 
 
 @overload(across)
@@ -132,7 +134,7 @@ def _across(blocks, p, j, v):
 
 
 def times(blocks, p, v, zero):
-    """Block p times v, as long as `zero`."""
+    """Return block p times v, of the length of `zero`."""
 
 
 @overload(times)
@@ -152,7 +154,7 @@ def _times(blocks, p, v, zero):
 
 
 def times_transposed(blocks, p, v, zero):
-    """The transposed block p times v, as long as `zero`."""
+    """Return the transpose of block p times v, of the length of `zero`."""
 
 
 @overload(times_transposed)
@@ -197,7 +199,7 @@ def _put(x, i, v):
 
 
 def scaled(a, v):
-    """a v."""
+    """Return the number a times v."""
 
 
 @overload(scaled)
@@ -210,7 +212,7 @@ def _scaled(a, v):
 
 
 def each(a, b):
-    """The products of their components."""
+    """Return the componentwise product of a and b."""
 
 
 @overload(each)
@@ -223,7 +225,7 @@ def _each(a, b):
 
 
 def line(blocks, p, i, zero):
-    """Row i of block p, as long as `zero`."""
+    """Return row i of block p, of the length of `zero`."""
 
 
 @overload(line)
@@ -247,7 +249,7 @@ def _line(blocks, p, i, zero):
 
 
 def add_line(blocks, p, i, a, v):
-    """Add a v to row i of block p."""
+    """Add the number a times v to row i of block p."""
 
 
 @overload(add_line)
@@ -273,7 +275,7 @@ def _add_line(blocks, p, i, a, v):
 
 
 def along_and_across(u, v, d):
-    """The upper half of u d d^T + v I by rows."""
+    """Return the upper triangle of u d d^T + v I."""
 
 
 @overload(along_and_across)
@@ -289,7 +291,7 @@ def _along_and_across(u, v, d):
 
 
 def nothing(zero):
-    """The upper half of a matrix of zeros, as many rows as `zero`."""
+    """Return the upper triangle of a zero matrix with len(zero) rows."""
 
 
 @overload(nothing)
@@ -298,7 +300,7 @@ def _nothing(zero):
 
 
 def take_symmetric(blocks, p, m, zero):
-    """Subtract the symmetric matrix of upper half m from block p."""
+    """Subtract the symmetric matrix with upper triangle m from block p."""
 
 
 @overload(take_symmetric)
@@ -324,7 +326,7 @@ def _take_symmetric(blocks, p, m, zero):
 
 
 def write_symmetric(blocks, p, m, zero):
-    """Write the symmetric matrix of upper half -m to block p."""
+    """Write the negative of the symmetric matrix with upper triangle m to block p."""
 
 
 @overload(write_symmetric)

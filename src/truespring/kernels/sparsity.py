@@ -1,4 +1,4 @@
-"""Where the blocks of elements stand in a sparse matrix of node blocks."""
+"""Sparsity of a matrix of node blocks, and assembly of element matrices into it."""
 
 from typing import Any
 
@@ -9,7 +9,10 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def incidence(elements: Any, n_nodes: int) -> Any:
-    """The elements at each node: starts, shape (n_nodes + 1,), and element * k + place, ascending within a node."""
+    """Return the elements at each node: starts (n_nodes + 1,), and element * k + local node (n_elements * k,).
+
+    Shapes: elements (n_elements, k).
+    """
     n_elements, k = elements.shape
     starts = np.zeros(n_nodes + 1, np.int32)
     for e in range(n_elements):
@@ -29,7 +32,10 @@ def incidence(elements: Any, n_nodes: int) -> Any:
 
 @kernel
 def count_neighbours(first: int, last: int, elements: Any, at_starts: Any, at: Any, counts: Any) -> None:
-    """Count the nodes that share an element with each node, itself included."""
+    """Count the nodes that share an element with each node, itself included.
+
+    Shapes: elements (n_elements, k), at_starts (n_nodes + 1,), at (n_elements * k,), counts (n_nodes,).
+    """
     k = elements.shape[1]
     seen = np.full(len(counts), -1, np.int32)
     for i in range(first, last):
@@ -47,7 +53,10 @@ def count_neighbours(first: int, last: int, elements: Any, at_starts: Any, at: A
 
 @kernel
 def fill_neighbours(first: int, last: int, elements: Any, at_starts: Any, at: Any, starts: Any, columns: Any) -> None:
-    """Write those nodes, ascending."""
+    """Write the nodes that share an element with each node, itself included, in ascending order.
+
+    Shapes: elements (n_elements, k), at_starts, starts (n_nodes + 1,), at (n_elements * k,), columns (n_blocks,).
+    """
     k = elements.shape[1]
     seen = np.full(len(starts) - 1, -1, np.int32)
     for i in range(first, last):
@@ -71,7 +80,10 @@ def fill_neighbours(first: int, last: int, elements: Any, at_starts: Any, at: An
 
 @kernel
 def fill_slots(first: int, last: int, elements: Any, starts: Any, columns: Any, slots: Any) -> None:
-    """Find the block of each pair of nodes of each element, shape (n_elements, k, k)."""
+    """Write the number of the block of each pair of an element's nodes.
+
+    Shapes: elements (n_elements, k), starts (n_nodes + 1,), columns (n_blocks,), slots (n_elements, k, k).
+    """
     k = elements.shape[1]
     for e in range(first, last):
         for a in range(k):
@@ -89,8 +101,11 @@ def fill_slots(first: int, last: int, elements: Any, starts: Any, columns: Any, 
 
 
 @kernel
-def add_rows(first: int, last: int, n_local: int, at_starts: Any, at: Any, values: Any, result: Any) -> None:
-    """Sum values of shape (n_elements * k, dim) into the nodes first to last."""
+def add_rows(first: int, last: int, at_starts: Any, at: Any, values: Any, result: Any) -> None:
+    """Add values of the elements' nodes to the nodes first to last.
+
+    Shapes: at_starts (n_nodes + 1,), at (n_elements * k,), values (n_elements * k, dim), result (n_nodes, dim).
+    """
     for i in range(first, last):
         for q in range(at_starts[i], at_starts[i + 1]):
             for d in range(values.shape[1]):
@@ -101,7 +116,11 @@ def add_rows(first: int, last: int, n_local: int, at_starts: Any, at: Any, value
 def add_blocks(
     first: int, last: int, offset: int, elements: Any, slots: Any, blocks: Any, low: int, high: int, data: Any
 ) -> None:
-    """Add the blocks of elements first to last, stored from `offset` on, to the rows low to high of a matrix."""
+    """Add the matrices of elements first to last to the rows low to high of a matrix; `blocks` begins at `offset`.
+
+    Shapes: elements (n_elements, k), slots (n_elements, k, k), blocks (slice, k * dim, k * dim), data (n_blocks, dim,
+    dim).
+    """
     k = elements.shape[1]
     dim = data.shape[1]
     for e in range(first, last):
@@ -117,7 +136,10 @@ def add_blocks(
 
 @kernel
 def unique_pairs(pairs: Any, n_nodes: int) -> Any:
-    """Each pair of nodes once, ascending in itself and among each other, and the place of every given pair there."""
+    """Return the distinct pairs of nodes, sorted, shape (n_found, 2), and the number of each given pair, shape (n,).
+
+    Shapes: pairs (n, 2).
+    """
     starts = np.zeros(n_nodes + 1, np.int64)
     for s in range(len(pairs)):
         starts[min(pairs[s, 0], pairs[s, 1]) + 1] += 1
@@ -130,7 +152,7 @@ def unique_pairs(pairs: Any, n_nodes: int) -> Any:
         order[filled[i]] = s
         filled[i] += 1
     place = np.empty(len(pairs), np.int32)
-    second = np.empty(len(pairs), np.int32)  # of the pairs found; those of a node in ascending order
+    second = np.empty(len(pairs), np.int32)  # second nodes of the pairs found, ascending for each first node
     begins = np.empty(n_nodes + 1, np.int64)
     n_found = 0
     for i in range(n_nodes):

@@ -1,4 +1,9 @@
-"""Loops over springs and over the nodes that own the rows of their matrix."""
+"""Loops over springs, and over nodes for the rows of their forces and matrix.
+
+Shapes: x, step, forces (n_nodes, dim), springs (n_springs, 2); stiffness, rest, length, tension, pull, lengthwise,
+sideways (n_springs,); at_starts (n_nodes + 1,) and at (2 n_springs,): the ends of springs at each node, as
+2 spring + end.
+"""
 
 from typing import Any
 
@@ -24,7 +29,7 @@ ONE = unsigned(1)
 
 @kernel
 def lengths(first: int, last: int, x: Any, springs: Any, length: Any, zero: Any) -> None:
-    """The length of each spring."""
+    """Write the length of each spring. Shapes: x (n_nodes, dim), springs (n_springs, 2), length (n_springs,)."""
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         length[s] = np.sqrt(dot(d, d))
@@ -32,7 +37,10 @@ def lengths(first: int, last: int, x: Any, springs: Any, length: Any, zero: Any)
 
 @kernel
 def energy(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, zero: Any) -> float:
-    """The sum of 1/2 k (l - L)^2."""
+    """Return the sum of 1/2 k (l - L)^2.
+
+    Shapes: x (n_nodes, dim), springs (n_springs, 2), stiffness k, rest L (n_springs,).
+    """
     total = 0.0
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
@@ -42,7 +50,10 @@ def energy(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: An
 
 @kernel
 def tensions(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, tension: Any, zero: Any) -> None:
-    """k (l - L)."""
+    """Write the tension k (l - L).
+
+    Shapes: x (n_nodes, dim), springs (n_springs, 2), stiffness k, rest L, tension (n_springs,).
+    """
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         tension[s] = stiffness[s] * (np.sqrt(dot(d, d)) - rest[s])
@@ -52,7 +63,10 @@ def tensions(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: 
 def extrapolated(
     first: int, last: int, x: Any, step: Any, springs: Any, stiffness: Any, rest: Any, tension: Any, zero: Any
 ) -> None:
-    """k (l - L + n . change of d along the step): the tension carried on linearly."""
+    """Write the tension extrapolated linearly along a step: k (l - L + n . change of d).
+
+    Shapes: x, step (n_nodes, dim), springs (n_springs, 2), stiffness k, rest L, tension (n_springs,).
+    """
     for s in range(unsigned(first), unsigned(last)):
         a, b = springs[s, 0], springs[s, 1]
         d = minus(row(x, b, zero), row(x, a, zero))
@@ -64,7 +78,10 @@ def extrapolated(
 
 @kernel
 def pulls(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, pull: Any, zero: Any) -> None:
-    """Tension over length."""
+    """Write tension over length.
+
+    Shapes: x (n_nodes, dim), springs (n_springs, 2), stiffness, rest, pull (n_springs,).
+    """
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         length = np.sqrt(dot(d, d))
@@ -75,7 +92,11 @@ def pulls(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any
 def internal_forces(
     first: int, last: int, x: Any, springs: Any, at_starts: Any, at: Any, pull: Any, forces: Any, zero: Any
 ) -> None:
-    """The derivative of the energy by the nodes first to last."""
+    """Write the derivative of the energy by the nodes first to last.
+
+    Shapes: x, forces (n_nodes, dim), springs (n_springs, 2), at_starts (n_nodes + 1,), at (2 n_springs,), pull
+    (n_springs,).
+    """
     for i in range(first, last):
         here, force = row(x, i, zero), zero
         for q in range(at_starts[i], at_starts[i + 1]):
@@ -90,7 +111,10 @@ def internal_forces(
 def stiffen(
     first: int, last: int, x: Any, springs: Any, stiffness: Any, tension: Any, lengthwise: Any, sideways: Any, zero: Any
 ) -> None:
-    """The numbers u, v of each spring's Hessian block u d d^T + v I; a collapsed spring has none."""
+    """Write u, v of each spring's Hessian block u d d^T + v I; zero for a collapsed spring.
+
+    Shapes: x (n_nodes, dim), springs (n_springs, 2), stiffness, tension, lengthwise u, sideways v (n_springs,).
+    """
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         squared = dot(d, d)
@@ -119,9 +143,12 @@ def hessian(
     data: Any,
     zero: Any,
 ) -> None:
-    """Write the rows first to last: every block is added to by its own row only.
+    """Write the rows first to last of the Hessian; each block is changed by its row only.
 
-    Where each block beside the diagonal is that of one spring `alone`, it is written at once.
+    If each off-diagonal block belongs to one spring (`alone`), it is written, not added to.
+
+    Shapes: x (n_nodes, dim), springs (n_springs, 2), at_starts, starts (n_nodes + 1,), at (2 n_springs,), lengthwise,
+    sideways (n_springs,), slots (n_springs, 2, 2), data (n_blocks, dim, dim).
     """
     for i in range(first, last):
         if not alone:

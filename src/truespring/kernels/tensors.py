@@ -1,4 +1,4 @@
-"""Loops of the mass-tensor method: forces from displacements by tensors that were computed once."""
+"""Loops of the mass-tensor method: forces from displacements by precomputed tensors."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from truespring.kernels.threads import kernel
 
 @kernel
 def _edges(i: int, here: Any, x: Any, rest: Any, starts: Any, columns: Any, tensors: Any, zero: Any) -> Any:
-    """The sum of the tensors of a node's edges times the displacement of their far ends relative to its own."""
+    """Return the sum over a node's edges of tensor times displacement of the other end relative to the node."""
     total = zero
     for p in range(starts[i], starts[i + 1]):
         j = columns[unsigned(p)]
@@ -23,7 +23,10 @@ def _edges(i: int, here: Any, x: Any, rest: Any, starts: Any, columns: Any, tens
 def edge_forces(
     first: int, last: int, x: Any, rest: Any, starts: Any, columns: Any, tensors: Any, force: Any, zero: Any
 ) -> None:
-    """The force on each node."""
+    """Write the force on each node: the sum of edge tensors times relative displacements.
+
+    Shapes: x, rest, force (n_nodes, dim), starts (n_nodes + 1,), columns (n_edges,), tensors (n_edges, dim, dim).
+    """
     for i in range(first, last):
         here = minus(row(x, i, zero), row(rest, i, zero))
         put(force, i, _edges(i, here, x, rest, starts, columns, tensors, zero))
@@ -31,7 +34,10 @@ def edge_forces(
 
 @kernel
 def edge_energy(first: int, last: int, x: Any, rest: Any, starts: Any, columns: Any, tensors: Any, zero: Any) -> float:
-    """Half the work of these forces on the displacements relative to that of the body's first node."""
+    """Return half the work of the edge forces on the displacements relative to that of the first node.
+
+    Shapes: x, rest (n_nodes, dim), starts (n_nodes + 1,), columns (n_edges,), tensors (n_edges, dim, dim).
+    """
     total, o = 0.0, minus(row(x, 0, zero), row(rest, 0, zero))
     for i in range(first, last):
         here = minus(row(x, i, zero), row(rest, i, zero))
@@ -41,7 +47,7 @@ def edge_energy(first: int, last: int, x: Any, rest: Any, starts: Any, columns: 
 
 @kernel
 def _form(x: Any, rest: Any, nodes: Any, w: Any, z: Any, zero: Any) -> None:
-    """Displacements w relative to a simplex' first node, and z: these, then their scalar products a <= b."""
+    """Write displacements w relative to a simplex's first node, and z: w, then the products w_a . w_b for a <= b."""
     dim = len(zero)
     o = minus(row(x, nodes[0], zero), row(rest, nodes[0], zero))
     for a in range(dim):
@@ -57,7 +63,7 @@ def _form(x: Any, rest: Any, nodes: Any, w: Any, z: Any, zero: Any) -> None:
 
 @kernel
 def _multiply(tensor: Any, z: Any, t: Any) -> None:
-    """t = T z, T symmetric."""
+    """Write t = T z, T symmetric."""
     t[:] = 0.0
     for r in range(len(z)):
         for s in range(len(z)):
@@ -66,7 +72,11 @@ def _multiply(tensor: Any, z: Any, t: Any) -> None:
 
 @kernel
 def energies(first: int, last: int, x: Any, rest: Any, elements: Any, tensors: Any, energy: Any, zero: Any) -> None:
-    """z . T z / 2 of each simplex; there is one T, or each has its own."""
+    """Write the energy z . T z / 2 of each simplex, with one T for all or one for each.
+
+    Shapes, with m = dim^2 + dim (dim + 1) / 2: x, rest (n_nodes, dim), elements (n_elements, dim + 1), tensors
+    (1 or n_elements, m, m), energy (n_elements,).
+    """
     dim, size = len(zero), tensors.shape[1]
     w, z, t = np.empty((dim, dim)), np.empty(size), np.empty(size)
     for e in range(first, last):
@@ -79,7 +89,11 @@ def energies(first: int, last: int, x: Any, rest: Any, elements: Any, tensors: A
 
 @kernel
 def forces(first: int, last: int, x: Any, rest: Any, elements: Any, tensors: Any, force: Any, zero: Any) -> None:
-    """The derivative of each simplex' energy by its nodes, shape (n_elements, k * dim)."""
+    """Write the derivative of each simplex's energy by its nodes.
+
+    Shapes, with m = dim^2 + dim (dim + 1) / 2: x, rest (n_nodes, dim), elements (n_elements, dim + 1), tensors
+    (1 or n_elements, m, m), force (n_elements, (dim + 1) * dim).
+    """
     dim, size = len(zero), tensors.shape[1]
     w, z, t = np.empty((dim, dim)), np.empty(size), np.empty(size)
     for e in range(first, last):

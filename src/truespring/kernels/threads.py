@@ -1,4 +1,4 @@
-"""Running kernels on several threads, and what compiling them costs."""
+"""Run kernels on several threads, and measure the time of compiling them."""
 
 import os
 import threading
@@ -13,18 +13,18 @@ import numba
 import numpy as np
 from numba.core import event
 
-#: Flags under which sums stay fast and stay the same: `fastmath=True` would reorder them, which is slower here.
+#: Flags that keep sums in order: `fastmath=True` would reorder them, which is slower here and less reproducible.
 FASTMATH = {"contract", "nsz", "arcp"}
 
-#: How every kernel is compiled: serially, released from the interpreter's lock, kept on disk.
+#: Decorator of kernels: compiled without parallel loops, without the interpreter lock, and cached on disk.
 kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(nogil=True, cache=True, fastmath=FASTMATH)
 
-#: How loops over plain vectors are compiled: sums in the order of the machine's vector registers.
+#: Decorator of loops over plain vectors, whose sums may be reordered for vector registers.
 vector_kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
     nogil=True, cache=True, fastmath=FASTMATH | {"reassoc"}
 )
 
-# Pieces smaller than so many rows, springs or elements are not worth the hand-over to another thread.
+# Smallest number of rows, springs or elements that is worth another thread.
 _SMALLEST_PIECE = 4000
 
 Array = TypeVar("Array", bound=np.ndarray[Any, Any])
@@ -33,34 +33,34 @@ _chosen: int | None = None
 
 
 def n_threads() -> int:
-    """Return how many threads kernels take: as set, else the cores that this process may use."""
+    """Return the number of threads of kernels: as set, else the cores that this process may use."""
     if _chosen is not None:
         return _chosen
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def set_threads(count: int | None) -> None:
-    """Set how many threads kernels take; None goes back to all cores."""
+    """Set the number of threads of kernels; None uses all cores."""
     global _chosen
     _chosen = count
 
 
 def pieces(n: int, smallest: int = _SMALLEST_PIECE) -> list[tuple[int, int]]:
-    """Cut the range 0..n into at most one piece a thread, none smaller than `smallest` but the only one."""
+    """Return ranges that divide 0..n, at most one per thread, each of at least `smallest` unless it is the only one."""
     count = max(1, min(n_threads(), n // max(smallest, 1)))
     bounds = [n * piece // count for piece in range(count + 1)]
     return list(pairwise(bounds))
 
 
 def run(function: Callable[..., Any], n: int, *arguments: Any, smallest: int = _SMALLEST_PIECE) -> list[Any]:
-    """Call function(first, last, *arguments) on all pieces of 0..n and return what each returned, in order."""
+    """Call function(first, last, *arguments) on all pieces of 0..n; return the results in order."""
     return run_on(pieces(n, smallest), function, *arguments)
 
 
 def run_on(ranges: list[tuple[int, int]], function: Callable[..., Any], *arguments: Any) -> list[Any]:
-    """Call function(first, last, *arguments) on ranges, each in a thread, and return what each returned, in order."""
+    """Call function(first, last, *arguments) on ranges, each in a thread; return the results in order."""
     (first, *others) = ranges
-    if not others or not _in_use.acquire(blocking=False):  # whoever comes second does without other threads
+    if not others or not _in_use.acquire(blocking=False):  # a second caller runs without other threads
         return [function(*piece, *arguments) for piece in (first, *others)]
     try:
         workers = _workers(len(others))
@@ -77,13 +77,13 @@ def run_on(ranges: list[tuple[int, int]], function: Callable[..., Any], *argumen
 
 
 def writable(array: Array) -> Array:
-    """Return a contiguous array that is not frozen: kernels are compiled anew for frozen ones."""
+    """Return a contiguous, writable array: numba compiles a kernel again for read-only arrays."""
     writable: Array = np.require(array, requirements=["C", "W"])
     return writable
 
 
 class _Worker:
-    """A thread that waits for calls: two locks hand them over in a third of the time that an executor takes."""
+    """A thread that waits for calls; its two locks take a third of the time of an executor."""
 
     def __init__(self) -> None:
         self._called, self._returned = threading.Lock(), threading.Lock()
@@ -92,26 +92,30 @@ class _Worker:
         threading.Thread(target=self._work, name="truespring", daemon=True).start()
 
     def start(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Start a call in the thread."""
         self._call = partial(function, *arguments)
         self._called.release()
 
     def wait(self) -> None:
+        """Wait until the call has ended."""
         self._returned.acquire()
 
     def result(self) -> Any:
+        """Return the result of the last call, or raise its exception."""
         if self._error is not None:
             raise self._error
         return self._result
 
     def _work(self) -> None:
+        """Execute calls, one after the other, until the process ends."""
         while True:
             self._called.acquire()
             self._result, self._error = None, None
             try:
                 self._result = self._call()
-            except BaseException as error:  # raised again where it is waited for
+            except BaseException as error:  # `result` raises it
                 self._error = error
-            del self._call  # and with it the arrays
+            del self._call  # frees the arrays
             self._returned.release()
 
 
@@ -120,13 +124,14 @@ _waiting: list[_Worker] = []
 
 
 def _workers(count: int) -> list[_Worker]:
+    """Return threads that wait for calls, starting them if needed."""
     while len(_waiting) < count:
         _waiting.append(_Worker())
     return _waiting[:count]
 
 
 def _forget() -> None:
-    """A process that was forked has none of the threads."""
+    """Discard the threads: a forked process does not have them."""
     global _in_use
     _in_use = threading.Lock()
     _waiting.clear()
@@ -137,17 +142,19 @@ if hasattr(os, "register_at_fork"):
 
 
 class _Stopwatch(event.Listener):
-    """Adds up the time of events; one within another counts once."""
+    """Add up the time of events; nested events count once."""
 
     def __init__(self) -> None:
         self.seconds, self._depth, self._started = 0.0, 0, 0.0
 
     def on_start(self, event: Any) -> None:
+        """Start the clock, unless within another event."""
         if not self._depth:
             self._started = time.perf_counter()
         self._depth += 1
 
     def on_end(self, event: Any) -> None:
+        """Stop the clock, unless within another event."""
         self._depth -= 1
         if not self._depth:
             self.seconds += time.perf_counter() - self._started
@@ -155,7 +162,7 @@ class _Stopwatch(event.Listener):
 
 @contextmanager
 def compiling() -> Iterator[Callable[[], float]]:
-    """Yield a function that tells the seconds spent on compiling kernels so far within the block."""
+    """Yield a function that returns the time spent on compiling kernels within the block so far [s]."""
     watch = _Stopwatch()
     with event.install_listener("numba:compile", watch):
         yield lambda: watch.seconds

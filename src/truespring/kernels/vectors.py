@@ -1,16 +1,16 @@
-"""Loops over vectors, flat, as conjugate gradients need them."""
+"""Loops over flat vectors for conjugate gradients."""
 
 from typing import Any
 
 from truespring.kernels.threads import vector_kernel
 
-#: Of so few numbers threads are not asked to take a share: handing it over takes longer than the loop.
+#: Smallest number of entries that is worth another thread.
 SMALLEST = 200_000
 
 
 @vector_kernel
 def advance(first: int, last: int, length: float, p: Any, q: Any, x: Any, r: Any) -> float:
-    """Step x along p and r against q; the sum of r . r."""
+    """Add length p to x, subtract length q from r, and return r . r. Shapes: p, q, x, r (n,)."""
     total = 0.0
     for i in range(first, last):
         x[i] += length * p[i]
@@ -21,14 +21,14 @@ def advance(first: int, last: int, length: float, p: Any, q: Any, x: Any, r: Any
 
 @vector_kernel
 def turn_towards(first: int, last: int, z: Any, share: float, p: Any) -> None:
-    """p = z + share p."""
+    """Set p to z + share p. Shapes: z, p (n,)."""
     for i in range(first, last):
         p[i] = z[i] + share * p[i]
 
 
 @vector_kernel
 def scalar_product(first: int, last: int, a: Any, b: Any) -> float:
-    """The sum of a . b."""
+    """Return a . b. Shapes: a, b (n,)."""
     total = 0.0
     for i in range(first, last):
         total += a[i] * b[i]

@@ -1,8 +1,8 @@
 """Loops over elements whose volume is a weighted sum of determinants over their simplices.
 
-The determinant is that of the edges which leave a simplex' first node; of a triangle, of its two
-edges and the unit vector across the plane. Its second derivative by two nodes a, b takes v to v x w,
-w that unit vector, or of a tetrahedron abcd the edge d - c.
+The determinant is that of the edges from a simplex's first node; of a triangle, that of its two edges and the unit
+vector normal to the plane. Its second derivative by two nodes a, b maps v to v x w, with w that unit vector, or the
+edge d - c of a tetrahedron abcd.
 """
 
 from typing import Any
@@ -13,13 +13,13 @@ from numba.extending import overload
 from truespring.kernels.small import dot, minus
 from truespring.kernels.threads import kernel
 
-# Pairs of a triangle's nodes; pairs of a tetrahedron's, each before the opposite one, all four in even permutation.
+# Pairs of nodes of a triangle; pairs of nodes of a tetrahedron, each followed by the other two in even permutation.
 _CYCLE = ((0, 1), (1, 2), (2, 0))
 _OPPOSITE = ((0, 1, 2, 3), (0, 2, 3, 1), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 2, 0), (2, 3, 0, 1))
 
 
 def _place(x, i, zero):
-    """Row i of an array of shape (n, len(zero)), in space."""
+    """Return row i of an array of shape (n, len(zero)) as a vector in space."""
 
 
 @overload(_place)
@@ -29,12 +29,13 @@ def _place_in_space(x, i, zero):
 
 @kernel
 def _cross(a: Any, b: Any) -> Any:
+    """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
 def _edges(x: Any, nodes: Any, simplex: Any, zero: Any) -> Any:
-    """The edges that leave a simplex' first node."""
+    """Return the edges from a simplex's first node; the third one of a triangle is the normal."""
     o = _place(x, nodes[simplex[0]], zero)
     first = minus(_place(x, nodes[simplex[1]], zero), o)
     second = minus(_place(x, nodes[simplex[2]], zero), o)
@@ -44,6 +45,7 @@ def _edges(x: Any, nodes: Any, simplex: Any, zero: Any) -> Any:
 
 @kernel
 def _add(rows: Any, i: int, factor: float, v: Any) -> None:
+    """Add factor v to row i."""
     rows[i, 0] += factor * v[0]
     rows[i, 1] += factor * v[1]
     rows[i, 2] += factor * v[2]
@@ -51,7 +53,7 @@ def _add(rows: Any, i: int, factor: float, v: Any) -> None:
 
 @kernel
 def _slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero: Any) -> None:
-    """The derivative of an element's volume by its nodes, shape (k, 3)."""
+    """Write the derivative of an element's volume by its nodes, shape (k, 3)."""
     slope[:] = 0.0
     for simplex in simplices:
         first, second, third = _edges(x, nodes, simplex, zero)
@@ -70,7 +72,10 @@ def _slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero:
 def volumes(
     first: int, last: int, x: Any, elements: Any, simplices: Any, weight: float, volume: Any, zero: Any
 ) -> None:
-    """The volume of each element."""
+    """Write the volume of each element.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), simplices (n_simplices, dim + 1), volume (n_elements,).
+    """
     for e in range(first, last):
         total = 0.0
         for simplex in simplices:
@@ -83,7 +88,10 @@ def volumes(
 def growths(
     first: int, last: int, x: Any, step: Any, elements: Any, simplices: Any, weight: float, growth: Any, zero: Any
 ) -> None:
-    """The change of each element's volume that is linear in a step."""
+    """Write the change of each element's volume that is linear in a step.
+
+    Shapes: x, step (n_nodes, dim), elements (n_elements, k), simplices (n_simplices, dim + 1), growth (n_elements,).
+    """
     dim, k = len(zero), elements.shape[1]
     slope = np.empty((k, 3))
     for e in range(first, last):
@@ -98,7 +106,11 @@ def growths(
 def forces(
     first: int, last: int, x: Any, elements: Any, simplices: Any, weight: float, pressure: Any, force: Any, zero: Any
 ) -> None:
-    """The pressure times the derivative of each element's volume, shape (n_elements, k * dim)."""
+    """Write the pressure times the derivative of each element's volume by its nodes.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), simplices (n_simplices, dim + 1), pressure (n_elements,), force
+    (n_elements, k * dim).
+    """
     dim, k = len(zero), elements.shape[1]
     slope = np.empty((k, 3))
     for e in range(first, last):
@@ -110,7 +122,7 @@ def forces(
 
 @kernel
 def _turns(x: Any, nodes: Any, simplices: Any, weight: float, turn: Any, zero: Any) -> None:
-    """The vector w of each pair of an element's nodes, shape (k, k, 3)."""
+    """Write the vector w of each pair of an element's nodes, shape (k, k, 3)."""
     turn[:] = 0.0
     for simplex in simplices:
         if len(zero) == 2:
@@ -137,7 +149,11 @@ def stiffnesses(
     blocks: Any,
     zero: Any,
 ) -> None:
-    """Write s s^T times a stiffness, s the derivative of the volume, and the geometric part."""
+    """Write the stiffness of each element: stiffness s s^T, s the derivative of the volume, plus the geometric part.
+
+    Shapes: x (n_nodes, dim), elements (n_elements, k), simplices (n_simplices, dim + 1), stiffness, pressure
+    (n_elements,), blocks (n_elements, k * dim, k * dim).
+    """
     dim, k = len(zero), elements.shape[1]
     slope, turn = np.empty((k, 3)), np.empty((k, k, 3))
     for e in range(first, last):
