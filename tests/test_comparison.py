@@ -8,6 +8,7 @@ import pytest
 
 import truespring as ts
 from truespring.arrays import Floats, Ints
+from truespring.comparison import most_moved
 from truespring.errors import ProblemError
 from truespring.misfit import Misfit, displacement_misfit, find_misfit
 from truespring.reference import Level, Placing, Record, placed
@@ -120,6 +121,17 @@ def test_distances_in_metres_do_not_tell_model_from_reference(coarse: ts.Solutio
     assert one.rms_distances == pytest.approx(two.rms_distances, rel=1e-14) and one.rms_distances[-1] > 1e-4
     assert one.hausdorff == pytest.approx(two.hausdorff, rel=1e-12)
     assert one.rms_error != pytest.approx(two.rms_error, rel=1e-3)
+
+
+def test_the_node_that_moves_most_is_free_and_of_several_the_first_along_x(coarse: ts.Solution) -> None:
+    problem = coarse.problem
+    size = np.linalg.norm(coarse.states[-1].displacement, axis=1)
+    assert most_moved(coarse) == size.argmax() != 0
+    some = np.array([3, 5, 7])
+    assert most_moved(coarse, some) == some[size[some].argmax()]
+    even = [replace(state, displacement=np.full_like(state.displacement, 0.1)) for state in coarse.states]
+    first = most_moved(replace(coarse, states=tuple(even)))
+    assert problem.mesh.nodes[first] == pytest.approx([LENGTH / 16, 0.0])  # those on the left are held
 
 
 def test_stored_energies_are_compared_if_both_are_known(coarse: ts.Solution) -> None:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy.optimize import brentq
 
 import truespring as ts
 from tests.law_contract import CHECKS
@@ -15,7 +16,7 @@ from truespring.arrays import Floats
 from truespring.material import Lame
 from truespring.models import LAWS, Constant, Law
 from truespring.models.law import Constants, Response
-from truespring.models.laws import material_constants, neo_hookean
+from truespring.models.laws import _free_thickness, material_constants, neo_hookean
 from truespring.models.symmetric import determinant, inverted
 from truespring.study import schema
 
@@ -200,3 +201,20 @@ def test_a_study_takes_them_with_units() -> None:
     described = table.model_json_schema()["properties"]["c1"]["description"]
     assert "half of the shear modulus" in described and "[Pa]" in described
     assert set(material_constants()) == set(schema.MaterialKeys.model_fields) - {"young", "poisson", "density"}
+
+
+@pytest.mark.parametrize("ratio", [-0.6, -0.2, 0.0, 0.5, 2.0, 100.0])
+def test_the_free_thickness_is_the_root_on_the_branch_that_begins_at_rest(ratio: float) -> None:
+    """Of e^y - 1 + ratio/2 (log det + y), by bisection above its minimum; none where that is above zero."""
+    log_det = np.linspace(-6.0, 6.0, 49)
+    found = _free_thickness(log_det, ratio)
+    for value, at in zip(found, log_det, strict=True):
+
+        def rest(y: float, at: float = at) -> float:
+            return float(np.expm1(y) + ratio / 2 * (at + y))
+
+        low = np.log(-ratio / 2) if ratio < 0 else -60.0 - abs(at) * 100
+        if ratio < 0 and rest(low) > 0:
+            assert np.isnan(value)
+        else:
+            assert np.log(value) == pytest.approx(brentq(rest, low, 60.0, xtol=1e-14), abs=1e-9)

@@ -68,3 +68,13 @@ def test_a_state_inside_out_is_searched_again_and_said() -> None:
     assert "line search" in note and "load factor 1:" in note and "inverted" in note
     tip = searched.states[-1].displacement
     assert np.abs(path.states[-1].displacement - tip).max() <= 1e-8 * np.abs(tip).max()
+
+
+def test_a_linear_body_takes_one_iteration_then_none() -> None:
+    """From two states the third is extrapolated, of a linear body to where it is."""
+    problem = ts.Problem(ts.rectangle((4.0, 1.0), (4, 1)), SOFT, THIN, ts.Fixed("left"), ts.Force("right", (0.0, 1e-3)))
+    path = ts.solve(problem, ts.Fem("linear"), ts.Newton(load_steps=3, method="mixed", max_iterations=1))
+    assert path.status is ts.Status.CONVERGED
+    assert [state.iterations for state in path.states] == [0, 1, 0, 0]
+    assert path.cost is not None and path.cost.newton_iterations == 1
+    assert path.cost.cg_iterations == path.cost.lanczos_iterations == 0 < path.cost.memory

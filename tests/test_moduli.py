@@ -15,7 +15,7 @@ import truespring as ts
 from tests.closed_forms import periodic_elasticity, square_moduli, tensile_test, young_extremes
 from truespring.arrays import Floats
 from truespring.models import findings
-from truespring.models.moduli import _directions
+from truespring.models.moduli import _directions, spring_counts
 
 THIRD = 1 / 3
 LLOYD, BULK, FULL = (5 / 16, 7 / 16), (3 / 8, 3 / 8), (17 / 56, 23 / 56)
@@ -556,3 +556,12 @@ def test_directions_that_are_tried_cover_the_axes_and_diagonals_once(dim: int, a
     some = np.random.default_rng(2).normal(size=(200, dim))
     some /= np.linalg.norm(some, axis=1, keepdims=True)
     assert np.degrees(np.arccos(np.abs(some @ found.T).max(axis=1).clip(max=1))).max() < 5
+
+
+def test_springs_are_counted_by_the_sign_of_their_sum() -> None:
+    """Two squares of six springs each, of which one is shared."""
+    mesh = ts.rectangle((2.0, 1.0), (2, 1))
+    stiffness = np.ones((2, 6))
+    assert spring_counts(mesh, stiffness) == (11, 0, 0)
+    stiffness[1, 4:] = 1e-17, -1.0  # the diagonals of one of them
+    assert spring_counts(mesh, stiffness) == (11, 1, 1)

@@ -15,7 +15,9 @@ from scipy import sparse
 
 import truespring as ts
 from tests.closed_forms import bending_factor, buckled_column_tip
+from truespring.solvers.balance import Balance
 from truespring.solvers.line_search import Step, _candidates, _search
+from truespring.solvers.newton import _snapped
 
 SOFT = ts.Material(young=1.0, poisson=1 / 3)
 THIN = ts.PlaneStress(1.0)
@@ -301,7 +303,7 @@ def test_a_body_turned_inside_out_is_said_to_be_inverted() -> None:
     assert path.status is ts.Status.INVERTED
     assert path.states[-1].area_ratio == pytest.approx(-1)
     assert path.states[-1].energy == pytest.approx(0, abs=1e-20)
-    assert any("inverted" in warning for warning in path.warnings)
+    assert any("inverted" in warning and "area" in warning for warning in path.warnings)
     linear = ts.solve(ts.Problem(mesh, SOFT, THIN, supports), MODELS["linear"], ts.Newton(load_steps=4))
     assert linear.status is ts.Status.CONVERGED
     assert any("inverted" in warning and "linear" in warning for warning in linear.warnings)
@@ -496,3 +498,26 @@ def test_a_search_ends_where_the_energy_says(
     step = Step(np.ones((1, 1)), -abs(slope(0.0)), newton)
     found = _search(balance, 1.0, np.zeros((1, 1)), step)
     assert found == (None if length is None else pytest.approx(np.array([[length]])))
+
+
+def test_a_matrix_is_brought_into_blocks_once() -> None:
+    matrix = sparse.csr_array(np.arange(36.0).reshape(6, 6))
+    balance: Any = SimpleNamespace(free=np.ones((3, 2), dtype=bool))
+    blocks = Balance.in_blocks(balance, matrix)
+    assert blocks.format == "bsr" and blocks.blocksize == (2, 2) and (blocks.toarray() == matrix.toarray()).all()
+    assert Balance.in_blocks(balance, blocks) is blocks
+    other = sparse.bsr_array(matrix, blocksize=(3, 3))
+    assert Balance.in_blocks(balance, other).blocksize == (2, 2)
+
+
+@pytest.mark.parametrize(("far", "snapped"), [(1.0, False), (3.0, False), (200.0, True)])
+def test_a_step_much_longer_than_the_last_is_a_snap(far: float, snapped: bool) -> None:
+    """Per load factor: of a step of a third of the one before a third is expected. Whatever the unit."""
+    for unit in (1e-6, 1.0, 1e6):
+        states: list[Any] = [
+            SimpleNamespace(load_factor=factor, positions=np.array([[unit * place, 0.0]]), branched=False)
+            for factor, place in ((0.0, 0.0), (0.3, 3.0), (0.4, 3.0 + far))
+        ]
+        assert _snapped(states[2], states[1], states[0]) is snapped
+        assert not _snapped(states[2], states[1], None)
+        assert not _snapped(SimpleNamespace(**{**vars(states[2]), "branched": True}), states[1], states[0])

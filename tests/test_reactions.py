@@ -404,5 +404,10 @@ def test_nothing_was_made_worse_where_the_force_improved() -> None:
         assert told.pair == pytest.approx((before[0], after[0])) and told.quantity == "force"
         said = [text for text in _warnings(unknowns, np.ones(len(unknowns)), [told]) if "worse" in text]
         assert bool(said) == worse
+    for gone, more in ((1, ""), (3, ""), (5, "and 2 more")):
+        values = np.where(np.arange(8) < gone, 0.0, 1.0)
+        names: Any = SimpleNamespace(names=[f"s{k}" for k in range(8)])
+        (said,) = _warnings(names, values, [])
+        assert said.count("s0") == 1 and (more in said if more else "more:" not in said and "and" not in said)
     mixed = CaseResult(case, True, off(0.3, 0.01), off(0.01, 0.1))
     assert mixed.quantity == "displacement" and mixed.pair == pytest.approx((0.3, 0.1))

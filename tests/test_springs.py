@@ -162,3 +162,7 @@ def test_negative_springs_are_refused_unless_allowed() -> None:
         ts.Springs(rule="isotropic").potential(problem)
     allowed = ts.Springs(rule="isotropic", allow_negative=True).potential(problem)
     assert allowed.stiffness.min() == pytest.approx(2 * 3 * (3 - 4) / 32)
+
+
+def test_the_label_says_what_springs_have() -> None:
+    assert "volume" in ts.Springs("isotropic", volume=True).label and "volume" not in ts.Springs("isotropic").label

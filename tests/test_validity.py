@@ -28,7 +28,8 @@ from truespring.validity.deviation import _left_out
 from truespring.validity.lines import polylines, spans
 from truespring.validity.loads import LOAD_TYPES, Bar
 from truespring.validity.refine import LINES, Cells, Rows, crossings
-from truespring.validity.sentences import headline, verdict
+from truespring.validity.rules import mapped_springs
+from truespring.validity.sentences import _on_grid, _spot, headline, verdict
 from truespring.validity.solving import SMALL, Solved, Task, run_task
 
 LATTICES = {"lloyd": (5 / 16, 7 / 16), "isotropic": (3 / 8, 3 / 8)}
@@ -81,8 +82,11 @@ def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) ->
             assert one.errors[0, place] == pytest.approx(max(abs(force / stress[0] - 1), rms), abs=1e-5)
 
 
-def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(study: Path) -> None:
+def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(
+    study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """15/17 of E along the mesh; its hardening crosses the straight line where P = 0.3 E."""
+    monkeypatch.setattr("truespring.validity.mapping.Pool", None)  # one process needs none
     (one,) = map_validity(study, law="linear", loads=["stretch"], rules=["lloyd"], y=None).maps
     (deviation,) = one.deviations.values()
     assert deviation.stiffness_on_grid[0] == pytest.approx(-2 / 17, abs=1e-5)
@@ -309,6 +313,9 @@ def test_sentences_follow_from_the_numbers(bent: Validity) -> None:
     assert "within 5 % of neo-Hookean FEM up to 15 % of the length on every mesh" in verdict(begun, begun.maps[0])
     level = _with_errors(bent, dict.fromkeys(range(1, 9), (0.3, 0.3)))
     assert "nearest under a small load, 30 % off" in verdict(level, level.maps[0])
+    fewer = _with_errors(bent, {depth: (0.0, 0.1) if depth >= 5 else far for depth in range(1, 9)})
+    said_of_fewer = verdict(fewer, fewer.maps[0])
+    assert "up to 15 % of the length on meshes of 5 to 8 elements through the depth, less on others" in said_of_fewer
     small = {spot.depth: deviation.stiffness_on_grid[0] for spot, deviation in bent.maps[0].deviations.items()}
     assert f"{100 * small[1]:.0f} % too stiff (1 element)" in said.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -564,3 +571,35 @@ def test_lines_of_one_row_are_points(bent: Validity) -> None:
     one = bent.maps[0]
     row = replace(one, y=one.y[:1], errors=np.abs(one.x[None] - 0.1))
     assert [float(part[0, 0]) for part in polylines(row)[0.05]] == pytest.approx([0.05, 0.15])
+
+
+# Cubes, on which isotropic springs are isotropic.
+CUBES = (*IN_SPACE[:2], ("elements = [8, 2]", "elements = [8, 2, 4]"), *IN_SPACE[3:])
+
+
+@pytest.mark.parametrize(("changes", "cauchy"), [((), 1 / 3), (CUBES, 1 / 4)], ids=["plane", "space"])
+def test_all_rules_have_a_volume_term_where_poisson_asks_for_one(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...], cauchy: float
+) -> None:
+    for poisson, varies, terms in ((cauchy, False, False), (cauchy, True, True), (0.4, False, True)):
+        text = changed(*changes, ("poisson = 0.3", f"poisson = {poisson}"))
+        found = mapped_springs(read_study(written(tmp_path, text)), ["all"], varies)
+        assert "isotropic" in {name for one in found for name in (one.name, *one.same)}
+        assert any(one.springs.volume for one in found) == terms
+        assert all(one.springs.volume == one.name.endswith("+volume") for one in found)
+
+
+def test_what_is_mapped_is_named_by_what_is_its_own() -> None:
+    assert _spot(Spot(poisson=0.25)) == " (Poisson's ratio 0.25)" and _spot(Spot()) == ""
+    depths = np.array([1.0, 2.0, 3.0, 4.0])
+    assert _on_grid(depths, "depth", (1.5, 4.0)) == (2.0, 4.0) and _on_grid(depths, "depth", (1.0, 3.2)) == (1.0, 3.0)
+    assert _on_grid(depths, "aspect", (1.5, 3.2)) == (1.5, 3.2)
+
+
+def test_without_a_probe_the_size_of_a_load_is_read_where_the_body_moves_most() -> None:
+    displacement = np.array([[0.0, 0.0], [3.0, -1.0], [-2.0, -3.0]])
+    load: Any = SimpleNamespace(sizes=lambda course: course.probe)
+    body: Any = SimpleNamespace(probe_in=lambda problem, load: None, extent=(1.0, 1.0))
+    states = [SimpleNamespace(displacement=displacement)]
+    solved: Any = SimpleNamespace(path=SimpleNamespace(problem=None, states=states), states=states, levels=np.ones(1))
+    assert reference._Search(body, load, "linear", None, 1).sizes(solved) == 2
