@@ -277,7 +277,7 @@ def test_classes_are_recovered_from_markers_and_from_a_curve(tmp_path: Path) -> 
     rows = [f"{s.load_factor * 20},{1e3 * f[0]},{1e3 * f[1]}" for s in path.states for f in [path.applied_force(s)]]
     file = tmp_path / "curve.csv"
     file.write_text("\n".join(["ux [mm],fx [mN],fy [mN]", *rows]), encoding="utf-8")
-    with pytest.raises(ReferenceFileError, match="column uy is missing"):
+    with pytest.raises(ReferenceFileError, match=r":1: .*uy.*load_factor"):
         read_curve(file, moved, 0)
     rows = [row.replace(row.split(",")[0], f"{s.load_factor}", 1) for row, s in zip(rows, path.states, strict=True)]
     file.write_text("\n".join(["load_factor,fx [mN],fy [mN]", *rows]), encoding="utf-8")
@@ -299,12 +299,12 @@ def test_a_curve_tells_how_far_the_load_went_by_itself(tmp_path: Path) -> None:
     assert (quantity, axes.tolist()) == ("displacement", [1]) and values == pytest.approx([-0.04])
     assert list(curve.at(1.1)) == []
     for text, said in (
-        ("fy,uy\n-0.02,-1\n-0.01,-0.5\n", r":3: the load goes down"),
-        ("uy\n-1\n", "fy is missing, or load_factor"),
-        ("fy\n-1\n", "one of the columns ux, uy is wanted"),
-        ("fy,uz\n-1,0\n", "the body has 2 directions"),
-        ("fy,uy\n0,1\n", "without load"),
-        ("fy,uy\n0,0\n", "no row under load"),
+        ("fy,uy\n-0.02,-1\n-0.01,-0.5\n", r":3: .*decreases to 0.23"),
+        ("uy\n-1\n", ":1: .*fy.*load_factor"),
+        ("fy\n-1\n", ":1: .*ux, uy"),
+        ("fy,uz\n-1,0\n", ":1: column uz"),
+        ("fy,uy\n0,1\n", ":2: .*displacement"),
+        ("fy,uy\n0,0\n", "csv: no row"),
     ):
         file.write_text(text, encoding="utf-8")
         with pytest.raises(ReferenceFileError, match=said):
@@ -416,13 +416,13 @@ def test_what_does_not_fit_is_refused() -> None:
     case = case_of(problem, ts.Springs("isotropic"), 1)
     for call, error, said in (
         (lambda: make_unknowns(problem, ts.Springs("lloyd"), "clas"), ModelError, "did you mean 'class'"),
-        (lambda: make_unknowns(problem, ts.Springs("biquadratic")), ModelError, "answer to each other"),
+        (lambda: make_unknowns(problem, ts.Springs("biquadratic")), ModelError, "biquadratic.*coupled"),
         (lambda: make_unknowns(problem, ts.Springs("lloyd"), "region"), ModelError, "several materials"),
-        (lambda: LoadCase("x", problem, solver=newton), ProblemError, "nothing is known"),
+        (lambda: LoadCase("x", problem, solver=newton), ProblemError, "no data at the load levels k/1"),
         (lambda: LoadCase("x", problem, case.reference, solver=ts.ArcLength()), ProblemError, "load control"),
         (lambda: ts.calibrate([], ts.Springs("lloyd")), ProblemError, "no load case"),
-        (lambda: ts.calibrate(case, ts.Springs("lloyd"), regularisation=-1), ProblemError, "from 0 on"),
-        (lambda: ts.calibrate(case, ts.Springs("lloyd"), evaluations=0), ProblemError, "at least 1"),
+        (lambda: ts.calibrate(case, ts.Springs("lloyd"), regularisation=-1), ProblemError, "regularisation = -1"),
+        (lambda: ts.calibrate(case, ts.Springs("lloyd"), evaluations=0), ProblemError, "evaluations = 0"),
     ):
         with pytest.raises(error, match=said):
             call()
@@ -435,7 +435,7 @@ def test_what_does_not_fit_is_refused() -> None:
     stiffer = replace(problem, material=ts.Material(20e3, 1 / 3))
     for other, what in ((cantilever((16, 4)), "mesh"), (stiffer, "material")):
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")
-        with pytest.raises(ProblemError, match=f"other: its {what} is another"):
+        with pytest.raises(ProblemError, match=f"other: its {what} "):
             ts.calibrate(case, ts.Springs("lloyd"), held_out=apart)
 
 

@@ -42,7 +42,7 @@ from truespring.sweeping import Failure, Pool, plan_sweep, run_sweep
 from truespring.sweeping.store import FAILED, Store
 from truespring.sweeping.sweep import _outcome, solve_point
 from truespring.sweeping.table import rows_of
-from truespring.sweeping.values import choose, read_points, read_value, read_values, read_vary
+from truespring.sweeping.values import make_changes, read_points, read_value, read_values, read_vary
 
 FAST = changed(("load_steps = 2", "load_steps = 1"))
 
@@ -92,7 +92,7 @@ def study(tmp_path: Path) -> Path:
 
 
 def test_the_grid_is_full(study: Path) -> None:
-    found = choose(read_text(study), {"material.poisson": "0:0.4:3", "mesh.elements": [[8, 2], [16, 4]]})
+    found = make_changes(read_text(study), {"material.poisson": "0:0.4:3", "mesh.elements": [[8, 2], [16, 4]]})
     assert [(one["material.poisson"], one["mesh.elements"]) for one in found] == [
         (poisson, elements) for poisson in (0.0, 0.2, 0.4) for elements in ([8, 2], [16, 4])
     ]
@@ -100,17 +100,21 @@ def test_the_grid_is_full(study: Path) -> None:
 
 def test_a_latin_hypercube_has_one_point_in_every_layer(study: Path) -> None:
     vary = {"material.poisson": "0:0.4", "material.young": "2 kPa:8 kPa", "models.springs.rule": "lloyd,isotropic"}
-    found = choose(read_text(study), vary, lhs=10, seed=3)
+    found = make_changes(read_text(study), vary, lhs=10, seed=3)
     poisson = np.array([one["material.poisson"] for one in found])
     young = np.array([float(one["material.young"].removesuffix(" kPa")) for one in found])
     for values, (low, high) in ((poisson, (0, 0.4)), (young, (2, 8))):
         assert sorted((10 * (values - low) / (high - low)).astype(int)) == list(range(10))
     assert sorted(one["models.springs.rule"] for one in found) == ["isotropic"] * 5 + ["lloyd"] * 5
-    assert found == choose(read_text(study), vary, lhs=10, seed=3) != choose(read_text(study), vary, lhs=10, seed=4)
+    assert (
+        found
+        == make_changes(read_text(study), vary, lhs=10, seed=3)
+        != make_changes(read_text(study), vary, lhs=10, seed=4)
+    )
 
 
 def test_a_latin_hypercube_keeps_whole_what_must_be_whole(study: Path) -> None:
-    found = choose(read_text(study), {"mesh.elements.1": "4:7", "material.young": "1:4"}, lhs=40)
+    found = make_changes(read_text(study), {"mesh.elements.1": "4:7", "material.young": "1:4"}, lhs=40)
     assert np.bincount([one["mesh.elements.1"] for one in found])[4:].tolist() == [10, 10, 10, 10]
     assert all(isinstance(one["material.young"], float) for one in found)
 
@@ -142,7 +146,7 @@ def test_points_come_from_a_table(study: Path) -> None:
 def test_any_key_can_have_another_value(tmp_path: Path, key: str, value: Any, read: Any) -> None:
     file = written(tmp_path, STUDY.replace('rule = "lloyd"', 'rule = "isotropic"'))
     assert not read(read_study(file)) and read(read_study(file, changes={key: value}))
-    assert value_at(read_text(file).table({key: value}), "load.1.on") == "right"
+    assert value_at(read_text(file).keys({key: value}), "load.1.on") == "right"
 
 
 @pytest.mark.parametrize(
@@ -160,19 +164,19 @@ def test_any_key_can_have_another_value(tmp_path: Path, key: str, value: Any, re
         (["material.young.x=3"], "not a table"),
         (["material.young=4 kPa,4 kg"], "point 2 (material.young = 4 kg): "),
         (["material.young=4 kPa,4 kg"], "study.toml:9: material.young: '4 kg' is in kilogram, not in Pa"),
-        (["material.young=1,,2"], "no value beside a comma"),
-        (["material.young="], "there is no value"),
+        (["material.young=1,,2"], "material.young = '1,,2'"),
+        (["material.young="], "material.young = ''"),
         (["mesh.elements=[8,2],[8.5,2]"], "point 2 (mesh.elements = [8.5, 2])"),
-        (["material.poisson=0:0.4"], "how many?"),
-        (["material.poisson=0:0.4:1"], "two values or more"),
-        (["material.young=1 kPa:2:3"], "one unit"),
+        (["material.poisson=0:0.4"], "0:0.4:5"),
+        (["material.poisson=0:0.4:1"], "at least 2 values"),
+        (["material.young=1 kPa:2:3"], "'kPa' and ''"),
         (["models.springs.rule=lloyd,loyd"], "did you mean 'lloyd'"),
         (["material.young=1", "material.young=2"], "given twice"),
         (["mesh.elements=[8,2]", "mesh.elements.1=8"], "both varied"),
         (["material.poisson=0:0.4:2000", "material.young=1:2:2000"], "more than 1,000,000"),
         ([], "nothing is varied"),
         (["material.young=1,2", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers"),
-        (["material.young=1,2", "--points", "there.csv"], "leave out"),
+        (["material.young=1,2", "--points", "there.csv"], "give one of them"),
     ],
 )
 def test_what_is_wrong_is_said_before_anything_is_solved(
@@ -190,9 +194,9 @@ def test_what_is_wrong_is_said_before_anything_is_solved(
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("material.young\n", "there is no point"),
-        ("material.young,material.young\n1,2\n", ":1: material.young stands there more than once"),
-        ("material.young,material.poisson\n1,0.3\n1\n", ":3: 1 values, and 2 keys"),
+        ("material.young\n", "points.csv has no points"),
+        ("material.young,material.young\n1,2\n", ":1: material.young"),
+        ("material.young,material.poisson\n1,0.3\n1\n", ":3: 1 values for 2 keys"),
         ("material.young,material.poisson\n1,\n", ":2: material.poisson has no value"),
         ("material.young\n4 kg\n", "point 1 (material.young = 4 kg)"),
     ],
@@ -274,7 +278,7 @@ def test_rows_are_sorted_and_columns_complete() -> None:
 def test_whatever_dies_no_point_is_lost() -> None:
     """A point that kills its workers, or fails, does so alone; workers and schedulers that are killed cost none."""
     said: list[str] = []
-    with Pool(1, report=said.append) as pool:
+    with Pool(1, note=said.append) as pool:
         found = dict(pool.run({str(number): number for number in range(9)}, square))
         assert "killed" in found.pop("3").reason
         assert found.pop("4") == Failure("ValueError: four") and found.pop("5") == Failure("five")
@@ -291,7 +295,7 @@ def test_whatever_dies_no_point_is_lost() -> None:
                 os.kill(scheduler, signal.SIGKILL)
         assert sorted(key for key, _ in done) == list(range(40)), "each once"
         assert worker not in {pid for _, pid in done[20:]} and len({pid for _, pid in done}) >= 3
-        assert said == ["the scheduler died: another is started, what was solved is kept"]
+        assert len(said) == 1 and "the scheduler died" in said[0]
         ((_, (ours, blas, around)),) = pool.run({0: 0}, threads)
         assert ours == blas == 1 and around["NUMBA_NUM_THREADS"] == around["OPENBLAS_NUM_THREADS"] == "1"
 
@@ -346,11 +350,11 @@ def test_a_point_that_takes_too_long_fails(study: Path) -> None:
 @pytest.mark.verification
 def test_a_point_that_never_comes_back_is_killed() -> None:
     with Pool(1, timeout=0.2) as pool:
-        assert "more memory or time than there is" in dict(pool.run({60: 60}, sleep))[60].reason
+        assert "more memory or time" in dict(pool.run({60: 60}, sleep))[60].reason
 
 
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    for address, told in (("tcp://127.0.0.1:9", "no Dask scheduler answers"), ("nonsense://x:1", "is no address")):
+    for address, told in (("tcp://127.0.0.1:9", "no Dask scheduler answers"), ("nonsense://x:1", "is not an address")):
         monkeypatch.setattr("truespring.sweeping.pool.FIRST_PATIENCE", 1.0)
         with pytest.raises(TruespringError, match=told):
             Pool(scheduler=address)
@@ -469,7 +473,7 @@ def test_a_changed_study_starts_anew_and_says_so(
         written(tmp_path, FAST.replace("-0.01", "-0.02")), {"material.poisson": [0.0], "mesh.elements": [[8, 2]]}
     )
     said: list[str] = []
-    done = run_sweep(plan, folder / "out", scheduler=cluster, report=said.append)
+    done = run_sweep(plan, folder / "out", scheduler=cluster, note=said.append)
     assert done.n_before == 0 and done.rows[0]["comparison.linear.rms_error"] is not None
     assert "has changed since 6 results" in said[0]
     now = records(folder / "out")
@@ -484,7 +488,7 @@ def test_a_file_that_changes_meanwhile_fails_its_points(tmp_path: Path) -> None:
     (point,) = plan.points.values()
     assert solve_point((plan.text, point))["models"]["springs"]["status"] == "converged"
     (tmp_path / "named.csv").write_text("2", encoding="utf-8")
-    with pytest.raises(TruespringError, match=r"named\.csv: is not the file that it was"):
+    with pytest.raises(TruespringError, match=r"named\.csv: .*changed"):
         solve_point((plan.text, point))
 
 
@@ -589,16 +593,16 @@ def test_a_scheduler_of_others_is_waited_for(tmp_path: Path) -> None:
     said: list[str] = []
     start()
     try:
-        with Pool(scheduler=address, report=said.append) as pool:
+        with Pool(scheduler=address, note=said.append) as pool:
             done = []
             for key, _ in pool.run({number: number for number in range(60)}, who):
                 done.append(key)
                 if len(done) == 5:
                     end()
                     start()
-            assert sorted(done) == list(range(60)) and "is lost: waiting for it" in said[-1]
+            assert sorted(done) == list(range(60)) and "is lost" in said[-1]
             pool.patience = 1.0
-            with pytest.raises(TruespringError, match="what was solved is kept"):
+            with pytest.raises(TruespringError, match="solved points are kept"):
                 for number, _ in enumerate(pool.run({number: number for number in range(60)}, who)):
                     if number == 5:
                         end()
@@ -635,5 +639,5 @@ def test_two_hundred_points_whose_workers_and_scheduler_are_killed(tmp_path: Pat
 
 @pytest.mark.parametrize("workers", [0, -3])
 def test_without_workers_nothing_is_solved(workers: int) -> None:
-    with pytest.raises(ts.TruespringError, match="1 or more"):
+    with pytest.raises(ts.TruespringError, match=f"workers = {workers}"):
         ts.sweep("examples/bending.toml", {"material.young": ["1 kPa"]}, workers=workers)

@@ -1,4 +1,4 @@
-"""Calibration: the stiffness of springs fitted to references, and told with the error on loads held out."""
+"""Calibration: fit the stiffness of springs to references, and test them on loads held out."""
 
 from truespring.calibration.calibration import REGULARISATION as REGULARISATION
 from truespring.calibration.calibration import calibrate as calibrate

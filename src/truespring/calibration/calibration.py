@@ -1,4 +1,4 @@
-"""calibrate(cases, springs) -> Calibration: springs fitted to references, and their errors on loads held out."""
+"""Fit the stiffness of springs to references, and test them on loads held out."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -19,10 +19,10 @@ from truespring.equilibrium import Solution, Status, solve
 from truespring.errors import ProblemError
 from truespring.models import Springs
 
-#: Weight of the pull toward the rule: errors of 1 % weigh as much as unknowns that are all off by as much as they are.
+#: Default weight of the regularisation: an error of 1 % weighs as much as a change of all unknowns by 1.
 REGULARISATION = 0.01
 
-#: Called with what is being done and the share that is done.
+#: Called with the current step and the share of the work done.
 Progress = Callable[[str, float], None]
 
 
@@ -36,26 +36,35 @@ def calibrate(
     evaluations: int = 20,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Fit the stiffness of springs to what is known of load cases, and test them on cases held out.
+    """Fit the stiffness of springs to references of load cases, and test them on cases held out.
 
     Full displacement fields give a start by equilibrium, which is linear in the stiffness; then the errors of the
-    equilibria themselves are minimised. Springs that turn elements inside out or lose their stability under a load to
-    fit, where those of the rule do not, are not taken. `unknowns` is a key of UNKNOWNS; none of them becomes negative;
-    `regularisation` weighs the pull toward the rule, see `Objective`; `evaluations` bounds how often all cases are
-    solved. Raises ModelError and ProblemError where springs, unknowns or cases do not fit.
+    equilibria are minimised. Springs that are inverted or unstable under a fitted load are rejected, unless those of
+    the rule are too.
+
+    Args:
+        cases: load cases to fit.
+        springs: springs of a rule to start from.
+        unknowns: a key of UNKNOWNS; unknowns stay non-negative.
+        held_out: load cases to test on.
+        regularisation: weight of the term toward the rule, see `Objective`.
+        evaluations: largest number of evaluations of the objective, each of which solves all cases.
+        progress: called with the current step and the share of the work done.
+
+    Raises ModelError or ProblemError if springs, unknowns or cases do not fit together.
     """
-    fitted, apart = _several(cases), _several(held_out)
+    fitted, tested = _several(cases), _several(held_out)
     if not fitted:
         raise ProblemError("there is no load case to calibrate to")
     if regularisation < 0 or not np.isfinite(regularisation):
-        raise ProblemError(f"regularisation = {regularisation}: a number from 0 on is wanted")
+        raise ProblemError(f"regularisation = {regularisation}: it must be finite and at least 0")
     if evaluations < 1:
-        raise ProblemError(f"evaluations = {evaluations}: at least 1 is wanted")
+        raise ProblemError(f"evaluations = {evaluations}: it must be at least 1")
     body = fitted[0].problem
-    require_one_body([(case.name, case.problem) for case in (*fitted, *apart)], body)
+    require_one_body([(case.name, case.problem) for case in (*fitted, *tested)], body)
     found = make_unknowns(body, springs, unknowns)
-    say = progress or (lambda text, share: None)
-    say("equilibrium of full fields", 0.0)
+    progress = progress or (lambda text, share: None)
+    progress("equilibrium of full fields", 0.0)
     system = equations(found, fitted)
     starts = {"rule": found.start}
     if system is not None:
@@ -65,9 +74,9 @@ def calibrate(
     objective = Objective(found, fitted, regularisation, excused)
     objectives = {name: objective.value(values) for name, values in starts.items()}
     if not np.isfinite(objectives["rule"]) and not np.isfinite(min(objectives.values())):
-        raise ProblemError("the springs do not reach full load in the cases to fit: load less, or take more load_steps")
+        raise ProblemError("the springs do not reach full load in the cases to fit: use less load or more load_steps")
     first = min(objectives, key=lambda name: objectives[name])
-    say("equilibria", 0.2)
+    progress("equilibria", 0.2)
     fit = fit_equilibria(objective, starts[first], evaluations)
     values, method = starts[first], "non-negative least squares"
     if fit.objective < objectives[first]:
@@ -75,10 +84,10 @@ def calibrate(
         objectives["refined"] = fit.objective
         starts["refined"] = values
     elif first == "rule":
-        method = "none: nothing was found that is better than the rule"
-    say("loads held out", 0.8)
+        method = "none: no improvement over the rule was found"
+    progress("loads held out", 0.8)
     model = found.model(values)
-    results = tuple(_results(fitted, apart, found, values))
+    results = tuple(_results(fitted, tested, found, values))
     return Calibration(
         rule=springs,
         unknowns=found,
@@ -90,7 +99,7 @@ def calibrate(
         method=method,
         objectives=objectives,
         residuals={} if system is None else {name: system.residual(one) for name, one in starts.items()},
-        solves=objective.solves + len(fitted) + 2 * len(apart),
+        solves=objective.solves + len(fitted) + 2 * len(tested),
         warnings=tuple(_warnings(found, values, results)),
     )
 
@@ -100,9 +109,9 @@ def _several(cases: LoadCase | Sequence[LoadCase]) -> list[LoadCase]:
 
 
 def _results(
-    fitted: Sequence[LoadCase], apart: Sequence[LoadCase], unknowns: Unknowns, values: Floats
+    fitted: Sequence[LoadCase], tested: Sequence[LoadCase], unknowns: Unknowns, values: Floats
 ) -> Iterator[CaseResult]:
-    for held_out, cases in ((False, fitted), (True, apart)):
+    for held_out, cases in ((False, fitted), (True, tested)):
         for case in cases:
             before, after = (
                 _labelled(solve(case.problem, unknowns.potential(one), case.solver), label)
@@ -116,7 +125,7 @@ def _labelled(path: Solution, label: str) -> Solution:
 
 
 def _identified(objective: Objective, values: Floats, system: Equations | None) -> Identifiability:
-    """What the data determine: of what was minimised, of very many unknowns the equilibrium of full fields."""
+    """Return what the data determine: by the objective's Jacobian; of many unknowns, by equilibrium of full fields."""
     names, regularisation = objective.unknowns.names, objective.regularisation
     if len(names) <= GAUSS_NEWTON:
         derivative = objective.jacobian(values)[: -len(names)]
@@ -141,10 +150,10 @@ def _warnings(unknowns: Unknowns, values: Floats, results: Sequence[CaseResult])
         before, after = one.pair
         if one.held_out and before is not None and (after is None or after > before):
             yield (
-                f"{one.case.name}: calibration made it worse, from {error_words(one.both[0])} to "
-                f"{error_words(one.both[1])}: springs fitted to some loads are not better under all"
+                f"{one.case.name}: calibration increased the error from {error_words(one.both[0])} to "
+                f"{error_words(one.both[1])}: the springs do not fit this load better"
             )
     gone = [name for name, value in zip(unknowns.names, values, strict=True) if value < 1e-3]
     if gone:
         more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
-        yield f"the data left nothing of {', '.join(gone[:3])}{more}: these springs have no stiffness any more"
+        yield f"the fit set the stiffness of {', '.join(gone[:3])}{more} to zero"

@@ -1,4 +1,4 @@
-"""Load cases of a calibration: a problem, and what is known of how its body answers."""
+"""Load cases of a calibration: a problem with measured or computed displacements and forces."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,17 +23,17 @@ Rows = sparse.csr_array[Any, tuple[int, int]]
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What is known of an equilibrium at one level: `rows` times displacement, or times the reactions.
+    """Data of one load level: `rows` times the displacement, or times the reactions, should equal `data`.
 
     Attributes:
-        level: the load factor.
+        level: load factor.
         quantity: "displacement" [m], "force" [N] or "torque" [N m] of a support.
         rows: sparse, shape (m, n_dof).
         data: shape (m,).
-        scale: by which the objective divides errors: the norm of the like data at the last level that is known, so that
-            what is small at first counts little; of forces no less than the total load.
-        whole: whether the displacement of all nodes is known, of which equilibrium itself may be asked.
-        support: the number of the support whose force or torque it is.
+        scale: by which the objective divides errors: the norm of data of this quantity at the last known level, so that
+            small values at first levels have little weight; for forces at least the total load.
+        whole: whether the displacement of all nodes is known, so that equilibrium can be evaluated.
+        support: number of the support of a force or torque.
     """
 
     level: float
@@ -52,19 +52,19 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class LoadCase:
-    """A problem, and references that its springs are to follow.
+    """A problem, and the reference that its springs are fitted to.
 
     Attributes:
-        name: how tables call it.
-        problem: mesh, material, supports, loads; of all cases of a calibration the mesh is the same.
-        reference: a path solved on any mesh, or read from a file: of a body of cells full fields, else markers.
+        name: name in tables.
+        problem: mesh, material, supports, loads; all cases of a calibration have the same mesh.
+        reference: a path solved on any mesh or read from a file: a full field if it has elements, else markers.
         curve: a measured force-displacement curve.
-        solver: how equilibrium is found; the levels that are compared are among its load steps.
-        against: what the reference is, in words; by default its label.
-        own_error: how far the reference is itself off, relative, None where that is not known.
-        field: full displacement fields on the nodes of the problem, None where the reference holds none.
+        solver: solver of the equilibria; data are compared at its load steps.
+        against: the reference in words; by default its label.
+        own_error: relative error of the reference; None if unknown.
+        field: the reference as full field on the nodes of the problem; None if it is not one.
 
-    Raises ProblemError where nothing is known at any level of the solver.
+    Raises ProblemError if there are no data at any load step of the solver.
     """
 
     name: str
@@ -77,27 +77,25 @@ class LoadCase:
 
     def __post_init__(self) -> None:
         if not self.against:
-            known = "what was measured" if self.reference is None else self.reference.label
+            known = "the measured data" if self.reference is None else self.reference.label
             object.__setattr__(self, "against", known)
         if not self.solver.follows_load:
-            raise ProblemError(
-                f'{self.name}: springs are calibrated under load control, with Newton: take control = "load"'
-            )
+            raise ProblemError(f'{self.name}: calibration needs load control: set control = "load"')
         if not self.observations:
             steps = self.solver.load_steps
             raise ProblemError(
-                f"{self.name}: nothing is known at the load levels k/{steps} that are solved: give a reference with "
+                f"{self.name}: there are no data at the load levels k/{steps} of the solver: give a reference with "
                 "such levels, or a curve that reaches the first of them"
             )
 
     @cached_property
     def levels(self) -> Floats:
-        """The load factors that are solved, shape (n,)."""
+        """Load factors of the solver's steps, shape (n,)."""
         return np.arange(1, self.solver.load_steps + 1) / self.solver.load_steps
 
     @cached_property
     def field(self) -> "tuple[Solution, Ints] | None":
-        """The reference on the nodes of the problem, and the nodes that it covers; None where it is no full field."""
+        """The reference on the nodes of the problem, and the nodes that it covers (n,); None if not a full field."""
         if self.reference is None or not self.reference.states:
             return None
         if self.reference.problem.mesh.element == "line" or not self.reference.whole.fills:
@@ -107,7 +105,7 @@ class LoadCase:
 
     @cached_property
     def observations(self) -> tuple[Observation, ...]:
-        """All that is known, level by level."""
+        """All data, by load level."""
         known: list[Observation] = []
         for source in (self._of_field, self._of_markers, self._of_curve):
             found = [one for level in self.levels for one in source(level)]
@@ -119,12 +117,12 @@ class LoadCase:
 
     @property
     def _load(self) -> float:
-        """The total of the loads at full load [N]."""
+        """Norm of the total force at full load [N]."""
         return float(np.linalg.norm(self.problem.loading.force(self.problem.mesh.nodes).sum(axis=0)))
 
     @cached_property
     def free(self) -> Ints:
-        """The numbers of the directions that are free."""
+        """Numbers of the free degrees of freedom, shape (n_free,)."""
         return np.flatnonzero(~self.problem.loading.held.ravel())
 
     def _of_field(self, level: float) -> Iterator[Observation]:
@@ -135,17 +133,17 @@ class LoadCase:
         if state is None:
             return
         dim = self.problem.mesh.dim
-        told = nodes[~self.problem.loading.held[nodes].all(axis=1)]  # of others the displacement is prescribed
-        dofs = (told[:, None] * dim + np.arange(dim)).ravel()
+        free = nodes[~self.problem.loading.held[nodes].all(axis=1)]  # others have a prescribed displacement
+        dofs = (free[:, None] * dim + np.arange(dim)).ravel()
         if dofs.size:
             whole = len(nodes) == self.problem.mesh.n_nodes
             yield Observation(level, "displacement", self._picked(dofs), state.displacement.ravel()[dofs], whole)
         yield from self._of_supports(path.support_forces(state), state.positions, level)
 
     def _of_supports(self, forces: Sequence[SupportForce], positions: Floats, level: float) -> Iterator[Observation]:
-        """What moved supports take: forces, and torques where the support holds its nodes in all directions.
+        """Yield forces of moved supports, and torques of those that hold their nodes in all directions.
 
-        The arms of a torque are then prescribed; where nodes slide they change with what is sought.
+        The lever arms of such torques are prescribed; those of sliding nodes depend on the unknowns.
         """
         for one in forces:
             force, torque = resultant_rows(self.problem, one.support, positions, level)
@@ -167,15 +165,15 @@ class LoadCase:
 
     @cached_property
     def _marker_rows(self) -> tuple[Rows, Ints]:
-        """What interpolates the displacement at the markers within the body, and their numbers."""
+        """The interpolation from nodes to the markers in the body, and the numbers of those markers."""
         assert self.reference is not None
         mesh, points = self.problem.mesh, self.reference.whole.points
         if points.shape[1] < mesh.dim:
-            raise ProblemError(f"{self.name}: markers in a plane say nothing of a body in space")
+            raise ProblemError(f"{self.name}: markers have 2 coordinates, the body has 3")
         found = Grid(mesh.nodes, mesh.cells).locate(points[:, : mesh.dim])
         inside = np.flatnonzero(~found.outside)
         if not inside.size:
-            raise ProblemError(f"{self.name}: no marker lies within the body: are unit, axes and origin the same?")
+            raise ProblemError(f"{self.name}: no marker lies in the body: check unit, axes and origin")
         rows = sparse.csr_array(sparse.kron(found.weights[inside], sparse.eye_array(mesh.dim)))
         return rows, inside
 
@@ -187,7 +185,7 @@ class LoadCase:
             yield Observation(level, quantity, sparse.csr_array(whole[axes]), data)
 
     def _pull(self, level: float) -> Rows:
-        """What sums the reactions of the support that moves most, whose force a curve tells, shape (dim, n_dof)."""
+        """Return the rows that sum the reactions of the support that moves most, shape (dim, n_dof)."""
         support = leading_support(self.problem)
         assert support is not None  # a motion drives the body
         force, _ = resultant_rows(self.problem, support, self.problem.mesh.nodes, level)
@@ -203,7 +201,7 @@ class LoadCase:
 
 
 def require_one_body(cases: Iterable[tuple[str, Problem]], problem: Problem) -> None:
-    """Raise ProblemError where a case, by name and problem, has another body than the one that is calibrated."""
+    """Raise ProblemError if a case, given by name and problem, differs from the calibrated body."""
     for case, own in cases:
         what = next(
             (
@@ -220,8 +218,8 @@ def require_one_body(cases: Iterable[tuple[str, Problem]], problem: Problem) -> 
         )
         if what is not None:
             raise ProblemError(
-                f"{case}: its {what} is another than that of the body that is calibrated; load cases differ in "
-                "supports and loads only"
+                f"{case}: its {what} differs from that of the calibrated body: load cases may differ in supports and "
+                "loads only"
             )
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a calibration: stiffness beside the rule, errors before and after."""
+"""Figures of a calibration: stiffness relative to the rule, errors before and after."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, INK, POINT
 from truespring.report.words import draw_words, text_width
 
-# More unknowns than this are no rows of bars any more, but counted by size; more springs are not drawn.
+# Up to so many unknowns are drawn as bars, more as a histogram; lattices with more springs are not drawn.
 _MOST_BARS, _MOST_SPRINGS = 60, 4000
-# From a row of bars to the next, and the height of one [inch].
+# Distance of rows of bars, and height of a bar [inch].
 _ROW, _BAR = 0.2, 0.11
-# Factors up to which colours tell stiffness over the rule's apart: a third to threefold.
+# Range of the colours for stiffness over that of the rule: 1/3 to 3.
 _WIDEST = 3.0
 
 
 def calibration_figures(found: Fitted) -> Iterator[tuple[str, Sheet]]:
-    """Yield the pictures by the stem of a file name."""
+    """Yield the figures with the stem of their file names."""
     yield "errors", errors_figure(found)
     if len(found.unknowns) <= _MOST_BARS:
         yield "unknowns", unknowns_figure(found)
@@ -38,7 +38,7 @@ def calibration_figures(found: Fitted) -> Iterator[tuple[str, Sheet]]:
 
 
 def errors_figure(found: Fitted) -> Sheet:
-    """The error of each case at its last level, by the rule and calibrated."""
+    """Return the error of each case at its last level, by the rule and calibrated."""
     rows = [
         _Row(
             f"{one.case.name} ({'held out' if one.held_out else 'fitted'})",
@@ -51,17 +51,17 @@ def errors_figure(found: Fitted) -> Sheet:
 
 
 def unknowns_figure(found: Fitted) -> Sheet:
-    """What each unknown has become: 1 is the rule."""
+    """Return the value of each unknown; 1 is the rule."""
     rows = [
         _Row(name, [None, float(value)], ["", f"{value:.3g}"])
         for name, value in zip(found.unknowns.names, found.values, strict=True)
     ]
-    return _bars("What became of each unknown; the line is the rule", "stiffness over the rule's", rows, mark=1.0)
+    return _bars("Calibrated unknowns; the line is the rule", "stiffness over the rule's", rows, mark=1.0)
 
 
 @dataclass(frozen=True)
 class _Row:
-    """A row of bars: its name, one value in grey, one in blue, and what is written behind each."""
+    """A row of bars: its name, one value in grey, one in blue, and the text after each."""
 
     name: str
     values: Sequence[float | None]
@@ -69,7 +69,7 @@ class _Row:
 
 
 def _bars(title: str, label: str, rows: Sequence[_Row], mark: float | None = None) -> Sheet:
-    """Bars from zero on, row by row from the top."""
+    """Return bars from zero, row by row from the top."""
     known = [value for row in rows for value in row.values if value is not None]
     several = any(sum(value is not None for value in row.values) > 1 for row in rows)
     step = _ROW + _BAR if several else _ROW
@@ -101,7 +101,7 @@ _PAIR = (FAINT, BLUE)
 
 
 def _draw_axis(area: Area, label: str) -> None:
-    """Draw the axis below, with its numbers: rows have names, not numbers."""
+    """Draw the x axis with its numbers."""
     sheet, bottom = area.sheet, area.bottom
     values = round_numbers(*area.x)
     places = area.place(np.stack([values, np.zeros(len(values))], axis=1))[:, 0]
@@ -127,9 +127,9 @@ def draw_shape(area: Area, corners: Floats, color: str) -> None:
 
 
 def counted_figure(found: Fitted) -> Sheet:
-    """How many unknowns became so large, of very many."""
+    """Return a histogram of the unknowns."""
     counts, edges = np.histogram(found.values, bins=40, range=(0.0, max(1.2, float(found.values.max()))))
-    title = f"What became of {len(found.values):,} unknowns; the line is the rule"
+    title = f"{len(found.values):,} calibrated unknowns; the line is the rule"
     sheet = Sheet(5.9, 3.2, title)
     area = Area(sheet, 0.7, 0.5, 5.0, 2.3, (0.0, float(edges[-1])), (0.0, 1.05 * float(counts.max())))
     draw_frame(area, "stiffness over the rule's", "unknowns")
@@ -141,7 +141,7 @@ def counted_figure(found: Fitted) -> Sheet:
 
 
 def lattice_figure(found: Fitted) -> Sheet:
-    """The springs of a plane body, coloured by their stiffness over that of the rule."""
+    """Return the springs of a plane body, coloured by their stiffness over that of the rule."""
     unknowns = found.unknowns
     rule, now = unknowns.stiffness @ unknowns.start, unknowns.stiffness @ found.values
     ratio = np.divide(now, rule, out=np.ones_like(rule), where=np.abs(rule) > 0)
@@ -174,7 +174,7 @@ _SHADES = 33
 
 
 def _diverging(shares: Floats) -> list[str]:
-    """Colours of shares 0 to 1, dark at both ends, grey in the middle: softer in orange, stiffer in blue."""
+    """Return the colours of shares 0 to 1: orange for softer, grey in the middle, blue for stiffer."""
     from matplotlib.colors import LinearSegmentedColormap, to_hex
 
     scale = LinearSegmentedColormap.from_list("stiffness", ["#a33f00", "#f0a35e", "#c9ced3", "#62a8dc", "#00476f"])
@@ -186,7 +186,7 @@ def _rgb(color: str) -> Floats:
 
 
 def case_figure(one: CaseResult) -> Sheet:
-    """The error of a case by load level, by the rule and calibrated."""
+    """Return the error of a case by load level, by the rule and calibrated."""
     curves = []
     for path, label, color, dashes, marker in (
         (one.before, "by the rule", "#5b6168", "--", "s"),

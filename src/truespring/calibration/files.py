@@ -20,7 +20,7 @@ def write_fitted(
     folder: Path,
     values: Mapping[str, Any],
     words: tuple[str, str],
-    beside: Sequence[str],
+    more: Sequence[str],
     command: str | None,
 ) -> tuple[Path, ...]:
     """Write springs, values, figures and page into a folder; return the files, the page last.
@@ -29,8 +29,8 @@ def write_fitted(
         found: the calibration.
         folder: an existing folder.
         values: those of calibrate.json.
-        words: the title of the page, and what was fitted to what.
-        beside: names of further files that the page lists.
+        words: the title of the page, and a sentence on what was fitted to what.
+        more: names of further files that the page lists.
         command: the command line that repeats the run.
     """
     tables = write_spring_files(found.model, folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv")
@@ -38,6 +38,6 @@ def write_fitted(
     file.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     drawn = drawings(calibration_figures(found))
     save_drawings({f"calibration_{name}": drawing for name, drawing in drawn.items()}, folder / "figures")
-    names = [*beside, *(table.name for table in tables), file.name]
+    names = [*more, *(table.name for table in tables), file.name]
     page.write_text(render_calibration(*words, found, drawn, names, command), encoding="utf-8")
     return *tables, file, page

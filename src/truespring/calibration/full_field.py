@@ -1,4 +1,4 @@
-"""Springs from full displacement fields: equilibrium is linear in the stiffness, even at large deformation."""
+"""Fit springs to full displacement fields: equilibrium is linear in the stiffness, even at large deformation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from truespring.calibration.cases import LoadCase
 from truespring.calibration.unknowns import Unknowns
 from truespring.equilibrium import State
 
-# Up to so many numbers the equations are solved dense, by an active set, which is exact.
+# Up to so many matrix entries the equations are solved dense by an active set method, which is exact.
 _DENSE = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equilibrium at known displacements, A c = b, rows over the forces of their level.
+    """Equilibrium at known displacements, A c = b, each row over the forces of its level.
 
     Attributes:
         matrix: sparse, shape (n_rows, n_unknowns).
@@ -30,19 +30,18 @@ class Equations:
 
     @property
     def size(self) -> float:
-        """The norm of the right side; without one, as where nothing but an unknown force drives the body, 1."""
+        """The norm of the right side; 1 if it is zero, as when only an unknown force acts."""
         return float(np.linalg.norm(self.right)) or 1.0
 
     def residual(self, values: Floats) -> float:
-        """Return the unbalanced force over the forces themselves [-]."""
+        """Return the norm of the unbalanced force over `size` [-]."""
         return float(np.linalg.norm(self.matrix @ values - self.right)) / self.size
 
 
 def equations(unknowns: Unknowns, cases: Sequence[LoadCase]) -> Equations | None:
-    """Return the equilibrium of all full fields of the cases; None where there is no full field.
+    """Return the equilibrium equations of all full fields of the cases; None without full fields.
 
-    The force that acts on the free directions is told by the loads; where supports move, that which moves them is one
-    equation a direction.
+    There is one equation for each free degree of freedom, and one for each component of a moved support's force.
     """
     found = [part for case in cases for part in _of_case(unknowns, case)]
     if not found:
@@ -54,7 +53,7 @@ def _of_case(unknowns: Unknowns, case: LoadCase) -> list[tuple[Any, Floats]]:
     found = []
     whole = {one.level for one in case.observations if one.whole}
     for level in sorted(whole):
-        assert case.field is not None  # an observation of it is there
+        assert case.field is not None  # its observations exist
         state = case.field[0].at(level)
         assert state is not None
         found.append(_at_level(unknowns, case, state, level))
@@ -77,7 +76,7 @@ def _at_level(unknowns: Unknowns, case: LoadCase, state: State, level: float) ->
 def fit_full_field(system: Equations, regularisation: float) -> Floats:
     """Return the unknowns c >= 0 that minimise |A c - b|^2 / |b|^2 + regularisation^2 |c - 1|^2 / n, shape (n,).
 
-    Non-negative least squares (Lawson and Hanson 1974) with Tikhonov's term toward the rule.
+    Non-negative least squares (Lawson and Hanson 1974) with Tikhonov regularisation toward the rule.
     """
     from scipy.optimize import lsq_linear, nnls
 

@@ -1,4 +1,4 @@
-"""Which unknowns data determine: rank and singular values of how the data answer to them."""
+"""Identifiability of unknowns: rank and singular values of the derivative of the data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,27 +7,28 @@ import numpy as np
 
 from truespring.arrays import Floats
 
-# Singular values below this share of the largest are zero: equilibria are found to about so much.
+# Singular values below this share of the largest are zero; equilibria are about as accurate.
 _ZERO = 1e-9
-# An unknown of which more than this share lies among what no datum sees is not determined.
+# An unknown with a larger share than this in the null space is not determined.
 _LOOSE = 1e-6
-# Of more unknowns than this the singular values are not computed.
+# For more unknowns than this singular values are not computed.
 _MOST = 3000
-# So many unknowns are named.
+# Number of unknowns that the sentence names.
 _NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """What data tell of unknowns, to first order.
+    """Which unknowns the data determine, to first order.
 
     Attributes:
         names: of the unknowns.
-        rank: the number of their combinations that the data determine; None where they are too many to look at.
-        singular_values: of the relative data's derivative by the unknowns, descending; rounding counts as zero.
-        undetermined: share of each unknown that lies among combinations which no datum sees, shape (n,).
-        resolution: share of each unknown that the data tell, and not the regularisation toward the rule, shape (n,).
-        of: whose derivative it is.
+        rank: number of combinations of unknowns that the data determine; None if there are too many unknowns.
+        singular_values: of the derivative of the relative data by the unknowns, descending, shape (n,); rounding
+            errors are zero.
+        undetermined: share of each unknown in the null space of the data, shape (n,).
+        resolution: share of each unknown that is determined by the data, not by the regularisation, shape (n,).
+        of: the data of the derivative in words.
     """
 
     names: tuple[str, ...]
@@ -44,7 +45,7 @@ class Identifiability:
 
     @property
     def determined(self) -> bool | None:
-        """Whether the data alone determine all unknowns; None where that is not known."""
+        """Whether the data alone determine all unknowns; None if unknown."""
         return None if self.rank is None else self.rank == self.n_unknowns
 
     @property
@@ -54,28 +55,28 @@ class Identifiability:
 
     @property
     def weak(self) -> tuple[str, ...]:
-        """The unknowns that the regularisation tells more of than the data."""
+        """The unknowns that the regularisation determines more than the data."""
         return tuple(name for name, share in zip(self.names, self.resolution, strict=True) if share < 0.5)
 
     @property
     def sentence(self) -> str:
-        """What is determined, in a sentence or two."""
+        """The result in one or two sentences."""
         n = self.n_unknowns
         if self.rank is None:
-            return f"Whether the data determine the {n} unknowns was not looked at: they are more than {_MOST}."
+            return f"Whether the data determine the {n} unknowns was not computed: there are more than {_MOST}."
         if self.rank == n:
             condition = self.singular_values[0] / self.singular_values[-1]
             text = f"The data determine all {n} unknowns (rank {n} of {n}, condition {condition:.1e})."
         else:
             text = (
-                f"The data do not determine the unknowns: rank {self.rank} of {n}; {len(self.loose)} unknowns are not "
-                f"determined by themselves ({_some(self.loose)}). The regularisation toward the rule chooses among the "
-                "rest; more load cases, or fewer unknowns, would tell."
+                f"The data do not determine all unknowns: rank {self.rank} of {n}; {len(self.loose)} unknowns are not "
+                f"determined individually ({_some(self.loose)}). The regularisation toward the rule fixes the rest; "
+                "use more load cases or fewer unknowns."
             )
         weak = len(self.weak)
         if weak and self.rank == n:
             few = f"{weak} of them {'is' if weak == 1 else 'are'}"
-            text += f" But {few} held by the regularisation more than by the data: {_some(self.weak)}."
+            text += f" But {few} determined more by the regularisation than by the data: {_some(self.weak)}."
         return text
 
 
@@ -84,10 +85,10 @@ def _some(names: Sequence[str]) -> str:
 
 
 def identifiability(matrix: Floats, names: Sequence[str], regularisation: float, of: str) -> Identifiability:
-    """Return what data whose relative derivative by the unknowns is `matrix`, shape (n_data, n), tell of them.
+    """Return the identifiability of unknowns from the derivative `matrix` of relative data, shape (n_data, n).
 
-    The resolution is the diagonal of V s^2 / (s^2 + regularisation^2 / n) V^T (Backus and Gilbert; Menke, Geophysical
-    Data Analysis), of the singular values s.
+    The resolution is the diagonal of V s^2 / (s^2 + regularisation^2 / n) V^T with the singular values s (Backus and
+    Gilbert; Menke, Geophysical Data Analysis).
     """
     n = len(names)
     if n > _MOST:
@@ -96,8 +97,8 @@ def identifiability(matrix: Floats, names: Sequence[str], regularisation: float,
     values, right = np.linalg.svd(reduced, full_matrices=False)[1:]
     there = values > _ZERO * values.max(initial=0.0)
     seen = right[there] ** 2
-    told = values[there] ** 2
-    share = told / (told + regularisation**2 / n)
+    squared = values[there] ** 2
+    share = squared / (squared + regularisation**2 / n)
     padded = np.zeros(n)
     padded[: len(values)] = np.where(there, values, 0.0)
     undetermined = np.clip(1 - seen.sum(axis=0), 0.0, 1.0)

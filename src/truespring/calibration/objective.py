@@ -1,4 +1,4 @@
-"""How far springs are from what is known, and how that changes with the unknowns: by equilibria that are solved."""
+"""The objective of a calibration, from solved equilibria, with its gradient and Jacobian."""
 
 import math
 from collections.abc import Container, Sequence
@@ -18,8 +18,8 @@ from truespring.linear.gradients import IndefiniteError, SlowError
 from truespring.solvers import Newton
 from truespring.solvers.balance import Balance
 
-# Relative residual of the linear systems behind a gradient. Iterative solvers hold their matrix in single precision: so
-# much is asked of them at a time, so often at most.
+# Relative residual of the linear systems of a gradient. Iterative solvers hold their matrix in single precision:
+# tolerance of each of their solves, and largest number of solves.
 _ACCURACY, _AT_A_TIME, _MOST_TIMES = 1e-8, 1e-3, 12
 
 
@@ -35,9 +35,9 @@ class _Seen(NamedTuple):
 class Objective:
     """J(c) = 1/2 mean of the squared relative errors + regularisation^2 / 2 mean of (c - 1)^2.
 
-    The mean is over all observations of all cases, each error |B x(c) - y|, x(c) the equilibrium at its level,
-    over the size of what is known of that kind at the case's last level. Where a path ends early, or is unstable or
-    inverted but for the cases by name that are `excused`, J is infinite.
+    The mean is over all observations of all cases; each error is |B x(c) - y| over the scale of its observation, with
+    the equilibrium x(c) at its level. J is infinite if a path ends early, or is unstable or inverted, unless `excused`
+    contains the name of its case.
     """
 
     unknowns: Unknowns
@@ -49,11 +49,11 @@ class Objective:
 
     @property
     def _weights(self) -> float:
-        """What each relative error is multiplied by, so that their squares sum to the mean."""
+        """Factor of each relative error, so that the squares sum to their mean."""
         return 1 / math.sqrt(sum(len(case.observations) for case in self.cases))
 
     def paths(self, values: Floats) -> list[Solution] | None:
-        """Return the springs' path of each case; None where one does not reach full load."""
+        """Return the springs' path of each case; None if one does not reach full load."""
         if self._last is None or not np.array_equal(self._last[0], values):
             self._last = np.array(values), self._solved(values)
         return self._last[1]
@@ -84,7 +84,7 @@ class Objective:
         return found
 
     def residuals(self, values: Floats) -> Floats:
-        """Return what J is half the square of, shape (n_data + n,); infinite where there is no equilibrium."""
+        """Return the residuals whose squared norm is 2 J, shape (n_data + n,); infinite without an equilibrium."""
         seen = self._seen(values)
         pull = self.regularisation * (values - 1) / np.sqrt(len(values))
         if seen is None:
@@ -94,20 +94,20 @@ class Objective:
         return np.concatenate([*parts, pull])
 
     def value(self, values: Floats) -> float:
-        """Return J; infinite where there is no equilibrium."""
+        """Return J; infinite without an equilibrium."""
         residuals = self.residuals(values)
         return float(residuals @ residuals / 2) if np.isfinite(residuals).all() else np.inf
 
     def gradient(self, values: Floats) -> Floats:
-        """Return dJ/dc by the adjoint, one linear system a level whatever the number of unknowns, shape (n,).
+        """Return dJ/dc by the adjoint method, with one linear system per level, shape (n,).
 
         With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
         K lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends on
-        c by itself too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
+        c directly too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
         """
         seen = self._seen(values)
         if seen is None:
-            raise ModelError("there is no equilibrium at these unknowns, and no gradient")
+            raise ModelError("there is no equilibrium at these unknowns, so no gradient")
         total = self.regularisation**2 * (values - 1) / len(values)
         for group in _by_state(seen):
             tangent = _At(self, group[0])
@@ -125,10 +125,10 @@ class Objective:
         return total
 
     def jacobian(self, values: Floats) -> Floats:
-        """Return the derivative of `residuals`, one linear system an unknown and level, shape (n_data + n, n)."""
+        """Return the derivative of `residuals`, with one linear system per unknown and level, shape (n_data + n, n)."""
         seen = self._seen(values)
         if seen is None:
-            raise ModelError("there is no equilibrium at these unknowns, and no derivative")
+            raise ModelError("there is no equilibrium at these unknowns, so no derivative")
         blocks: dict[int, Floats] = {}
         for group in _by_state(seen):
             tangent = _At(self, group[0])
@@ -145,13 +145,13 @@ class Objective:
 
 
 def _misfit(one: _Seen) -> Floats:
-    """What is found less what is known, shape (m,)."""
-    told = one.state.displacement if one.observation.quantity == "displacement" else one.state.reaction
-    return np.asarray(one.observation.rows @ told.ravel() - one.observation.data)
+    """Return computed minus observed data, shape (m,)."""
+    field = one.state.displacement if one.observation.quantity == "displacement" else one.state.reaction
+    return np.asarray(one.observation.rows @ field.ravel() - one.observation.data)
 
 
 def _by_state(seen: Sequence[_Seen]) -> list[list[_Seen]]:
-    """Observations of one equilibrium together."""
+    """Return observations grouped by equilibrium."""
     groups: dict[tuple[int, float], list[_Seen]] = {}
     for one in seen:
         groups.setdefault((one.case, one.observation.level), []).append(one)
@@ -159,7 +159,7 @@ def _by_state(seen: Sequence[_Seen]) -> list[list[_Seen]]:
 
 
 class _At:
-    """The tangent at an equilibrium, loads that follow the body included, and the force by each unknown."""
+    """The tangent at an equilibrium, with that of following loads, and the derivative of the force by each unknown."""
 
     def __init__(self, objective: Objective, one: _Seen) -> None:
         case, state = objective.cases[one.case], one.state
@@ -177,7 +177,7 @@ class _At:
             self._ready: Tangent = balance.ready(self._matrix, positions)
         except SingularMatrixError:
             raise ModelError(
-                f"{case.name}: at load factor {state.load_factor:g} the tangent is singular: there is no gradient"
+                f"{case.name}: at load factor {state.load_factor:g} the tangent is singular, so there is no gradient"
             ) from None
         self.forces = objective.unknowns.forces(positions)
 
@@ -189,26 +189,26 @@ class _At:
         """Return the displacement of the free directions under forces [m], shape (n_nodes, dim)."""
         if self._ready.lasting:
             return self._ready.solve(right)
-        wanted = np.where(self._free, right, 0.0)
-        left, found = wanted, np.zeros(self.shape)
+        target = np.where(self._free, right, 0.0)
+        left, found = target, np.zeros(self.shape)
         for _ in range(_MOST_TIMES):
-            if np.linalg.norm(left) <= _ACCURACY * np.linalg.norm(wanted):
+            if np.linalg.norm(left) <= _ACCURACY * np.linalg.norm(target):
                 return found
             try:
                 found = found + self._ready.solve(left, _AT_A_TIME)
             except (SlowError, IndefiniteError):
                 break
-            left = np.where(self._free, wanted - self.apply(found), 0.0)
-        if self._balance.go_direct("an accurate gradient was wanted"):
+            left = np.where(self._free, target - self.apply(found), 0.0)
+        if self._balance.go_direct("an accurate gradient needs a direct solver"):
             self._ready = self._balance.ready(self._matrix, self._positions)
             return self._ready.solve(right)
         return found
 
 
 def relative_errors(case: LoadCase, path: Solution, quantity: str = "displacement") -> dict[float, float]:
-    """Return, by load factor, the relative error of a path: distance over size of what is known there.
+    """Return the relative error of a path by load factor: norm of the misfit over the norm of the data.
 
-    Of displacements that is what a comparison calls the rms error, of forces and torques the largest of all supports.
+    For displacements it is the rms error of a comparison, for forces and torques the largest of all supports.
     """
     found: dict[float, float] = {}
     for one in case.observations:

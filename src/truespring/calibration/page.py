@@ -1,4 +1,4 @@
-"""What a calibration tells: a table for a terminal, values for JSON, and a page that loads nothing from anywhere."""
+"""A calibration as a table for a terminal, as JSON values, and as a page."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -15,14 +15,14 @@ from truespring.report.shell import picture, render
 if TYPE_CHECKING:
     from rich.table import Table
 
-# More unknowns than this are not listed one by one.
+# More unknowns than this are not listed.
 _MOST = 2000
-# So many singular values are shown on a page.
+# Number of singular values on a page.
 _SHOWN = 40
 
 
 def calibration_table(title: str, found: Fitted) -> "Table":
-    """Return the error of each load case at its last level, by the rule and calibrated."""
+    """Return a table of the error of each load case at its last level, by the rule and calibrated."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left")
@@ -60,8 +60,8 @@ def _percent(share: float | None) -> str:
 
 
 def calibration_values(found: Fitted) -> dict[str, Any]:
-    """Return a calibration as values that JSON can hold."""
-    told = found.identifiability
+    """Return a calibration as JSON values."""
+    identified = found.identifiability
     each = len(found.unknowns) <= _MOST
     return {
         "headline": found.headline,
@@ -78,20 +78,20 @@ def calibration_values(found: Fitted) -> dict[str, Any]:
         "values": [
             {"name": name, "value": float(value), "undetermined": float(loose), "resolution": float(share)}
             for name, value, loose, share in zip(
-                found.unknowns.names, found.values, told.undetermined, told.resolution, strict=True
+                found.unknowns.names, found.values, identified.undetermined, identified.resolution, strict=True
             )
         ]
         if each
         else None,
         "identifiability": {
-            "rank": told.rank,
-            "n_unknowns": told.n_unknowns,
-            "determined": told.determined,
-            "singular_values": told.singular_values.tolist(),
-            "not_determined": list(told.loose),
-            "held_by_regularisation": list(told.weak),
-            "of": told.of,
-            "sentence": told.sentence,
+            "rank": identified.rank,
+            "n_unknowns": identified.n_unknowns,
+            "determined": identified.determined,
+            "singular_values": identified.singular_values.tolist(),
+            "not_determined": list(identified.loose),
+            "held_by_regularisation": list(identified.weak),
+            "of": identified.of,
+            "sentence": identified.sentence,
         },
         "warnings": list(found.warnings),
     }
@@ -135,14 +135,14 @@ def render_calibration(
 
     Args:
         title: of the study.
-        what: what was fitted to what, in a sentence.
+        what: a sentence on what was fitted to what.
         found: the calibration.
         drawings: its pictures.
-        names: of the files beside the page.
-        command: what does it again.
+        names: of the files in the folder of the page.
+        command: the command line that repeats the run.
     """
-    told = found.identifiability
-    shown = [f"{value:.2e}" for value in told.singular_values[:_SHOWN]]
+    identified = found.identifiability
+    shown = [f"{value:.2e}" for value in identified.singular_values[:_SHOWN]]
     return render(
         "calibration/page.html.j2",
         command,
@@ -150,36 +150,36 @@ def render_calibration(
         what=what,
         headline=found.headline,
         fitted=fitted_sentence(found),
-        identifiability=told.sentence,
+        identifiability=identified.sentence,
         trouble=not found.held_out or found.error is None,
         warnings=found.warnings,
         errors=[picture(drawing) for name, drawing in drawings.items() if name not in ("unknowns", "lattice")],
         unknowns=[picture(drawing) for name, drawing in drawings.items() if name in ("unknowns", "lattice")],
         rows=_rows(found),
         method=_method(found),
-        of=told.of,
-        singular_values=", ".join(shown) + (", …" if len(told.singular_values) > _SHOWN else ""),
+        of=identified.of,
+        singular_values=", ".join(shown) + (", …" if len(identified.singular_values) > _SHOWN else ""),
         steps=[
             (name, f"{value:.3e}", f"{found.residuals[name]:.3e}" if name in found.residuals else "–")
             for name, value in found.objectives.items()
         ],
-        files=f"Beside this page: {', '.join(names)}.",
+        files=f"Files in this folder: {', '.join(names)}.",
     )
 
 
 def fitted_sentence(found: Fitted) -> str:
-    """Return how well the springs follow what they were fitted to."""
-    told = [
+    """Return the errors on the fitted loads, before and after, in a sentence."""
+    errors = [
         f"{one.case.name} from {_percent(one.pair[0])} to {_percent(one.pair[1])}"
         for one in found.cases
         if not one.held_out
     ]
-    return f"The error on the loads that they were fitted to went in {'; '.join(told)}."
+    return f"Error on the fitted loads: {'; '.join(errors)}."
 
 
 def _method(found: Fitted) -> str:
     return (
-        f"{len(found.unknowns)} unknowns ({found.unknowns.kind}), each a factor on what {found.rule.label} gives, none "
-        f"below zero. Found by {found.method}, {found.solves} paths solved; regularisation {found.regularisation:g} "
-        "toward the rule."
+        f"{len(found.unknowns)} unknowns ({found.unknowns.kind}), each a non-negative factor on the stiffness of "
+        f"{found.rule.label}. Method: {found.method}; {found.solves} paths solved; regularisation "
+        f"{found.regularisation:g} toward the rule."
     )

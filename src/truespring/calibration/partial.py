@@ -1,4 +1,4 @@
-"""Springs from what is known of their displacements and forces, full fields or not: by the equilibria themselves."""
+"""Fit springs to displacements and forces, full fields or not, through their equilibria."""
 
 from typing import NamedTuple
 
@@ -7,16 +7,16 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.calibration.objective import Objective
 
-#: Up to so many unknowns their sensitivities are found one by one, for Gauss and Newton's method.
+#: Largest number of unknowns for the Gauss-Newton method, which computes the sensitivity to each.
 GAUSS_NEWTON = 300
 
-# Steps of the unknowns below this share end the search, and gains of the objective below that one: so small a gain
-# changes an error of 1 % by a two-thousandth of itself.
+# Relative changes of unknowns and of the objective at which the search ends; the latter changes an error of 1 % by
+# 1/2000 of it.
 _SETTLED, _GAIN = 1e-3, 1e-3
 
 
 class Fit(NamedTuple):
-    """Unknowns that were found, the objective there, and how."""
+    """Fitted unknowns, shape (n,), the objective there, and the method."""
 
     values: Floats
     objective: float
@@ -24,10 +24,10 @@ class Fit(NamedTuple):
 
 
 def fit_equilibria(objective: Objective, start: Floats, evaluations: int) -> Fit:
-    """Minimise the objective over unknowns c >= 0 from `start`, with so many evaluations at most.
+    """Minimise the objective over unknowns c >= 0 from `start`, shape (n,), with at most `evaluations` evaluations.
 
-    Few unknowns by Gauss and Newton's method in a trust region (Branch, Coleman, Li 1999), many by L-BFGS-B (Byrd et
-    al. 1995) with the adjoint gradient. Where no equilibrium is found a step is taken back.
+    Few unknowns are fitted by Gauss-Newton in a trust region (Branch, Coleman, Li 1999), many by L-BFGS-B (Byrd et al.
+    1995) with the adjoint gradient. A step without an equilibrium is reduced.
     """
     from scipy.optimize import Bounds, least_squares, minimize
 

@@ -1,4 +1,4 @@
-"""The result of `calibrate`: springs with their errors, table and figures, which can be written."""
+"""The result of `calibrate`: springs and their errors, as table, figures and files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,13 +28,13 @@ class Calibration(Fitted):
         return table_of(self.rows)
 
     def figures(self) -> Figures:
-        """Return the figures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
+        """Return the figures by the stem of their files; `png()` and `svg()` return the bytes of a file."""
         return sheets((f"calibration_{name}", sheet) for name, sheet in calibration_figures(self))
 
     def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
-        """Write calibrate.json, calibrated.csv, figures and report.html into out; return where each is.
+        """Write calibrate.json, calibrated.csv, figures and report.html into `out`; return the paths by file name.
 
-        `command` is the command line that repeats the run, named in the report.
+        `command` is the command line that repeats the run, for the report.
         """
         what = f"{self.rule.label} with {len(self.unknowns)} unknowns by {self.unknowns.kind}."
         with Output(Path(out), "calibrate.json") as output:

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
+from truespring.calibration.calibrated import Calibrated
 from truespring.calibration.calibration import REGULARISATION, Progress, calibrate
 from truespring.calibration.cases import LoadCase, require_one_body
 from truespring.calibration.curve import read_curve
-from truespring.calibration.result import Calibration
 from truespring.calibration.turned import turned
 from truespring.calibration.unknowns import make_unknowns
 from truespring.comparison import most_moved
@@ -23,23 +22,6 @@ from truespring.study.read import Study
 from truespring.study.run import follow
 
 
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """A study whose springs were calibrated.
-
-    Attributes:
-        study: whose springs and mesh these are.
-        springs: the name of the springs in it.
-        reference: the name of the model, or the names of the files, that the springs were fitted to.
-        calibration: what was found.
-    """
-
-    study: Study
-    springs: str
-    reference: str
-    calibration: Calibration
-
-
 def calibrate_study(
     study: Study,
     cases: Sequence[Study] = (),
@@ -51,12 +33,22 @@ def calibrate_study(
     regularisation: float = REGULARISATION,
     progress: Progress | None = None,
 ) -> Calibrated:
-    """Fit the springs of a study to a reference under its own load and those of further cases, on one mesh.
+    """Fit the springs of a study to a reference under its load and those of further cases, on one mesh.
 
-    `to` names the model of the references, by default one of neo-Hookean finite elements, else the first of another
-    law that is not linear, else the first. With `markers` or `curve`, files of what was measured under the study's own
-    load, these are its reference. Where nothing is `held_out` the study's own load is, turned by 45 degrees, if its
-    reference can be solved. Raises StudyError, with the file, where studies do not go together.
+    Args:
+        study: study with the springs.
+        cases: studies whose loads are fitted too.
+        held_out: studies whose loads are used for testing; by default the load of the study rotated by 45 degrees, if
+            its reference converges.
+        unknowns: a key of UNKNOWNS.
+        to: name of the reference in the studies; by default neo-Hookean FEM, else FEM with another nonlinear law, else
+            the first model that is not springs.
+        markers: file of markers measured under the study's load, used as reference.
+        curve: file of a force-displacement curve measured under the study's load, used as reference.
+        regularisation: weight of the term toward the rule.
+        progress: called with the current step and the share of the work done.
+
+    Raises StudyError, with the file, if the studies do not fit together.
     """
     name = springs_of(study)
     model = springs_by_rule(study.entries)[name]
@@ -66,7 +58,7 @@ def calibrate_study(
         with _naming(study):
             require_one_body([(str(one.file), one.problem)], study.problem)
     with _naming(study):
-        make_unknowns(study.problem, model, unknowns)  # what does not fit is said before anything is solved
+        make_unknowns(study.problem, model, unknowns)  # raises errors before anything is solved
     measured = markers is not None or curve is not None
     names = [_reference(one, to) for one in (*([] if measured else [study]), *cases, *held_out)]
     own = [*([] if measured else [study]), *cases, *held_out]
@@ -77,43 +69,43 @@ def calibrate_study(
         found[one.file] = _case(one, reference)
     fitted = [_measured(study, name, markers, curve)] if measured else [found[study.file]]
     fitted += [found[one.file] for one in cases]
-    apart = [found[one.file] for one in held_out]
+    tested = [found[one.file] for one in held_out]
     if not held_out and not measured:
-        apart = list(_turned(study, names[0]))
+        tested = list(_turned(study, names[0]))
 
-    def say(text: str, share: float) -> None:
+    def second_half(text: str, share: float) -> None:
         if progress:
             progress(text, 0.5 + 0.5 * share)
 
     with _naming(study):
-        calibration = calibrate(fitted, model, unknowns, apart, regularisation, progress=say)
+        calibration = calibrate(fitted, model, unknowns, tested, regularisation, progress=second_half)
     files = [str(file) for file in (markers, curve) if file is not None]
     return Calibrated(study, name, ", ".join(files) or names[0], calibration)
 
 
 def springs_of(study: Study) -> str:
-    """Return the name of the springs to calibrate: the compared model where it is springs of a rule, else the first.
+    """Return the name of the springs to calibrate: the compared model if it is springs of a rule, else the first.
 
-    Springs that answer to each other's lengths are passed over where there are others.
+    Coupled springs are chosen only if there are no others.
     """
     by_rule = springs_by_rule(study.entries)
     springs = [name for name, entry in by_rule.items() if not entry.coupled] or list(by_rule)
     if not springs:
         raise StudyError(
-            f"{study.file}: there are no springs of a rule or of numbers to start from among "
-            f"{', '.join(study.entries)}: add some to [models]"
+            f"{study.file}: models: none of {', '.join(study.entries)} is springs of a rule or of given stiffness: "
+            "add one"
         )
     return study.model if study.model in springs else springs[0]
 
 
 def _reference(study: Study, to: str | None) -> str:
-    """The name of the model that the springs of a study are to follow."""
+    """Return the name of the model that the springs of a study are fitted to."""
     known = [name for name in study.entries if name not in springs_by_rule(study.entries)]
     if to is not None and to not in known:
-        there = f"there are {', '.join(known)}" if known else "there is none beside the springs"
-        raise StudyError(f"{study.file}: --to {to}: no such reference{nearest(to, known)}: {there}")
+        there = f"allowed: {', '.join(known)}" if known else "the study has springs only: add a model of kind fem"
+        raise StudyError(f"{study.file}: --to {to}: no such reference{nearest(to, known)}; {there}")
     if not known:
-        raise StudyError(f"{study.file}: there is no reference beside the springs: add a model of kind fem")
+        raise StudyError(f"{study.file}: models: there is no reference for the springs: add a model of kind fem")
     if to is not None:
         return to
     fem = {name: entry for name, entry in study.entries.items() if entry.chosen_element(study.problem)}
@@ -123,17 +115,17 @@ def _reference(study: Study, to: str | None) -> str:
 
 
 def _case(study: Study, reference: str) -> LoadCase:
-    path, told = _reference_path(study, study.problem, reference)
-    _refuse_short(study, reference, path)
+    path, described = _reference_path(study, study.problem, reference)
+    _require_complete(study, reference, path)
     with _naming(study):
-        return LoadCase(study.stem, study.problem, path, None, study.solver, *told)
+        return LoadCase(study.stem, study.problem, path, None, study.solver, *described)
 
 
 def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Solution, tuple[str, float | None]]:
-    """The path that springs are to follow; what it is in words, and how far it is itself off.
+    """Return the reference path, its description and its own error.
 
-    Finite elements whose kind the study leaves open are of second order on the nodes of the springs: those of first
-    order, on a mesh that springs are made for, are often further off than springs fitted to them would be.
+    If the study does not set the kind of finite elements, they are of second order on the nodes of the springs: on
+    meshes for springs, first-order elements often have larger errors than springs fitted to them.
     """
     entry = study.entries[reference]
     better = in_second_order(problem, entry)
@@ -148,46 +140,46 @@ def _reference_path(study: Study, problem: Problem, reference: str) -> tuple[Sol
 
 
 def _measured(study: Study, springs: str, markers: Path | None, curve: Path | None) -> LoadCase:
-    """The study's own load with what was measured under it."""
+    """Return the load of the study with data measured under it."""
     seen = None if markers is None else read_result(markers)
-    told = None
+    measured = None
     if curve is not None:
         probe = study.probe
         if probe is None:
             probe = most_moved(solve(study.problem, study.entries[springs], study.solver))
-        told = read_curve(curve, study.problem, probe)
+        measured = read_curve(curve, study.problem, probe)
     with _naming(study):
-        return LoadCase(study.stem, study.problem, seen, told, study.solver)
+        return LoadCase(study.stem, study.problem, seen, measured, study.solver)
 
 
 def _turned(study: Study, reference: str) -> Iterator[LoadCase]:
-    """The study's load turned by 45 degrees, if it can be and its reference then converges."""
+    """Yield the load of the study rotated by 45 degrees, if that is possible and its reference converges."""
     entry = study.entries[reference]
     problem = turned(study.problem, math.pi / 4)
     if problem is None or not entry.chosen_element(problem):
         return
-    path, told = _reference_path(study, problem, reference)
+    path, described = _reference_path(study, problem, reference)
     if path.complete:
         name = f"{study.stem}, its load turned by 45 degrees"
-        yield LoadCase(name, problem, path, None, study.solver, *told)
+        yield LoadCase(name, problem, path, None, study.solver, *described)
 
 
-def _refuse_short(study: Study, reference: str, path: Solution) -> None:
+def _require_complete(study: Study, reference: str, path: Solution) -> None:
     if not path.complete:
         raise StudyError(
             f"{study.file}: reference '{reference}' is {path.status} and ends at load factor {path.load_factor:.6g}: "
-            "load less, take more load_steps, or another reference by --to"
+            "reduce the load, use more load_steps, or choose another reference by --to"
         )
 
 
 def _require_newton(study: Study) -> None:
     if not study.solver.follows_load:
-        raise StudyError(f'{study.file}: solver.control: springs are calibrated under control = "load"')
+        raise StudyError(f'{study.file}: solver.control: calibration needs control = "load"')
 
 
 @contextmanager
 def _naming(study: Study) -> Iterator[None]:
-    """Name the study in front of an error."""
+    """Prefix errors with the study file."""
     try:
         yield
     except StudyError:

@@ -1,4 +1,4 @@
-"""A problem's loads and motions turned: other loads on the same body, to hold out."""
+"""Rotated loads and motions on the same body, as a load case to hold out."""
 
 from dataclasses import replace
 
@@ -8,11 +8,10 @@ from truespring.problem import Problem
 
 
 def turned(problem: Problem, angle: float = np.pi / 4) -> Problem | None:
-    """Return the problem with its dead loads and prescribed displacements turned by an angle [rad].
+    """Return the problem with dead loads and prescribed displacements rotated by an angle [rad].
 
-    All turn about one axis: in the plane of the body, or in space about the coordinate axis along which they are
-    smallest. Loads that follow the body, rotations, and motions of some directions only stay as they are. None where
-    nothing turns.
+    All are rotated in the plane of a plane body, in 3D about the coordinate axis along which they are smallest.
+    Following loads, rotations and motions in some directions only are unchanged. None if nothing can be rotated.
     """
     ours = [one.vector for one in problem.loads] + [one.vector for one in problem.supports]
     vectors = [vector for vector in ours if vector is not None and vector.any()]

@@ -1,4 +1,4 @@
-"""The unknowns of a calibration: stiffness k = P c, linear in numbers c of which 1 is the rule one starts from."""
+"""The unknowns of a calibration: stiffness k = P c, where c = 1 is the rule."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,15 +20,16 @@ from truespring.problem import Problem
 
 Columns = sparse.csr_array[Any, tuple[int, int]]
 
-# Components of a direction below this share of its length are rounding; heights are one within it of a spring.
+# Components of a direction below this share of its length are rounding errors; heights closer than this share of the
+# shortest spring are equal.
 _ROUNDING = 1e-6
-# An unknown of less weight than this share of the largest stiffness has none.
+# Unknowns with a stiffness below this share of the largest are dropped.
 _NO_WEIGHT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """What a calibration changes: each unknown c scales a part of what the rule gives.
+    """The unknowns of a calibration: each c scales a part of the stiffness of a rule.
 
     Attributes:
         kind: a key of UNKNOWNS.
@@ -54,12 +55,12 @@ class Unknowns:
         return np.ones(len(self))
 
     def model(self, values: Floats, label: str = "springs (calibrated)") -> PrescribedSprings:
-        """Return the springs with these unknowns, which `solve` takes on any problem of the same mesh."""
+        """Return the springs with these unknowns (n,), which `solve` accepts for any problem on the same mesh."""
         kappa = np.zeros(0) if self.kappa is None else self.kappa @ values
         return PrescribedSprings(self.springs, self.stiffness @ values, kappa, label)
 
     def potential(self, values: Floats) -> SpringNetwork | VolumeSprings:
-        """Return the potential with these unknowns; it is not asked whether it is a mechanism."""
+        """Return the potential with these unknowns (n,), without the check for mechanisms."""
         network = SpringNetwork(self.problem.mesh.nodes, self.springs, self.stiffness @ values)
         if self.kappa is None:
             return network
@@ -89,7 +90,7 @@ class Unknowns:
 
 
 def _spring_forces(nodes: Floats, springs: Ints, positions: Floats) -> Columns:
-    """What a unit of stiffness of each spring adds to the internal force [m], shape (n_dof, n_springs)."""
+    """Return the derivative of the internal force by the stiffness of each spring [m], shape (n_dof, n_springs)."""
     first, second = springs.T
     rest = np.linalg.norm(nodes[second] - nodes[first], axis=1)
     across = positions[second] - positions[first]
@@ -107,24 +108,23 @@ def _spring_forces(nodes: Floats, springs: Ints, positions: Floats) -> Columns:
 def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Unknowns:
     """Return the unknowns of a kind, a key of UNKNOWNS, for the springs of a problem.
 
-    Raises ModelError for springs that answer to each other's lengths, for a kind that is unknown or does not fit the
-    mesh, and where the rule itself does not.
+    Raises ModelError for coupled springs, and for a kind or a rule that is unknown or does not fit the mesh.
     """
     if kind not in UNKNOWNS:
         raise ModelError(f"unknowns = '{kind}' is unknown{nearest(kind, UNKNOWNS)}; allowed: {', '.join(UNKNOWNS)}")
     if springs.coupled:
         raise ModelError(
-            f"rule = '{springs.rule}': its springs answer to each other's lengths, they have no stiffness of their own "
-            "to fit; take another rule to start from, such as least-squares"
+            f"rule = '{springs.rule}': its springs are coupled and have no individual stiffness to fit: use another "
+            "rule, such as least-squares"
         )
-    springs.potential(problem)  # what does not fit is said as it is elsewhere
+    springs.potential(problem)  # raises the usual errors
     pairs, place = shared_springs(problem.mesh)
-    given = in_a_row(problem.mesh, springs.element_stiffness(problem))
+    by_link = in_a_row(problem.mesh, springs.element_stiffness(problem))
     if springs.sharing == "single":
-        given = given / np.bincount(place)[place]
+        by_link = by_link / np.bincount(place)[place]
     labels, group = UNKNOWNS[kind](problem, np.asarray(pairs), np.asarray(place))
     shape = (len(pairs), len(labels))
-    stiffness = sparse.csr_array((given, (place, group)), shape=shape)
+    stiffness = sparse.csr_array((by_link, (place, group)), shape=shape)
     kappas = springs.kappa(problem) if springs.volume else np.zeros(len(problem.mesh.elements))
     if not kappas.any():
         return _weighted(Unknowns(kind, tuple(labels), problem, np.asarray(pairs, dtype=np.int64), stiffness))
@@ -138,7 +138,7 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Un
 
 
 def _weighted(unknowns: Unknowns) -> Unknowns:
-    """Drop the unknowns that scale nothing: springs to which the rule gives no stiffness."""
+    """Return the unknowns without those of springs to which the rule gives no stiffness."""
     weight = np.zeros(len(unknowns), dtype=bool)
     for part in (unknowns.stiffness, unknowns.kappa):
         if part is not None:
@@ -155,12 +155,12 @@ def _weighted(unknowns: Unknowns) -> Unknowns:
     )
 
 
-#: How unknowns group springs: names, and the number of the group of each element's each link, (n_elements * links,).
+#: Groups of springs: their names, and the number of the group of each link of each element, (n_elements * links,).
 Groups = tuple[list[str], Ints]
 
 
 def _classes(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Edges, diagonals of faces and through the body; on lattices edges along each axis apart."""
+    """Group edges, face diagonals and body diagonals; on lattices, edges by axis."""
     words = []
     for numbers, part in problem.mesh.blocks:
         kind = part.kind
@@ -175,9 +175,9 @@ def _classes(problem: Problem, pairs: Ints, place: Ints) -> Groups:
 
 
 def _regions(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """The classes of each material apart."""
+    """Group by class and material."""
     if len(problem.materials) < 2:
-        raise ModelError("unknowns = 'region' is for bodies of several materials, this one has one: take 'class'")
+        raise ModelError("unknowns = 'region' needs a body of several materials, this one has one: use 'class'")
     names, group = _classes(problem, pairs, place)
     numbers = problem.material_numbers
     blocks = problem.mesh.blocks
@@ -195,11 +195,11 @@ def _material(number: int) -> str:
 
 
 def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Springs of one direction, up to sign along each axis, at one height."""
+    """Group springs by height and direction, up to signs of components."""
     mesh = problem.mesh
     if mesh.element not in ("quadrilateral", "hexahedron") or not _axis_aligned(mesh):
         raise ModelError(
-            "unknowns = 'direction-row' is for rectangles and bricks along the axes: take 'class', or 'spring'"
+            "unknowns = 'direction-row' needs rectangles or bricks along the axes: use 'class' or 'spring'"
         )
     along = _components(mesh)
     names = np.array(
@@ -216,12 +216,12 @@ def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
 
 
 def _springs(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Each spring its own."""
+    """Use one group per spring."""
     return [f"spring {a}-{b}" for a, b in pairs.tolist()], np.asarray(place, dtype=np.int64)
 
 
 def _volume_groups(problem: Problem, kind: str) -> Groups:
-    """The volume term's own unknowns: one, or one a region."""
+    """Return the groups of the volume term: one, or one per region."""
     if kind == "region":
         used = [f"volume term, {_material(number)}" for number in range(len(problem.materials))]
         return used, problem.material_numbers
@@ -229,7 +229,7 @@ def _volume_groups(problem: Problem, kind: str) -> Groups:
 
 
 def _numbered(names: Any) -> Groups:
-    """Each name once, in natural order, and its number."""
+    """Return the distinct names in natural order, and the number of each name."""
     found = sorted(set(names), key=lambda name: [int(part) if part.isdigit() else part for part in _parts(name)])
     number = {name: place for place, name in enumerate(found)}
     return found, np.array([number[name] for name in names], dtype=np.int64)
@@ -241,13 +241,13 @@ def _parts(name: str) -> list[str]:
 
 
 def _components(mesh: Mesh) -> Bools:
-    """Along which axes each element's each link goes, shape (n_elements * links, dim)."""
+    """Return which components of each link of each element are not zero, shape (n_elements * links, dim)."""
     vectors = np.abs(np.concatenate([link_vectors(part).reshape(-1, mesh.dim) for _, part in mesh.blocks]))
     return np.asarray(vectors > _ROUNDING * vectors.max(axis=1, keepdims=True))
 
 
 def _axis_of(mesh: Mesh) -> Ints:
-    """The axis that each link goes along, -1 where it goes along several, shape (n_elements * links,)."""
+    """Return the axis of each link, -1 if it is along none, shape (n_elements * links,)."""
     along = _components(mesh)
     return np.where(along.sum(axis=1) == 1, along.argmax(axis=1), -1)
 
@@ -257,7 +257,7 @@ def _axis_aligned(mesh: Mesh) -> bool:
     return bool((_axis_of(mesh).reshape(-1, n_links)[:, :n_edges] >= 0).all())
 
 
-#: What may be unknown, by name.
+#: Kinds of unknowns by name.
 UNKNOWNS: MappingProxyType[str, Callable[[Problem, Ints, Ints], Groups]] = MappingProxyType(
     {"class": _classes, "region": _regions, "direction-row": _directions_and_rows, "spring": _springs}
 )

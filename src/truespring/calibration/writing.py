@@ -1,4 +1,4 @@
-"""What a calibration leaves behind: a study like any other with its springs in a file, values, and a page."""
+"""The files of a calibrated study: a study with its springs in a file, values, figures and a page."""
 
 import copy
 import os
@@ -9,20 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from truespring.calibration.files import NAME, write_fitted
+from truespring.calibration.fitted_study import FittedStudy
 from truespring.calibration.page import calibration_values, fitted_sentence
-from truespring.calibration.study import Calibrated
 from truespring.errors import StudyError
 from truespring.outputs import Output
 from truespring.study import schema
 from truespring.study.read import Study
 from truespring.study.toml import toml_text
 
-# Keys of tables that name files beside the study.
+# Keys of [mesh] and of models that name files.
 _MESH_FILES, _MODEL_FILES = ("file", "voxels", "nodes", "springs"), ("file", "undeformed")
 
 
-def calibrated_values(found: Calibrated) -> dict[str, Any]:
-    """Return a calibration of a study as values that JSON can hold."""
+def calibrated_values(found: FittedStudy) -> dict[str, Any]:
+    """Return a calibration of a study as JSON values."""
     return {
         "title": found.study.title,
         "truespring": version("truespring"),
@@ -33,7 +33,7 @@ def calibrated_values(found: Calibrated) -> dict[str, Any]:
     }
 
 
-def write_calibrated(found: Calibrated, out: Path, command: str) -> tuple[Path, ...]:
+def write_calibrated(found: FittedStudy, out: Path, command: str | None) -> tuple[Path, ...]:
     """Write calibrated.toml, its springs as CSV, calibrate.json, figures and report.html into out/STEM; return them."""
     with Output(out / found.study.stem, "calibrate.json") as output:
         files = _write(found, output, command)
@@ -41,7 +41,7 @@ def write_calibrated(found: Calibrated, out: Path, command: str) -> tuple[Path, 
     return tuple(output.folder / file.name for file in files)
 
 
-def _write(found: Calibrated, output: Output, command: str) -> tuple[Path, ...]:
+def _write(found: FittedStudy, output: Output, command: str | None) -> tuple[Path, ...]:
     study = output.staging / f"{NAME}.toml"
     words = found.study.title, what_was_fitted(found)
     files = write_fitted(found.calibration, output.staging, calibrated_values(found), words, (study.name,), command)
@@ -50,20 +50,20 @@ def _write(found: Calibrated, output: Output, command: str) -> tuple[Path, ...]:
     return study, *files
 
 
-def what_was_fitted(found: Calibrated) -> str:
-    """Return what was fitted to what, in a sentence."""
-    told = found.calibration
-    loads = ", ".join(one.case.name for one in told.cases if not one.held_out)
+def what_was_fitted(found: FittedStudy) -> str:
+    """Return a sentence on what was fitted to what."""
+    fitted = found.calibration
+    loads = ", ".join(one.case.name for one in fitted.cases if not one.held_out)
     return (
-        f"{told.rule.label[:1].upper()}{told.rule.label[1:]} with {len(told.unknowns)} unknowns by "
-        f"{told.unknowns.kind}, fitted to {found.reference} under {loads}."
+        f"{fitted.rule.label[:1].upper()}{fitted.rule.label[1:]} with {len(fitted.unknowns)} unknowns by "
+        f"{fitted.unknowns.kind}, fitted to {found.reference} under {loads}."
     )
 
 
-def calibrated_study(found: Calibrated, folder: Path, tables: list[str]) -> str:
-    """Return the text of the study with its calibrated springs beside those of the rule, to stand in `folder`.
+def calibrated_study(found: FittedStudy, folder: Path, tables: list[str]) -> str:
+    """Return the text of the study, to be written into `folder`, with the calibrated springs as a further model.
 
-    The comments at its head tell the errors: they are shown with its results, and stand in what it is exported to.
+    The comments at its head give the errors: they are shown with its results and copied into exported files.
     """
     study = _tables(found.study)
     study["title"] = f"{found.study.title}, springs calibrated"
@@ -88,36 +88,36 @@ def calibrated_study(found: Calibrated, folder: Path, tables: list[str]) -> str:
 
 
 def _tables(study: Study) -> dict[str, Any]:
-    """The tables of a study as they were read, with as many elements as its mesh has."""
+    """Return the tables of a study as read, with the number of elements of its mesh."""
     tables = copy.deepcopy(dict(study.text.document))
     if study.halvings:
         if not isinstance(study.keys.mesh, schema.ShapeKeys):
-            raise StudyError(f"{study.file}: a mesh that was read and made finer cannot be written into a study")
+            raise StudyError(f"{study.file}: mesh: a refined mesh from a file cannot be written into a study")
         tables["mesh"]["elements"] = list(study.keys.mesh.elements)
     return tables
 
 
-def _head(found: Calibrated) -> list[str]:
-    """What the reader of the study, and of what it is exported to, must know of its springs."""
-    told = found.calibration
+def _head(found: FittedStudy) -> list[str]:
+    """Return the lines of comment at the head of the study: origin, errors and identifiability of the springs."""
+    fitted = found.calibration
     lines = [
         f"Springs calibrated by truespring {version('truespring')}: {what_was_fitted(found)}",
-        fitted_sentence(told),
-        told.headline,
-        told.identifiability.sentence,
+        fitted_sentence(fitted),
+        fitted.headline,
+        fitted.identifiability.sentence,
     ]
     return [" ".join(line.split()) for line in lines]
 
 
 def _free_name(models: Mapping[str, Any]) -> str:
-    """A name that the study does not have yet."""
+    """Return a name that is not used in the study."""
     taken = {name.casefold() for name in models}
     numbers = ("", *(f"-{number}" for number in range(2, len(taken) + 3)))
     return next(f"{NAME}{number}" for number in numbers if f"{NAME}{number}" not in taken)
 
 
 def _move(table: dict[str, Any], keys: tuple[str, ...], before: Path, now: Path) -> None:
-    """Keep what a table calls its files true where the study moves to another folder."""
+    """Adapt the relative paths of files in a table to the new folder of the study."""
     for key in keys:
         name = table.get(key)
         if isinstance(name, str) and not re.match(r"\w\w+:", name):

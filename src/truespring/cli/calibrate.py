@@ -47,7 +47,6 @@ def _add(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     from truespring.calibration.page import calibration_table
     from truespring.calibration.study import calibrate_study
-    from truespring.calibration.writing import calibrated_values, write_calibrated
     from truespring.study import read_studies
 
     study, *others = read_studies([options.study, *options.case, *options.held_out])
@@ -68,17 +67,17 @@ def _run(options: argparse.Namespace) -> int:
             **weight,
         )
     with writing(options.out):
-        files = write_calibrated(found, options.out, options.command)
+        files = found.write(options.out, options.command)
     screen = console(options)
     screen.print(found.calibration.headline, soft_wrap=True)
     screen.print(calibration_table(f"{study.stem}: springs fitted to {found.reference}", found.calibration))
     screen.print(found.calibration.identifiability.sentence, soft_wrap=True)
     for text in found.calibration.warnings:
         screen.print(f"warning: {text}", soft_wrap=True)
-    screen.print(f"study: {files[0]}", soft_wrap=True)
-    print_file(options, "report", files[-1])
+    screen.print(f"study: {files['calibrated.toml']}", soft_wrap=True)
+    print_file(options, "report", files["report.html"])
     if options.json:
-        print_json(calibrated_values(found))
+        print_json(found.values)
     if not found.calibration.converged:
         for text in found.calibration.warnings:
             say(f"{study.stem}: {text}")

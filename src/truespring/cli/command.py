@@ -5,7 +5,6 @@ import gc
 import importlib
 import io
 import os
-import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -15,9 +14,7 @@ from truespring.cli.parser import parse
 from truespring.cli.printing import say
 from truespring.cli.verb import CLOSED_PIPE, CONVERGED, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT
 from truespring.errors import TruespringError, one_line
-
-# Options that change what is printed, not what is computed.
-_ONLY_PRINTING = ("--json", "--quiet", "-q", "--verbose", "-v")
+from truespring.report.command import command_line
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -59,7 +56,7 @@ def _run_verb(arguments: list[str]) -> int:
         options = parse(arguments)
         if options is None:
             return WRONG_INPUT
-        options.command = shlex.join(["truespring", *(one for one in arguments if one not in _ONLY_PRINTING)])
+        options.command = command_line(arguments)
         _load(options)
         with _threads(options.threads), ExitStack() as options.reserved:
             code: int = options.run(options)

@@ -49,9 +49,8 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.comparing import compare_sources, find_sources, read_probe, write_comparisons
+    from truespring.comparing import compare_sources, find_sources, read_probe
     from truespring.comparing.tables import difference_tables
-    from truespring.report.summary import difference
 
     given = [(name, getattr(options, name)) for name in FILE_OPTIONS]
     sources = find_sources(options.source, given)
@@ -59,20 +58,19 @@ def _run(options: argparse.Namespace) -> int:
     reserve(options)
     with progress(options) as advance:
         reading = None if advance is None else lambda text, share: advance("reading", text, share)
-        results = list(compare_sources(sources, probe, options.tolerance, reading, options.timeout))
+        found = compare_sources(sources, probe, options.tolerance, reading, options.timeout)
     with writing(options.out):
-        report = write_comparisons(results, options.out, options.command)
+        files = found.write(options.out, options.command)
     screen = console(options)
-    for result in results:
+    for result in found:
         for part in difference_tables(result):
             screen.print(part)
-    print_file(options, "report", report)
+    print_file(options, "report", files["report.html"])
     if options.json:
-        values = [difference(result) for result in results]
-        print_each({one["model"]: one for one in values})
-    for result in results:
+        print_each(found.values)
+    for result in found:
         print_failures(result, options.out, shown=not screen.quiet)
-    return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
+    return CONVERGED if found.converged else NOT_CONVERGED
 
 
 COMPARE = Verb(

@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
                 retry_failed=options.retry_failed,
                 timeout=options.timeout,
                 progress=advance,
-                report=note,
+                note=note,
             )
     except KeyboardInterrupt:
         say("interrupted; the same command continues where it stopped")

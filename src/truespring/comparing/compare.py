@@ -1,6 +1,5 @@
-"""Results against results, whoever computed them: the first is the reference."""
+"""Compare results with the first one, the reference."""
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -8,18 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from truespring.comparing.misfits import box_words, refuse_misfit
+from truespring.comparing.misfits import box_words, require_alignment
 from truespring.comparing.options import read_place
+from truespring.comparing.result import Comparisons
 from truespring.comparing.sources import Progress, Source, open_source
 from truespring.comparison import TOLERANCE, Comparison, compare
 from truespring.equilibrium import Solution
 from truespring.errors import StudyError, TruespringError
 from truespring.misfit import displacement_misfit, same_place
-from truespring.outputs import Output, write_whole
-from truespring.report.curves import write_curves
 from truespring.report.result import Result
-from truespring.report.series import write_difference
-from truespring.report.summary import difference
 
 Probe = str | tuple[float, ...] | None
 
@@ -30,36 +26,44 @@ def compare_sources(
     tolerance: float | None = None,
     progress: Progress | None = None,
     timeout: float | None = None,
-) -> Iterator[Result]:
-    """Read or solve all sources and yield each but the first compared with that, as a result to report.
+) -> Comparisons:
+    """Read or solve all sources and compare each with the first, the reference.
 
-    Probe and tolerance are those of a study among the two where they are not given; each model that is solved is given
-    up after `timeout` seconds. Raises TruespringError where a
-    file cannot be read, or a body does not lie where that of the reference lies, with what would make it lie there.
+    Args:
+        sources: from `find_sources`, at least two.
+        probe: name or coordinates [m] of the watched point; by default that of a study among the two sources.
+        tolerance: relative error up to which two results agree; by default that of a study among the two sources.
+        progress: called with the source that is read or solved, and the share of the work done.
+        timeout: time limit of each model [s].
+
+    Raises TruespringError if a file cannot be read, or if a body has another place than that of the reference, with the
+    options that would align them.
     """
     (first, *others), (reference, *models) = names(sources), _opened(sources, progress, timeout)
+    results = []
     for source, name, model in zip(sources[1:], others, models, strict=True):
-        refuse_misfit(source, model, sources[0], reference)
+        require_alignment(source, model, sources[0], reference)
         study = source.study or sources[0].study
         accepted = tolerance or (TOLERANCE if study is None else study.tolerance)
-        found = _laid_over(model, reference, probe, accepted)
+        found = _compared(model, reference, probe, accepted)
         watched = source.probe or sources[0].probe
-        if probe is None and watched is not None:  # where the study looks, if the other body is there
-            there = _laid_over(model, reference, watched, accepted)
+        if probe is None and watched is not None:  # the probe of the study, if it is on the other body too
+            there = _compared(model, reference, watched, accepted)
             found = there if _off(watched, there) <= _FAR else found
         elif isinstance(probe, tuple):
-            _refuse_far(probe, found)
-        yield _result(name, model, first, found, source.is_file or sources[0].is_file)
+            _require_near(probe, found)
+        results.append(_result(name, model, first, found, source.is_file or sources[0].is_file))
+    return Comparisons(tuple(results))
 
 
-def _laid_over(model: Solution, reference: Solution, place: Probe, tolerance: float) -> Comparison:
-    """Compare two paths; a surface alone has no levels to draw, so the body is drawn over it, whichever is which."""
-    turned = not model.states and bool(reference.states)
-    return compare(reference, model, place, tolerance) if turned else compare(model, reference, place, tolerance)
+def _compared(model: Solution, reference: Solution, place: Probe, tolerance: float) -> Comparison:
+    """Return the comparison of two paths; if only the reference has states, it takes the place of the model."""
+    swapped = not model.states and bool(reference.states)
+    return compare(reference, model, place, tolerance) if swapped else compare(model, reference, place, tolerance)
 
 
 def names(sources: Sequence[Source]) -> list[str]:
-    """Return a short name for each source: its file's, with as many folders as tell it from others; each once."""
+    """Return a short unique name for each source: its file name, with as many folders as needed."""
     named = [_named(source, 0) for source in sources]
     for folders in range(1, 4):
         if len(set(named)) == len(named):
@@ -81,11 +85,11 @@ def _named(source: Source, folders: int) -> str:
 
 
 def _opened(sources: Sequence[Source], progress: Progress | None, timeout: float | None) -> list[Solution]:
-    """The paths of all sources; STL files last, which are read beside the first other body."""
+    """Return the paths of all sources; STL files are read last, because they need another body."""
     opened: dict[int, Solution] = {}
     for number, source in sorted(enumerate(sources), key=lambda one: one[1].is_stl):
-        beside = opened[min(opened)].problem if opened and source.is_stl else None
-        opened[number] = open_source(source, beside, progress, timeout)
+        other = opened[min(opened)].problem if opened and source.is_stl else None
+        opened[number] = open_source(source, other, progress, timeout)
     return [opened[number] for number in range(len(sources))]
 
 
@@ -108,83 +112,53 @@ def _result(name: str, model: Solution, first: str, found: Comparison, from_file
 
 
 def _off(place: tuple[float, ...], found: Comparison) -> float:
-    """How far a place [m] is from the node that is watched for it, as a share of the diameter."""
+    """Return the distance of a place [m] from its nearest node, as a share of the body's diameter."""
     mesh = found.model.problem.mesh
     return float(np.linalg.norm(mesh.nodes[found.probe] - place[: mesh.dim])) / mesh.diameter
 
 
-def _refuse_far(place: tuple[float, ...], found: Comparison) -> None:
+def _require_near(place: tuple[float, ...], found: Comparison) -> None:
     if (off := _off(place, found)) > _FAR:
         at = ", ".join(f"{part:.4g}" for part in place)
-        away = f"{off * found.model.problem.mesh.diameter:.4g} m away from the nearest node"
+        away = f"{off * found.model.problem.mesh.diameter:.4g} m from the nearest node"
         raise StudyError(f"--probe ({at}) m is {away}: the body {box_words(found.model)}")
 
 
-# A probe farther off the body, as a share of its diameter, was not meant.
+# Largest distance of a probe from the body, as a share of the body's diameter.
 _FAR = 0.1
 
 
 def _notes(first: str, found: Comparison, from_file: bool) -> Iterator[str]:
-    """What a reader must know of how two bodies were laid over each other."""
+    """Yield warnings on differences of place, levels, units and axes of the two bodies."""
     model, reference = found.known_on
     if not same_place(model, reference):
-        yield f"it {box_words(model)}, {first} {box_words(reference)}: they are not one body"
+        yield f"it {box_words(model)}, {first} {box_words(reference)}: the bodies differ"
     if found.n_outside:
         yield (
-            f"{found.n_outside} of {len(found.outside)} nodes lie outside of the other body and are left out of all "
-            "errors; figures mark them by crosses"
+            f"{found.n_outside} of {len(found.outside)} nodes are outside of the other body: they are excluded from "
+            "all errors and marked by crosses in figures"
         )
     if found.n_reference_outside:
-        yield f"{found.n_reference_outside} nodes of {first} lie outside of it, where nothing is compared"
+        yield f"{found.n_reference_outside} nodes of {first} are outside of it and not compared"
     if found.model.states and found.reference.states and not found.load_factors.size:
         mine, theirs = (", ".join(f"{level:g}" for level in path.load_factors[:12]) for path in found.known_on)
         yield f"it has the load levels {mine}, {first} has {theirs}: none in common"
     better = displacement_misfit(found) if from_file else None
     if better is not None and better.factor != 1:
         yield (
-            f"its displacement would be near that of {first} if it were {better.factor:g} times as large, where its "
-            "nodes lie right: are both in one unit?"
+            f"its displacement is near that of {first} if multiplied by {better.factor:g}, while its nodes agree: "
+            "check the unit of the displacement"
         )
     elif better is not None:
         axes = ",".join(better.axes)
-        yield f"its displacement would be near that of {first} with --axes {axes}: are its axes others?"
+        yield f"its displacement is near that of {first} with --axes {axes}: check its axes"
 
 
 def read_probe(text: str | None) -> Probe:
-    """Return a named point, or a place of lengths with commas between [m]."""
+    """Return the name of a point, or its coordinates [m] if the text has commas."""
     if text is None or "," not in text:
         return text
     try:
         return read_place(text)
     except TruespringError as error:
         raise StudyError(f"--probe {text}: {error}") from None
-
-
-def write_comparisons(results: Sequence[Result], out: Path, command: str) -> Path:
-    """Write the files of each result into out, or where there are several into folders of it; return the report.
-
-    `command` is the command line that repeats the comparison, named in the report.
-    """
-    for result in results:
-        write_comparison(result, out if len(results) == 1 else out / result.file, command)
-    report = out / "report.html"
-    if len(results) > 1:
-        from truespring.report.page import render_page
-
-        write_whole(report, render_page(results, command).encode())
-    return report
-
-
-def write_comparison(result: Result, folder: Path, command: str) -> None:
-    """Write comparison.json, curves.csv, difference.vtu, figures and the report of two results into a folder."""
-    from truespring.report.figures import save_figures
-    from truespring.report.page import write_page
-
-    with Output(folder, "comparison.json") as output:
-        text = json.dumps(difference(result), indent=2, allow_nan=False)
-        (output.staging / "comparison.json").write_text(text + "\n", encoding="utf-8")
-        write_curves(result, output.staging / "curves.csv")
-        write_difference(next(iter(result.comparisons.values())), output.staging / "difference.vtu")
-        save_figures(result, output.staging / "figures")
-        write_page([result], output.staging / "report.html", command)
-        output.publish()

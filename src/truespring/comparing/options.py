@@ -1,4 +1,4 @@
-"""What the options of `truespring compare` tell of files that do not tell it themselves."""
+"""The options of `truespring compare` for what result files do not state."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from truespring.units import to_si
 
 @dataclass(frozen=True)
 class FileOptions:
-    """What is told of a result file that it does not tell itself.
+    """Options of a result file.
 
     Attributes:
-        unit, axes, shift, load_factor, force_unit, full_time: see Placing; None where nothing is told, which takes m,
-            x,y,z, no shift, 1, no energies, and what the file's times say.
-        field: the name of the displacement among a VTK file's arrays.
-        undeformed: the body at rest, of STL or marker files that hold no more than where it went.
-        mesh: the deck with the nodes of a .dat file.
+        unit, axes, shift, load_factor, force_unit, full_time: see Placing; None for its defaults: m, x,y,z, no shift,
+            1, no energies, and the times of the file.
+        field: name of the displacement in a VTK file.
+        undeformed: the undeformed body of STL or marker files with the deformed one.
+        mesh: deck with the nodes of a .dat file.
     """
 
     unit: str | None = None
@@ -34,7 +34,7 @@ class FileOptions:
 
     @property
     def placing(self) -> Placing:
-        """Where the file's body lies."""
+        """Unit, axes, shift and load levels of the file."""
         plain = Placing()
         return Placing(
             unit=self.unit or plain.unit,
@@ -47,50 +47,50 @@ class FileOptions:
 
     @property
     def placed(self) -> bool:
-        """Whether it is told where the body lies."""
+        """Whether unit, axes or shift is set."""
         return self.unit is not None or self.axes is not None or self.shift is not None
 
 
-#: An option's name, and each value that it was given.
-Given = Sequence[tuple[str, Sequence[str]]]
+#: Names of options, each with its values on the command line.
+OptionValues = Sequence[tuple[str, Sequence[str]]]
 
-# Options that some formats take only.
+# Options of some formats only.
 _BY_FORMAT = ("field", "undeformed", "mesh")
 
 
-def options_of(text: str, given: Given, texts: Sequence[str]) -> FileOptions:
-    """Return what options tell of one of `texts`, the things that are compared.
+def options_of(text: str, options: OptionValues, texts: Sequence[str]) -> FileOptions:
+    """Return the options of one of the sources `texts`.
 
-    VALUE is for all files that can take it, FILE=VALUE for one, by what was given, its file's name or its stem. Raises
-    StudyError for a FILE that is none of them or several, an option that no file takes, a VALUE that cannot be read.
+    VALUE applies to all files that accept the option, FILE=VALUE to one, given by its path, name or stem. Raises
+    StudyError for a FILE that matches none or several, an option that no file accepts, and an invalid VALUE.
     """
     found: dict[str, Any] = {}
-    for name, values in given:
+    for name, values in options:
         for value in values:
             file, rest = _parts(name, value, texts)
             known = _value(name, rest, value)
             takers = [one for one in texts if _takes(one, name)]
             if not takers:
                 suffixes = ", ".join(suffix for suffix in READERS if _is_for(suffix, name))
-                raise StudyError(f"{_option(name)} {value}: nothing that is compared takes it; {suffixes} files do")
+                raise StudyError(f"{_option(name)} {value}: none of the sources accepts it; it is for {suffixes} files")
             if text in takers if file is None else text == file or _names(text, file):
                 found[name] = known
     return FileOptions(**found)
 
 
 def _parts(name: str, value: str, texts: Sequence[str]) -> tuple[str | None, str]:
-    """The FILE, None for all, and the VALUE of an option."""
+    """Return FILE, None for all files, and VALUE of an option."""
     file, equals, rest = value.partition("=")
     if not equals:
         return None, value
     named = sorted({one for one in texts if _names(one, file)})
     if not named:
-        if Path(value).exists():  # a path may hold the sign
+        if Path(value).exists():  # a path may contain =
             return None, value
-        raise StudyError(f"{_option(name)} {value}: '{file}' is none of {', '.join(texts)}")
+        raise StudyError(f"{_option(name)} {value}: '{file}' matches none of {', '.join(texts)}")
     taking = [one for one in named if _takes(one, name)]
     if len(taking) > 1 and file not in taking:
-        raise StudyError(f"{_option(name)} {value}: '{file}' names {' and '.join(taking)}: write one as it was given")
+        raise StudyError(f"{_option(name)} {value}: '{file}' matches {' and '.join(taking)}: give the path of one")
     return file, rest
 
 
@@ -100,7 +100,7 @@ def _names(text: str, file: str) -> bool:
 
 
 def _takes(text: str, name: str) -> bool:
-    """Whether a source can take an option: of files some by their format, others all."""
+    """Return whether a source accepts an option."""
     key = format_of(Path(text))
     return key is not None and _is_for(key, name)
 
@@ -113,7 +113,8 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _value(name: str, text: str, given: str) -> Any:
+def _value(name: str, text: str, original: str) -> Any:
+    """Return the value of an option from text; `original` is the text for messages."""
     parts = tuple(part.strip() for part in text.split(","))
     try:
         match name:
@@ -135,14 +136,14 @@ def _value(name: str, text: str, given: str) -> Any:
             case _:
                 return text
     except (TruespringError, ValueError) as error:
-        raise StudyError(f"{_option(name)} {given}: {error}") from None
+        raise StudyError(f"{_option(name)} {original}: {error}") from None
 
 
 def read_place(text: str) -> tuple[float, ...]:
-    """Return a place or a way [m] of two or three lengths: "0.16, 0.02", or "160 mm, 20 mm"."""
+    """Return a vector of two or three lengths [m] from text: "0.16, 0.02" or "160 mm, 20 mm"."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) not in (2, 3):
-        raise StudyError(f"'{text}' is no place: two or three lengths are wanted, such as 160 mm, 20 mm")
+        raise StudyError(f"'{text}': give two or three lengths, such as 160 mm, 20 mm")
     return tuple(to_si(float(part) if _is_number(part) else part, "length") for part in parts)
 
 

@@ -21,7 +21,7 @@ def difference_tables(result: Result) -> "Iterator[Table | str]":
     for key, what in _DIFFERENCES.items():
         if (value := values.get(key)) is not None:
             table.add_row(what, f"{value:.2%}" if key.endswith("error") else f"{value:.4g}")
-    table.add_row("compared", "node by node" if one.node_by_node else "at nodes of one, carried from the other")
+    table.add_row("compared", "node by node" if one.node_by_node else "at the nodes of one, interpolated in the other")
     table.add_row("nodes", f"{len(one.outside):,}, {one.n_outside:,} outside")
     yield verdict(result)
     yield table
@@ -41,6 +41,6 @@ _DIFFERENCES = {
     "energy_error": "error of the stored energy",
     "rms_distance": "root-mean-square distance [m]",
     "max_distance": "largest distance [m]",
-    "surface_rms": "surfaces apart, root mean square [m]",
-    "hausdorff": "surfaces apart, at most (Hausdorff) [m]",
+    "surface_rms": "distance of surfaces, root mean square [m]",
+    "hausdorff": "distance of surfaces, largest (Hausdorff) [m]",
 }

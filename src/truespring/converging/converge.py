@@ -1,4 +1,4 @@
-"""The same study on finer and finer meshes, until what is watched settles."""
+"""Solve a study on finer meshes until the watched quantities settle."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,23 +24,31 @@ def converge(
     most: int = 5,
     progress: Callable[[Study, str], None] | None = None,
 ) -> Iterator[StudyRefinement]:
-    """Solve a study on meshes of half the size each time; yield after each what all models tell.
+    """Solve a study on a sequence of meshes, each with elements of half the size; yield the refinement after each.
 
-    It ends when every watched quantity has settled to `tolerance`, where a model does not reach full load, or after
-    `most` meshes. Watched are the probe's displacement along each axis, the stored energy, and force and torque of
-    each moved support. A mesh on which a model is inverted, unstable or not converged settles nothing. `progress` is
-    called with the refined study and the name of a model before that is solved. Raises StudyError where the mesh
-    cannot be refined.
+    It ends when every watched quantity has settled, when a model does not reach full load, or after `most` meshes.
+    Watched are the probe's displacement along each axis, the stored energy, and force and torque of each moved support.
+    Nothing settles on a mesh on which a model is inverted, unstable or not converged.
+
+    Args:
+        study: a study or its file.
+        tolerance: relative error up to which a quantity has settled.
+        most: largest number of meshes.
+        progress: called with the refined study and the name of a model before it is solved.
+
+    Raises StudyError if the mesh cannot be refined.
     """
-    given = study if isinstance(study, Study) else read_study(study)
+    original = study if isinstance(study, Study) else read_study(study)
     attempts: list[Attempt] = []
     values: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
     place = None
     for halvings in range(most):
-        study = given.finer(halvings) if halvings else given
+        study = original.finer(halvings) if halvings else original
         models = {name: entry for name, entry in study.entries.items() if entry.solves}
         if not models:
-            raise StudyError(f"{study.file}: models: there is none to solve: what was read from files has one mesh")
+            raise StudyError(
+                f"{study.file}: models: all models are read from files, which have one mesh: add a model to solve"
+            )
         mesh = study.problem.mesh
         for name, model in models.items():
             if progress:
@@ -53,7 +61,7 @@ def converge(
                 place = mesh.nodes[most_moved(path) if study.probe is None else study.probe]
             for quantity, unit, value in _watched(path, nearest_node(mesh, place.tolist())):
                 values.setdefault((name, quantity, unit), []).append((mesh.n_nodes, value))
-        found = refined_study(given.title, given.file, refinement(attempts, values, tolerance))
+        found = refined_study(original.title, original.file, refinement(attempts, values, tolerance))
         yield found
         if found.ended:
             return
@@ -68,7 +76,7 @@ def _watched(path: Solution, probe: int) -> Iterator[tuple[str, str, float]]:
     state = path.states[-1]
     for direction, value in zip(AXES, state.displacement[probe], strict=False):
         yield f"u{direction} of the probe", "m", float(value)
-    if np.isfinite(state.energy):  # another program may not tell it
+    if np.isfinite(state.energy):  # unknown for some other programs
         yield "energy", "J", state.energy
     for one in path.support_forces(state):  # a resultant that vanishes is zero on every mesh
         yield f"force of {one.name}", "N", float(np.linalg.norm(one.force)) if one.has_force else 0.0

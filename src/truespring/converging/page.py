@@ -1,4 +1,4 @@
-"""What a study tells on finer and finer meshes: rows of a table, and a page that loads nothing from anywhere."""
+"""A refinement as rows, as a table for a terminal and as a page."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +31,7 @@ def settling_rows(found: Refinement) -> Iterator[tuple[str, ...]]:
 
 
 def settling_table(title: str, found: Refinement) -> "Table":
-    """Return what quantities come to on finer meshes: value, order, extrapolated value, error, and what they tell."""
+    """Return a table of the watched quantities: value, order, extrapolated value, error and state."""
     table = new_table(title, "model", "", "value", "order", "at h = 0", "error", "")
     for row in settling_rows(found):
         table.add_row(*row)
@@ -39,7 +39,7 @@ def settling_table(title: str, found: Refinement) -> "Table":
 
 
 def render_settling(title: str, file: Path, found: Refinement, command: str | None) -> str:
-    """Return the page as HTML; `command` is what does it again."""
+    """Return the page as HTML; `command` is the command line that repeats the run."""
     return render(
         "converging/page.html.j2",
         command,
@@ -59,8 +59,8 @@ def render_settling(title: str, file: Path, found: Refinement, command: str | No
 
 
 def settling_figures(found: Refinement) -> Iterator[tuple[str, Sheet]]:
-    """Yield the figure of each quantity over its limit, mesh by mesh; none where there are no two meshes."""
-    several = [one for one in found.told if len(one.values) > 1]
+    """Yield the figure of each quantity over its limit by mesh; none with fewer than two meshes."""
+    several = [one for one in found.nonzero if len(one.values) > 1]
     if not several:
         return
     curves = []
@@ -73,5 +73,5 @@ def settling_figures(found: Refinement) -> Iterator[tuple[str, Sheet]]:
 
 
 def _limit(one: Settling) -> float:
-    """What a quantity comes to, as far as it is known."""
+    """Return the extrapolated value of a quantity, else its last value."""
     return one.values[-1] if one.extrapolated is None else one.extrapolated

@@ -1,4 +1,4 @@
-"""The result of `converge`: a study on finer and finer meshes, with its table and figures, which can be written."""
+"""The result of `converge`: a study on finer meshes, as table, figures and files."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ class StudyRefinement(Refinement):
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """For each model, watched quantity and mesh a row, as in converge.csv."""
+        """One row per model, watched quantity and mesh, as in converge.csv."""
         return [
             {"model": one.model, "quantity": one.quantity, "unit": one.unit, "n_nodes": count, "value": value}
             for one in self.quantities
@@ -41,13 +41,13 @@ class StudyRefinement(Refinement):
         return table_of(self.rows)
 
     def figures(self) -> Figures:
-        """Return the figures by the stem of their names; `png()` and `svg()` of each are the bytes of a file."""
+        """Return the figures by the stem of their files; `png()` and `svg()` return the bytes of a file."""
         return sheets(settling_figures(self))
 
     def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
-        """Write converge.csv, converge.json and the page converge.html into out/STEM; return where each is.
+        """Write converge.csv, converge.json and the page converge.html into out/STEM; return the paths by file name.
 
-        `command` is the command line that repeats the run, named in the page.
+        `command` is the command line that repeats the run, for the page.
         """
         with Output(Path(out) / self.file.stem, "converge.json") as output:
             folder = output.staging

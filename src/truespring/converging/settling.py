@@ -1,4 +1,4 @@
-"""Settling: what a quantity comes to on finer and finer meshes."""
+"""Convergence of quantities on finer meshes, by Richardson's extrapolation."""
 
 import math
 from collections.abc import Mapping
@@ -6,25 +6,24 @@ from dataclasses import dataclass, replace
 
 from truespring.richardson import observed_order, remaining_error
 
-# Orders between these are believed: below nothing settles, above chance has a hand in it.
+# Range of plausible orders: lower ones do not converge, higher ones are accidental.
 _LOWEST_ORDER, _HIGHEST_ORDER = 0.3, 6.0
-# A quantity this much smaller than the largest of its kind is rounding.
+# A quantity below this share of the largest with the same unit is a rounding error.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Settling:
-    """A quantity of one model over meshes, each of elements half as large as on the last.
+    """A quantity of one model on a sequence of meshes, each with elements of half the size.
 
     Attributes:
-        model, quantity, unit: whose, what, in which unit of SI.
+        model, quantity, unit: name of the model, name of the quantity, its SI unit.
         n_nodes, values: of each mesh.
-        order: p of the error ~ h^p by the three finest meshes, None where they tell none.
-        extrapolated: the value at h = 0 by Richardson's extrapolation, None without an order.
-        error: of the finest mesh, relative: the distance to the extrapolated value, else the last change.
-        settled: whether that is within the tolerance, and the meshes that tell it may be trusted.
-        zero: whether it is zero, as by symmetry: rounding beside another of the same model and unit. Such a quantity
-            tells nothing, and settles nothing.
+        order: p of the error ~ h^p from the three finest meshes; None if they show no plausible order.
+        extrapolated: the value at h = 0 by Richardson's extrapolation; None without an order.
+        error: relative error of the finest mesh: the distance to the extrapolated value, else the last change.
+        settled: whether the error is within the tolerance and the three finest meshes converged.
+        zero: whether it is zero up to rounding, as by symmetry; such a quantity is not used.
     """
 
     model: str
@@ -41,14 +40,14 @@ class Settling:
 
 @dataclass(frozen=True)
 class Attempt:
-    """How a model ended on a mesh.
+    """The status of a model on a mesh.
 
     Attributes:
-        model, n_nodes: which model on which mesh.
-        status: of its path; only where it is "converged" the mesh can settle anything.
+        model, n_nodes: name of the model, number of nodes of the mesh.
+        status: of the path; quantities settle on "converged" paths only.
         load_factor: the last level reached.
-        advice: what the status means.
-        complete: whether the full load was reached.
+        advice: explanation of the status.
+        complete: whether full load was reached.
     """
 
     model: str
@@ -66,12 +65,12 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Refinement:
-    """A study on meshes up to here, each of elements half as large as on the last.
+    """The watched quantities of a study on a sequence of meshes, each with elements of half the size.
 
     Attributes:
-        quantities: what is watched, of each model: the one list that is shown and that ends the loop.
-        attempts: how each model ended on each mesh.
-        tolerance: the relative error that was asked for.
+        quantities: watched quantities of each model.
+        attempts: status of each model on each mesh.
+        tolerance: relative error up to which a quantity has settled.
     """
 
     quantities: tuple[Settling, ...]
@@ -80,33 +79,33 @@ class Refinement:
 
     @property
     def n_nodes(self) -> tuple[int, ...]:
-        """Of each mesh."""
+        """Number of nodes of each mesh."""
         return tuple(dict.fromkeys(one.n_nodes for one in self.attempts))
 
     @property
     def last(self) -> tuple[Attempt, ...]:
-        """How the models ended on the finest mesh."""
+        """Status of each model on the finest mesh."""
         return tuple(one for one in self.attempts if one.n_nodes == self.n_nodes[-1])
 
     @property
-    def told(self) -> tuple[Settling, ...]:
-        """The quantities that tell something: all but those that are zero."""
+    def nonzero(self) -> tuple[Settling, ...]:
+        """The quantities that are not zero."""
         return tuple(one for one in self.quantities if not one.zero)
 
     @property
     def settled(self) -> bool:
-        """Whether all that tells something has settled, of every model."""
-        models = {one.model for one in self.told}
-        return all(one.settled for one in self.told) and models == {one.model for one in self.attempts}
+        """Whether all nonzero quantities have settled, and every model has one."""
+        models = {one.model for one in self.nonzero}
+        return all(one.settled for one in self.nonzero) and models == {one.model for one in self.attempts}
 
     @property
     def ended(self) -> bool:
-        """Whether finer meshes would tell no more: all has settled, or a model did not reach full load."""
+        """Whether to stop: all has settled, or a model did not reach full load."""
         return self.settled or not all(one.complete for one in self.last)
 
     @property
     def sentence(self) -> str:
-        """How it ended."""
+        """The result in a sentence."""
         count = (
             f"{len(self.n_nodes)} mesh{'es' if len(self.n_nodes) > 1 else ''}, the finest of {self.n_nodes[-1]:,} nodes"
         )
@@ -124,34 +123,34 @@ class Refinement:
             one = coarse[-1]
             return f"The study does not settle on {count}: {one.model} is {one.status} on {one.n_nodes:,} nodes."
         if len(self.n_nodes) < _MESHES:
-            return f"Too early to tell on {count}: at least {_MESHES} are needed."
-        if not self.told:
+            return f"Not known yet on {count}: at least {_MESHES} meshes are needed."
+        if not self.nonzero:
             return f"Nothing settles on {count}: all watched quantities are zero."
-        untold = [one.model for one in self.attempts if one.model not in {told.model for told in self.told}]
-        if untold:
-            return f"The study does not settle on {count}: all watched quantities of {untold[0]} are zero."
-        unsettled = [one for one in self.told if not one.settled]
+        all_zero = [one.model for one in self.attempts if one.model not in {known.model for known in self.nonzero}]
+        if all_zero:
+            return f"The study does not settle on {count}: all watched quantities of {all_zero[0]} are zero."
+        unsettled = [one for one in self.nonzero if not one.settled]
         worst = max(unsettled, key=lambda one: math.inf if one.error is None else one.error)
         off = "off by an unknown error" if worst.error is None else f"{_percent(worst.error)} off"
-        wanted = _percent(self.tolerance)
-        return f"The study does not settle to {wanted} on {count}: {worst.quantity} of {worst.model} is {off}."
+        tolerance = _percent(self.tolerance)
+        return f"The study does not settle to {tolerance} on {count}: {worst.quantity} of {worst.model} is {off}."
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-# A quantity is told from so many meshes, the finest ones.
+# Number of meshes that are needed for a quantity, the finest ones.
 _MESHES = 3
 
 
 def refinement(
     attempts: list[Attempt], values: Mapping[tuple[str, str, str], list[tuple[int, float]]], tolerance: float
 ) -> Refinement:
-    """Return what attempts on finer and finer meshes tell.
+    """Return the refinement of attempts on finer meshes.
 
-    `values` are those of each quantity, by model, name and unit, with the number of nodes of their mesh. One that is
-    not known on each mesh is left out, such as an energy that another program does not tell.
+    `values` has (number of nodes, value) of each mesh, by model, name and unit of the quantity. Quantities that are not
+    finite on every mesh are left out, such as energies that another program does not output.
     """
     found = []
     for (model, quantity, unit), several in values.items():
@@ -161,11 +160,11 @@ def refinement(
         one = settle(model, quantity, unit, counts, numbers, tolerance)
         finest = [attempt for attempt in attempts if attempt.model == model][-_MESHES:]
         found.append(replace(one, settled=one.settled and all(attempt.sound for attempt in finest)))
-    return Refinement(tuple(_beside(one, found) for one in found), tuple(attempts), tolerance)
+    return Refinement(tuple(_marked_zero(one, found) for one in found), tuple(attempts), tolerance)
 
 
 def settle(name: str, quantity: str, unit: str, n_nodes: list[int], values: list[float], tolerance: float) -> Settling:
-    """Return what a list of values, from coarse to fine, tells."""
+    """Return order, extrapolated value and error of a quantity from its values on coarse to fine meshes."""
     order = extrapolated = error = None
     size = abs(values[-1])
     if len(values) > 1:
@@ -181,8 +180,8 @@ def settle(name: str, quantity: str, unit: str, n_nodes: list[int], values: list
     return Settling(name, quantity, unit, tuple(n_nodes), tuple(values), order, extrapolated, error, settled)
 
 
-def _beside(one: Settling, others: list[Settling]) -> Settling:
-    """Return a quantity as zero where it is rounding beside another of the same model and unit, or nothing at all."""
+def _marked_zero(one: Settling, others: list[Settling]) -> Settling:
+    """Return a quantity, marked as zero if it is a rounding error of the largest one of the same model and unit."""
     largest = max(abs(other.values[-1]) for other in others if (other.model, other.unit) == (one.model, one.unit))
     if abs(one.values[-1]) <= _ROUNDING * largest:
         return replace(one, order=None, extrapolated=None, error=None, settled=False, zero=True)

@@ -1,1 +1,1 @@
-"""What a study leaves behind: curves, summary, VTU series, STL, figures and one HTML page."""
+"""Results as files: curves, summary, VTU series, STL, figures and one HTML page."""

@@ -1,4 +1,4 @@
-"""A bar of colours: how far two bodies are apart, from nothing to the largest distance."""
+"""A colour bar of distances between two bodies, from 0 to the largest."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from truespring.report.sheet import Sheet
 from truespring.report.style import error_colors
 from truespring.report.words import draw_words
 
-#: The height of a bar with its words [inch].
+#: Height of a bar with its label and numbers [inch].
 BAR = 0.44
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar of colours from 0 to `largest`, in the unit that `label` names; `most` tells the largest in words."""
+    """A colour bar from 0 to `largest`, in the unit that `label` names; `most` is the largest value as text."""
 
     label: str
     largest: float
@@ -24,7 +24,7 @@ class Bar:
 
 
 def bar_of(farthest: float, size: float) -> Bar:
-    """Return the bar of distances up to `farthest` beside a reference that moves by `size` at most [m]."""
+    """Return the bar of distances up to `farthest`, relative to `size`, the reference's largest displacement [m]."""
     if size:
         most = f"{percent(farthest / size)}, {quantity(farthest, 'm', 2)}"
         return Bar("distance [% of the reference's largest displacement]", 100 * farthest / size, most)
@@ -33,7 +33,7 @@ def bar_of(farthest: float, size: float) -> Bar:
 
 
 def draw_error_bar(sheet: Sheet, bar: Bar, left: float, top: float) -> None:
-    """Draw a bar with its label above, from its upper left corner on [inch]."""
+    """Draw a bar with its label above; (left, top) is its upper left corner [inch]."""
     draw_words(sheet, left, top - 0.07, bar.label)
     largest = bar.largest or 1.0
     values = round_numbers(0.0, largest, 5)

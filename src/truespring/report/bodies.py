@@ -1,4 +1,4 @@
-"""Pictures of bodies: as asked for, and a model over a reference."""
+"""Figures of plane bodies: undeformed, and a model over a reference."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,21 +28,21 @@ from truespring.report.words import draw_words, text_width
 
 
 def path_lines(path: Solution) -> Ints:
-    """Return the pairs of nodes that a path is drawn by, shape (n, 2).
+    """Return the pairs of nodes that are joined by lines in figures of a path, shape (n, 2).
 
-    Its springs, with the edges of elements that have none beside them; of a path without springs those of all elements,
-    of points alone none.
+    These are springs, and edges of elements without springs; without springs, the edges of all elements; of points
+    without elements, none.
     """
     if path.is_cloud:
         return np.zeros((0, 2), dtype=np.int64)
     if spring_lines(path) is None:
         return path.problem.mesh.edges
-    assert isinstance(path.potential, Visible)  # as all that have springs are
+    assert isinstance(path.potential, Visible)  # every potential with springs is
     return path.potential.cells["line"]
 
 
 def magnification(result: Result) -> float:
-    """Return the round factor by which displacements are drawn: 1, or where they are tiny so much that they show."""
+    """Return the round factor by which displacements are magnified in figures; 1 unless they are too small to see."""
     mesh = result.problem.mesh
     moved = [
         float(np.linalg.norm(state.displacement, axis=1).max())
@@ -53,9 +53,9 @@ def magnification(result: Result) -> float:
 
 
 def picture_box(points: Floats, others: Sequence[Floats]) -> tuple[Floats, Floats, list[bool]]:
-    """Return the box of `points` [m], shape (n, dim), widened by all `others` that leave it less than three times wide.
+    """Return lower and upper corner [m] of the box shown, and for each of `others` whether it leaves that box.
 
-    Besides, for each of `others`, whether it leaves the picture.
+    The box holds `points` [m], shape (n, dim), and all `others` that do not make it more than three times as wide.
     """
     lower, upper = points.min(axis=0), points.max(axis=0)
     widest = _WIDEST * float((upper - lower).max())
@@ -69,14 +69,14 @@ def picture_box(points: Floats, others: Sequence[Floats]) -> tuple[Floats, Float
     return low, high, leaves
 
 
-# A reference that would make the picture wider than this, in widths of the body and its model, leaves it.
+# Largest width of a picture, in widths of the model's body; a reference beyond that leaves the picture.
 _WIDEST = 3.0
 
 
 def _body_figure(
     title: str, lower: Floats, upper: Floats, legend: Sequence[Entry], remark: str = "", bar: Bar | None = None
 ) -> tuple[Area, Scale]:
-    """A sheet whose one area shows the box from `lower` to `upper` [m] at equal scales, words and a bar on top."""
+    """Return an area that shows a box [m] at equal scales, on a sheet with title, legend and bar; and its scale."""
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
     columns, words = legend_columns(legend, 4.7)
@@ -89,8 +89,8 @@ def _body_figure(
     # A narrow body leaves room for the legend: the box grows sideways, the scales stay equal.
     broad = max(width, 3.3, words + 0.05)
     margin = (broad / width - 1) / 2 * extent[0]
-    told = f"{title}; {remark}" if remark else title
-    sheet = Sheet(left + broad + right, bottom + height + top, told)
+    description = f"{title}; {remark}" if remark else title
+    sheet = Sheet(left + broad + right, bottom + height + top, description)
     x = ((lower[0] - margin) / scale.size, (upper[0] + margin) / scale.size)
     area = Area(sheet, left, bottom, broad, height, x, (lower[1] / scale.size, upper[1] / scale.size))
     draw_frame(area, f"x [{scale.unit}]", f"y [{scale.unit}]")
@@ -106,16 +106,16 @@ def _body_figure(
 def _lines(
     area: Area, points: Floats, lines: Ints, color: str, width: float, zorder: float, name: str, **more: Any
 ) -> None:
-    """Draw lines between points; fine meshes in fine lines."""
+    """Draw lines between points, thinner the more there are."""
     width *= min(1.0, max(0.25, (500 / max(len(lines), 1)) ** 0.5))
     draw_lines(area, points[lines], color, width, zorder, name, **more)
 
 
 def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | None:
-    """The model in blue over a reference in black, at the last load level that both have."""
+    """Return the model in blue over a reference in black, at the last load level that both have; None without one."""
     model, reference = (_drawn_on(comparison, side) for side in (0, 1))
     rest = model.problem.mesh.nodes
-    factor = magnification(result) if reference.states else 1.0  # of a surface alone no displacement is known
+    factor = magnification(result) if reference.states else 1.0  # a surface alone has no displacement
     inside = None
     if reference.surface is not None and factor == 1:
         level = reference.surface.load_factor
@@ -140,7 +140,7 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
     legend = [
         Entry(full_name(result, result.model or ""), BLUE),
         Entry(full_name(result, name), INK),
-        Entry("at rest", FAINT, linestyle=(0, (3, 2))),
+        Entry("undeformed", FAINT, linestyle=(0, (3, 2))),
         Entry("probe", RED, "o", ""),
     ]
     title = over_title(result, level, comparison)
@@ -161,7 +161,7 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
 
 
 def _drawn_on(comparison: Comparison, side: int) -> Solution:
-    """The model (0) or the reference (1) as it is drawn: on its own mesh, where that lies in the plane."""
+    """Return the model (0) or the reference (1) to draw: on the mesh it was solved on, if that is plane."""
     known = comparison.known_on[side]
     carried = (comparison.model, comparison.reference)[side]
     return known if known.problem.mesh.dim == 2 and not comparison.node_by_node else carried
@@ -172,10 +172,10 @@ def _magnified(path: Solution, state: State, factor: float) -> Floats:
 
 
 def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet | None:
-    """The model coloured by its distance from a reference, whose outline is black; nodes outside of it crossed.
+    """Return the model coloured by its distance from a reference, whose outline is black; crosses mark nodes outside.
 
-    Elements have the mean colour of their corners; where there are none, nodes are dots. None where the two are the
-    same but for rounding.
+    The colour of an element is the mean over its corners; without elements, nodes are dots. None if the two differ by
+    rounding only.
     """
     level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
     mine, theirs = comparison.model.at(level), comparison.reference.at(level)
@@ -216,7 +216,7 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
 
 
 def over_title(result: Result, level: float, comparison: Comparison) -> str:
-    """Return the level at which the two paths of a comparison are drawn, and how far they are apart."""
+    """Return a title: the load level, and the distance between the two paths of a comparison."""
     at = level_name(result, level).capitalize()
     if comparison.load_factors.size and np.isfinite(comparison.rms_errors[-1]):
         return f"{at}: {percent(float(comparison.rms_errors[-1]))} apart (root mean square)"
@@ -248,7 +248,7 @@ def undeformed_figure(body: Undeformed) -> Sheet:
 
 
 def _supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
-    """Clamped edges hatched, edges held in one direction on rollers, single nodes on a pin or roller."""
+    """Draw supports: hatching at clamped edges, rollers at edges held in one direction, pins at single nodes."""
     mesh, loading = problem.mesh, problem.loading
     still = loading.held & (loading.motion() == 0)
     clamped = loading.held.all(axis=1) & still.all(axis=1)
@@ -275,9 +275,13 @@ def _supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """Nodes on edges of the boundary that face one way and are held along `axis`, in order.
+    """Consecutive nodes on boundary edges that face one direction and are held along `axis`.
 
-    `away` is where their rollers point; where that is along the edge, `beside` is out of the body.
+    Attributes:
+        nodes: node numbers along the edges, shape (n,).
+        axis: the held direction.
+        away: unit vector from a node to its roller.
+        beside: outward unit vector if rollers stand along the edge, else zero.
     """
 
     nodes: Ints
@@ -286,7 +290,7 @@ class _Run:
     beside: Floats
 
     def thinned(self, nodes: Floats, spacing: float) -> Ints:
-        """Return every n-th node, so that neighbours are about `spacing` [m] apart or more."""
+        """Return every n-th node such that neighbours are at least about `spacing` [m] apart."""
         length = float(np.linalg.norm(np.diff(nodes[self.nodes], axis=0), axis=1).sum())
         n_gaps = len(self.nodes) - 1
         every = max(1, -int(-spacing * n_gaps // length)) if n_gaps else 1
@@ -294,7 +298,7 @@ class _Run:
 
 
 def _rolling_runs(mesh: Mesh, still: Bools) -> Iterator[_Run]:
-    """Runs of boundary edges whose two nodes are held in one direction, but not both clamped."""
+    """Yield runs of boundary edges whose two nodes are held in one direction, but not both clamped."""
     if mesh.boundary.shape[1] != 2:
         return
     along = np.diff(mesh.nodes[mesh.boundary], axis=1)[:, 0]
@@ -316,7 +320,7 @@ def _rolling_runs(mesh: Mesh, still: Bools) -> Iterator[_Run]:
 
 
 def _hatch(area: Area, edges: Floats, size: float) -> None:
-    """Short strokes outside clamped edges; edges of shape (n, 2, dim) run anticlockwise round the body."""
+    """Draw short strokes outside clamped edges, shape (n, 2, dim), which run anticlockwise round the body."""
     if not len(edges):
         return
     along = edges[:, 1] - edges[:, 0]

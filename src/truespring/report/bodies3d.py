@@ -1,6 +1,6 @@
-"""Pictures of bodies in 3D: as asked for, a model over a reference, and where the two are apart.
+"""Figures of bodies in 3D: undeformed, a model over a reference, and their distance.
 
-What hides what is an image (render.py); words, marks, arrows and scales are drawn over it as in 2D.
+Bodies are an image (render.py), for hidden lines and faces; text, marks, arrows and scales are drawn over it as in 2D.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, 
 from truespring.report.undeformed import Undeformed
 from truespring.report.verdict import display_name, level_name
 
-# Surfaces: of the body as asked for, of a reference, where it is held; their light comes from above, left of the eye.
+# Colours of surfaces: undeformed body, reference, supports; the light comes from above, left of the viewer.
 _BODY, _REFERENCE, _HELD = "#f7f8f9", "#e6e9ec", "#bcc2c8"
 _LIGHT = np.array([-0.3, 0.6, 0.74]) / np.linalg.norm([-0.3, 0.6, 0.74])
 _DASHES = (0, (3, 2))
@@ -70,9 +70,14 @@ def undeformed_picture(body: Undeformed) -> Picture:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Pair:
-    """A model and a reference at the last level that both have, as they are drawn: `factor` magnifies.
+    """A model and a reference at the last level that both have, in the coordinates of `seen` [m].
 
-    Places are as `seen` gives them [m].
+    Attributes:
+        level: load factor.
+        factor: magnification of displacements.
+        rest, mine, theirs: undeformed nodes, nodes of the model, of the reference, shape (n_nodes, 3).
+        distance: of nodes of the model from the reference, shape (n_nodes,); 0 outside of it.
+        largest: displacement of the reference.
     """
 
     level: float
@@ -102,7 +107,7 @@ def _pair(result: Result, comparison: Comparison) -> _Pair | None:
 
 
 def over_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
-    """The model in blue over a reference in black, at the last load level that both have."""
+    """Return the model in blue over a reference in black, at the last load level that both have; None without one."""
     pair = _pair(result, comparison)
     if pair is None:
         return None
@@ -116,7 +121,7 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
     legend = (
         Entry(full_name(result, result.model or ""), BLUE),
         Entry(full_name(result, name), INK),
-        Entry("at rest", FAINT, linestyle=_DASHES),
+        Entry("undeformed", FAINT, linestyle=_DASHES),
         Entry("probe", RED, "o", ""),
     )
     return _pair_picture(
@@ -125,10 +130,10 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
 
 
 def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
-    """The model's surface coloured by the distance of its nodes from the reference, whose outline is black.
+    """Return the model's surface coloured by its distance from the reference, whose outline is black.
 
-    Nodes without a surface, as markers are, become dots before the body that they were compared with. None where the
-    two are the same but for rounding.
+    Nodes without a surface, such as markers, are dots in front of the body that they were compared with. None if the
+    two differ by rounding only.
     """
     pair = _pair(result, comparison)
     mesh = comparison.model.problem.mesh
@@ -148,14 +153,14 @@ def distance_picture(result: Result, name: str, comparison: Comparison) -> Pictu
     title = f"{level_name(result, pair.level).capitalize()}: at most {bar.most} from {reference}"
     legend = (
         Entry(f"outline of {full_name(result, name)}", INK),
-        Entry("at rest", FAINT, linestyle=_DASHES),
+        Entry("undeformed", FAINT, linestyle=_DASHES),
         Entry("probe", RED, "o", ""),
     )
     return _pair_picture(result, name, comparison, pair, title, legend, (surface, black), bar)
 
 
 def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair) -> Picture:
-    """Nodes as dots in the colours of their distance, before the bodies that have a surface."""
+    """Return nodes as dots coloured by their distance, in front of the bodies that have a surface."""
     farthest = float(pair.distance.max())
     bar = bar_of(farthest, pair.largest)
     title = f"{level_name(result, pair.level).capitalize()}: at most {bar.most} from {display_name(result, name)}"
@@ -168,7 +173,7 @@ def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair
             layers.append(_solid(points, facets, _one_color(facets, _BODY), edges_of(facets), INK, 0.35))
     if not layers:
         layers.append(_wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
-    legend = (Entry("at rest", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
+    legend = (Entry("undeformed", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
     picture = _pair_picture(result, name, comparison, pair, title, legend, tuple(layers), bar)
     ends = np.concatenate(corners)[:, :2]
     margin = 0.03 * float(np.ptp(ends, axis=0).max())
@@ -220,7 +225,7 @@ def _pair_picture(
 
 
 def _solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, width: float) -> Layer:
-    """A lit surface with lines on it; colours of shape (n_facets, corners, 3)."""
+    """Return a lit surface with lines on it; colours of shape (n_facets, corners, 3)."""
     on, owners = lines_on(facets, lines)
     facing = normals(points, facets) @ _LIGHT
     lit = colors * (0.8 + 0.2 * facing.clip(0, 1))[:, None, None]
@@ -228,7 +233,7 @@ def _solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, 
 
 
 def _wires(points: Floats, facets: Ints, lines: Ints, width: float, ink: str = BLUE) -> Layer:
-    """Lines that lie on a surface, hidden where it is nearer; of a body without a surface, all lines."""
+    """Return lines on a surface, hidden behind nearer parts of it; of a body without a surface, all lines."""
     if not len(facets):
         return Layer(np.zeros((0, 3, 3)), None, points[lines], np.zeros((0, 2), int), ink, _thin(width, len(lines)))
     on, owners = lines_on(facets, lines)
@@ -236,7 +241,7 @@ def _wires(points: Floats, facets: Ints, lines: Ints, width: float, ink: str = B
 
 
 def _thin(width: float, count: int) -> float:
-    """Fine meshes in fine lines [points]."""
+    """Return a line width [points], smaller the more lines there are."""
     return width * min(1.0, max(0.3, float(np.sqrt(1200 / max(count, 1)))))
 
 
@@ -245,7 +250,7 @@ def _one_color(facets: Ints, color: str) -> Floats:
 
 
 def _tinted(problem: Problem, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
-    """Colours of the body as asked for: darker where it is clamped, those of the arrows where they act."""
+    """Return the colours of the undeformed body: darker where it is clamped, tinted where arrows act."""
     mesh = problem.mesh
     colors = _one_color(facets, _BODY).copy()
     clamped = clamped_nodes(problem)[facets].all(axis=1)
@@ -263,7 +268,7 @@ def _within(facets: Ints, nodes: Ints, n_nodes: int) -> Bools:
 
 
 def _spots(points: Floats, facets: Ints, lines: Ints) -> Floats:
-    """Places on paper that a body covers, close enough to see whether there is room beside it, shape (n, 2)."""
+    """Return points of the picture plane that a body covers [m], dense enough to find free corners, shape (n, 2)."""
     share = np.linspace(0, 1, 5 if len(facets) < 5000 else 2)
     if not len(facets):
         ends = points[lines, :2]

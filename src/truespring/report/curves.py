@@ -1,4 +1,4 @@
-"""curves.csv: displacement of the probe against force; reactions.csv: what supports that move need."""
+"""curves.csv: displacement of the probe and force; reactions.csv: forces and torques of moved supports."""
 
 import csv
 from pathlib import Path
@@ -11,10 +11,9 @@ from truespring.report.result import Result
 
 
 def write_curves(result: Result, file: Path) -> None:
-    """Write columns model, load_factor, ux, uy[, uz] [m], fx, fy[, fz] [N], a row per model and level.
+    """Write columns model, load_factor, ux, uy[, uz] [m], fx, fy[, fz] [N], one row per model and level.
 
-    Where a path goes through unstable states a last column, state, tells them: stable, unstable, or the kind of
-    critical point.
+    If a path has unstable states, a last column `state` is stable, unstable or the kind of critical point.
     """
     axes = AXES[: result.problem.mesh.dim]
     with file.open("w", newline="", encoding="utf-8") as stream:
@@ -25,7 +24,7 @@ def write_curves(result: Result, file: Path) -> None:
         columns = ["model", "load_factor", *(f"u{axis}" for axis in axes), *(f"f{axis}" for axis in axes)]
         table.writerow([*columns, *(["state"] if past else [])])
         for name, path in result.paths.items():
-            for state in path.states:  # + 0.0 writes no negative zero; what is not known stays empty
+            for state in path.states:  # + 0.0 turns a negative zero into zero; unknown values stay empty
                 moved, force = state.displacement[result.probe], path.applied_force(state)
                 table.writerow(
                     [
@@ -42,9 +41,9 @@ def write_curves(result: Result, file: Path) -> None:
 def write_reactions(result: Result, file: Path) -> None:
     """Write columns model, load_factor, support, on, ux, uy[, uz] [m], fx, fy[, fz] [N], [mx, my,] mz [N m], compared.
 
-    A row per model, level and support that is moved or turned, supports counted from 1 and called by what they are on:
-    the mean displacement of its nodes, its force on the body and its torque, see SupportForce. `compared` tells which
-    of both is compared with a reference: what does not vanish.
+    One row per model, level and moved support; supports are numbered from 1, `on` is their selection. u is the mean
+    displacement of the support's nodes, f and m are its force and torque on the body, see SupportForce. `compared`
+    names which of the two are compared with a reference: those that do not vanish.
     """
     axes = AXES[: result.problem.mesh.dim]
     letters = (("u", axes), ("f", axes), ("m", torque_axes(len(axes))))
@@ -56,8 +55,8 @@ def write_reactions(result: Result, file: Path) -> None:
             for state in path.states:
                 for one in path.support_forces(state):
                     moved = state.displacement[path.problem.held[one.support].nodes].mean(axis=0)
-                    told = (repr(float(value) + 0.0) for value in (*moved, *one.force, *one.torque))
+                    values = (repr(float(value) + 0.0) for value in (*moved, *one.force, *one.torque))
                     compared = " ".join(
                         what for what, there in (("force", one.has_force), ("torque", one.has_torque)) if there
                     )
-                    table.writerow([name, repr(float(state.load_factor)), one.support + 1, one.name, *told, compared])
+                    table.writerow([name, repr(float(state.load_factor)), one.support + 1, one.name, *values, compared])

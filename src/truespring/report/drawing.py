@@ -1,4 +1,4 @@
-"""Figures as files: sheets drawn in one style, kept as the bytes of their PNG and SVG files."""
+"""Figures as the bytes of PNG and SVG files, drawn in one style."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ Figures = dict[str, Sheet]
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure as the bytes of its two files, its title for those who cannot see it, and its width [inch].
+    """A figure as the bytes of its two files, with its title (the alternative text) and its width [inch].
 
-    `note` tells what a reader should know of how it was drawn, and is mostly empty.
+    `note` is a remark on how it was drawn, mostly empty.
     """
 
     png: bytes
@@ -26,13 +26,13 @@ class Drawing:
 
 
 def sheets(named: Iterable[tuple[str, Sheet]]) -> Figures:
-    """Return figures by name, drawn in the style of all figures."""
+    """Return figures by name, drawn in the common style."""
     with figure_style():
         return dict(named)
 
 
 def drawings(named: Iterable[tuple[str, Sheet]]) -> dict[str, Drawing]:
-    """Return figures as the bytes of their files, by name, drawn in the style of all figures."""
+    """Return figures as the bytes of their files, by name, drawn in the common style."""
     with figure_style():
         return {name: drawing_of(sheet) for name, sheet in named}
 
@@ -43,7 +43,7 @@ def drawing_of(sheet: Sheet, note: str = "") -> Drawing:
 
 
 def save_drawings(several: Mapping[str, Drawing], folder: Path) -> None:
-    """Write figures as PNG and SVG into a folder, made where it does not exist."""
+    """Write figures as PNG and SVG into a folder; create it if it does not exist."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, drawing in several.items():
         (folder / f"{name}.png").write_bytes(drawing.png)

@@ -1,6 +1,6 @@
 """The figures of a study: springs over FEM, curves, errors and moduli, as PNG and SVG.
 
-Matplotlib is imported where it is needed, and only through its objects: no window, no global state.
+Matplotlib's objects are used directly, without pyplot: no window, no global state.
 """
 
 import re
@@ -12,14 +12,14 @@ from truespring.report.bodies import distance_figure, over_figure, undeformed_fi
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
 from truespring.report.drawing import Drawing, drawing_of, save_drawings
 from truespring.report.frame3d import figure_of, shot
-from truespring.report.plots import curves_figure, error_figure, moduli_figure, reactions_figure, tells_reactions
+from truespring.report.plots import curves_figure, error_figure, has_reactions, moduli_figure, reactions_figure
 from truespring.report.render import render
 from truespring.report.result import Result
 from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
 from truespring.report.undeformed import Undeformed, undeformed_of
 
-# A Result does not change, and its files and its pages show the same pictures: they are drawn once.
+# Figures of a result, drawn once for its files and its page.
 _DRAWN: "WeakKeyDictionary[Result, dict[str, Drawing]]" = WeakKeyDictionary()
 
 
@@ -38,14 +38,14 @@ def render_figures(result: Result) -> dict[str, Drawing]:
 
 
 def save_figures(result: Result, folder: Path) -> dict[str, Drawing]:
-    """Write every figure as PNG and SVG into `folder`, made where it is not there; return what was written."""
+    """Write every figure as PNG and SVG into `folder`, created if it does not exist; return the figures."""
     drawings = render_figures(result)
     save_drawings(drawings, folder)
     return drawings
 
 
 def save_undeformed(body: Undeformed, file: Path) -> None:
-    """Write the picture of a body before it moves as a PNG file."""
+    """Write the picture of an undeformed body as a PNG file."""
     with figure_style():
         if body.problem.mesh.dim == 2:
             sheet = undeformed_figure(body)
@@ -57,12 +57,12 @@ def save_undeformed(body: Undeformed, file: Path) -> None:
 
 
 def over_name(result: Result, reference: str) -> str:
-    """Return the stem of the figure of the model over a reference: path-safe, whatever the models are called."""
+    """Return the file stem of the figure of the model over a reference; safe in paths for any names of models."""
     return _safe(f"{result.model}_over_{reference}")
 
 
 def distance_name(result: Result, reference: str) -> str:
-    """Return the stem of the figure of the model coloured by its distance from a reference."""
+    """Return the file stem of the figure of the model coloured by its distance from a reference."""
     return _safe(f"{result.model}_error_{reference}")
 
 
@@ -70,16 +70,16 @@ def _safe(name: str) -> str:
     return re.sub(r"[^\w.-]+", "-", name)
 
 
-# A figure, the stem of the names of its files, and what a reader should know of how it was drawn.
+# The stem of file names, the figure, and a remark on how it was drawn.
 _Named = tuple[str, Sheet, str]
 
 
 def _draw(result: Result) -> Iterator[_Named]:
-    """Yield every figure; plots first, since a child draws what bodies in 3D look like meanwhile."""
+    """Yield every figure; plots first, while a child process renders bodies in 3D."""
     bodies = _bodies_in_space(result) if result.problem.mesh.dim == 3 else lambda: _plane_bodies(result)
     if any(len(path.states) > 1 for path in result.paths.values()):
         yield "curves", curves_figure(result), ""
-        if tells_reactions(result):
+        if has_reactions(result):
             yield "reactions", reactions_figure(result), ""
     if any(one.load_factors.size for one in result.comparisons.values()):
         yield "error", error_figure(result), ""

@@ -1,4 +1,4 @@
-"""The frame of a plot: grid, ticks, numbers and labels in few artists, many times faster than matplotlib's own."""
+"""The frame of a plot: grid, ticks, numbers and labels in few artists, many times faster than matplotlib's axes."""
 
 from collections.abc import Sequence
 
@@ -10,15 +10,15 @@ from truespring.report.sheet import Area, Sheet
 from truespring.report.style import POINT
 from truespring.report.words import draw_words, text_width
 
-#: The colours of grids and of axes, and the size of their numbers [points].
+#: Colours of grids and axes, and font size of numbers [points].
 GRID, EDGE, SIZE = "#e3e6e9", "#5b6168", 8.5
 
-# A tick, from a row of words to the next, the height of a bar [inch].
+# Length of a tick, distance of text rows, height of a bar [inch].
 _TICK, _ROW, _BAR = 3.5 * POINT, 14 * POINT, 0.09
 
 
 def draw_frame(area: Area, x_label: str, y_label: str) -> None:
-    """Draw grid, axes, ticks and numbers about an area, and what the numbers stand for."""
+    """Draw grid, axes, ticks, numbers and labels of an area."""
     sheet, left, bottom = area.sheet, area.left, area.bottom
     right, top = left + area.width, bottom + area.height
     x, x_numbers = _places(area.x, left, right)
@@ -41,7 +41,7 @@ def draw_frame(area: Area, x_label: str, y_label: str) -> None:
 def draw_bar(
     sheet: Sheet, left: float, top: float, width: float, colors: Floats, shares: Floats, numbers: Sequence[str]
 ) -> None:
-    """Draw a bar of colours, shape (n, 3), from its upper left corner on [inch], with numbers below at `shares`."""
+    """Draw a colour bar, shape (n, 3), at its upper left corner [inch], with numbers below at `shares` of its width."""
     bottom = top - _BAR
     sheet.add_image(colors[None], left, bottom, width, _BAR, 3, "bar")
     corners = np.array([(left, bottom), (left + width, bottom), (left + width, top), (left, top)])
@@ -53,14 +53,14 @@ def draw_bar(
 
 
 def _places(limits: tuple[float, float], start: float, end: float) -> tuple[Floats, list[str]]:
-    """Where between `start` and `end` the round numbers between two limits stand, and the numbers in writing."""
+    """Return the places of round numbers within `limits` between `start` and `end`, shape (n,), and their text."""
     low, high = limits
     values = round_numbers(low, high)
     return start + (values - low) / (high - low) * (end - start), written(values)
 
 
 def round_numbers(low: float, high: float, intervals: int = 6) -> Floats:
-    """Return evenly spaced round numbers from `low` to `high`, no more than `intervals` apart."""
+    """Return evenly spaced round numbers from `low` to `high`, at most `intervals` + 1 of them, shape (n,)."""
     from matplotlib.ticker import MaxNLocator
 
     values = np.asarray(MaxNLocator(intervals, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
@@ -69,10 +69,10 @@ def round_numbers(low: float, high: float, intervals: int = 6) -> Floats:
 
 
 def written(values: Floats) -> list[str]:
-    """Return evenly spaced numbers in writing, all with as many decimals as tell them apart."""
+    """Return evenly spaced numbers as text, all with as many decimals as distinguish them."""
     step = float(np.ptp(values)) / max(len(values) - 1, 1)
     largest = float(np.abs(values).max())
     decimals = next((n for n in range(7) if abs(round(step, n) - step) <= 1e-6 * step), None)
     form = "g" if decimals is None or largest >= 1e7 else f".{decimals}f"
-    hair = 1e-9 * step  # what is nothing but rounding is written as zero, without a sign
+    hair = 1e-9 * step  # rounding errors are written as 0, without sign
     return [f"{0.0 if abs(value) < hair else value:{form}}".replace("-", "\N{MINUS SIGN}") for value in values]

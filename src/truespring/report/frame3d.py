@@ -1,4 +1,4 @@
-"""The frame of a picture in 3D: an image with a title, a legend, a triad that is its scale, and a bar of colours."""
+"""The frame of a picture in 3D: an image with title, legend, colour bar, and a triad of axes that shows the scale."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from truespring.report.style import LOAD, POINT
 from truespring.report.surfaces import VIEW
 from truespring.report.words import draw_words, text_width
 
-# Images are this fine [pixels an inch]: finer than the PNG that they become a part of.
+# Resolution of images [pixels/inch], finer than the PNG that holds them.
 _DPI = 200
 
 _TRIAD = "#3d4248"
@@ -27,16 +27,16 @@ Marks = Callable[[Area, Scale], None]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Picture:
-    """A picture of a body in 3D before its image is there.
+    """A picture of a body in 3D, without its image.
 
     Attributes:
-        title, remark: the words on top; the remark may be empty.
-        legend: what lines stand for.
-        lower, upper: the corners of what is shown, right and up [m], shape (2,).
-        taken: places on paper where something is drawn [m], shape (n, 2).
-        layers: what the image shows.
-        marks: what is drawn over the image and, with a low zorder, behind it.
-        bar: the colours of the image, if they stand for numbers.
+        title, remark: the text above; the remark may be empty.
+        legend: entries for the lines.
+        lower, upper: the corners of the box shown, right and up [m], shape (2,).
+        taken: points of the picture plane where something is drawn [m], shape (n, 2).
+        layers: the content of the image.
+        marks: draws over the image and, with a low zorder, behind it.
+        bar: the colour bar, if colours stand for numbers.
     """
 
     title: str
@@ -50,20 +50,20 @@ class Picture:
     bar: Bar | None = None
 
 
-# Inches around the image, and of the triad beyond its arms.
+# Margins of the image, and room for the labels of the triad [inch].
 _SIDE, _BOTTOM, _TOP, _WORDS = 0.12, 0.06, 0.32, 0.17
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Layout:
-    """Where things are on paper.
+    """Places and sizes on paper.
 
     Attributes:
         width, height: of the image [inch].
-        top: what words take above it [inch].
-        lower, upper: the corners of what is shown, right and up [m], shape (2,).
+        top: height of the text above it [inch].
+        lower, upper: the corners of the box shown, right and up [m], shape (2,).
         columns: of the legend.
-        arm, origin: length of the arms of the triad and where they start, right and up [m].
+        arm, origin: length of the arms of the triad and their common start, right and up [m].
     """
 
     width: float
@@ -85,7 +85,7 @@ def _layout(picture: Picture) -> _Layout:
     inch = float(max(extent[0] / 5.4, extent[1] / 4.4))  # [m] on paper
     arm = _round_length(0.15 * float(extent.max()))
     lower, upper, origin = _triad_place(picture, arm, _WORDS * inch)
-    # A narrow body leaves room for the words: the box grows sideways.
+    # If the text is wider than the body, widen the box.
     broad = max(float(upper[0] - lower[0]) / inch, 3.3, words + 0.05)
     wider = (broad * inch - (upper[0] - lower[0])) / 2 * np.array([1.0, 0.0])
     lower, upper = lower - wider, upper + wider
@@ -93,13 +93,13 @@ def _layout(picture: Picture) -> _Layout:
 
 
 def _round_length(most: float) -> float:
-    """The largest of 1, 2, 5, 10, 20, ... times a power of ten that is not above `most`."""
+    """Return the largest of 1, 2, 5, 10, 20, ... times a power of ten that is not above `most`."""
     power = 10.0 ** np.floor(np.log10(most))
     return float(max(digit * power for digit in (1, 2, 5) if digit * power <= most * (1 + 1e-9)))
 
 
 def _triad_place(picture: Picture, arm: float, words: float) -> tuple[Floats, Floats, Floats]:
-    """Where the triad starts: in a corner that nothing else takes, else in a strip below; and the box with it [m]."""
+    """Return lower and upper corner of the box and the origin of the triad [m], in a free corner or a strip below."""
     tips = np.concatenate([arm * VIEW[:2].T, np.zeros((1, 2))])
     low, high = tips.min(axis=0) - words * np.array([1.2, 2.0]), tips.max(axis=0) + words * np.array([1.2, 1.0])
     lower, upper = picture.lower, picture.upper
@@ -113,18 +113,18 @@ def _triad_place(picture: Picture, arm: float, words: float) -> tuple[Floats, Fl
 
 
 def shot(picture: Picture) -> Shot:
-    """Return what the image of a picture is to show."""
+    """Return the job to render the image of a picture."""
     at = _layout(picture)
     pixels = (round(at.width * _DPI), round(at.height * _DPI))
     return Shot(picture.layers, at.lower, at.upper, pixels, _DPI / 72)
 
 
 def figure_of(picture: Picture, image: Image) -> Sheet:
-    """Return a picture with its image."""
+    """Return the figure of a picture and its image."""
     at = _layout(picture)
     scale = natural_scale(float(np.abs(picture.upper - picture.lower).max()), "m")
-    told = f"{picture.title}; {picture.remark}" if picture.remark else picture.title
-    sheet = Sheet(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top, told)
+    description = f"{picture.title}; {picture.remark}" if picture.remark else picture.title
+    sheet = Sheet(_SIDE + at.width + _SIDE, _BOTTOM + at.height + at.top, description)
     (left, bottom), (right, top) = at.lower / scale.size, at.upper / scale.size
     area = Area(sheet, _SIDE, _BOTTOM, at.width, at.height, (left, right), (bottom, top))
     sheet.add_image(image, _SIDE, _BOTTOM, at.width, at.height, 3, "image")
@@ -140,7 +140,7 @@ def figure_of(picture: Picture, image: Image) -> Sheet:
 
 
 def _draw_triad(area: Area, at: _Layout, scale: Scale) -> None:
-    """Draw arms along x, y and z, each as long as is written beside them."""
+    """Draw arms along x, y and z with their common length."""
     origin = area.place(at.origin / scale.size)
     tips = area.place((at.origin + at.arm * VIEW[:2].T) / scale.size)
     for tip, name in zip(tips, "xyz", strict=True):
@@ -148,5 +148,5 @@ def _draw_triad(area: Area, at: _Layout, scale: Scale) -> None:
         x, y = tip + 6 * POINT * (tip - origin) / np.linalg.norm(tip - origin)
         draw_words(area.sheet, x, y, name, align=0.5)
     lowest = float(min(origin[1], *tips[:, 1]))
-    told = f"each {quantity(at.arm, 'm', 1)}"
-    draw_words(area.sheet, origin[0], lowest - 11 * POINT, told, 7.5, _TRIAD, align=0.5)
+    length = f"each {quantity(at.arm, 'm', 1)}"
+    draw_words(area.sheet, origin[0], lowest - 11 * POINT, length, 7.5, _TRIAD, align=0.5)

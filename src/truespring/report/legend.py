@@ -1,4 +1,4 @@
-"""Legends above a picture: many times faster than matplotlib's own, and in as few rows as the room allows."""
+"""Legends above a picture, in as few rows as the width allows; many times faster than matplotlib's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ ROW = 0.18
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A line of a legend: what it stands for, its colour and its mark."""
+    """An entry of a legend: its text, colour, marker and line style."""
 
     text: str
     color: str
@@ -25,7 +25,7 @@ class Entry:
 
 
 def legend_columns(entries: Sequence[Entry], room: float) -> tuple[list[Sequence[Entry]], float]:
-    """Return a legend in columns, of the fewest rows that `room` [inch] allows, and how wide it is [inch]."""
+    """Return a legend in columns, with as few rows as a width of `room` [inch] allows, and its width [inch]."""
     columns: list[Sequence[Entry]] = []
     width = 0.0
     for rows in range(1, len(entries) + 1):

@@ -1,4 +1,4 @@
-"""Lines on a sheet, many as one path: fast to draw, and one element of an SVG however many they are; and arrows."""
+"""Lines on a sheet, all in one path, which is fast and one element of an SVG; and arrows."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from truespring.report.style import POINT
 
 
 def draw_lines(on: Sheet | Area, ends: Floats, color: str, width: float, zorder: float, name: str, **more: Any) -> None:
-    """Draw lines between `ends`, shape (n, 2, 2); `width` in points. `name` is how an SVG calls them."""
+    """Draw lines between `ends`, shape (n, 2, 2), of a width [points]; `name` is their id in an SVG."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -20,7 +20,7 @@ def draw_lines(on: Sheet | Area, ends: Floats, color: str, width: float, zorder:
 
 
 def draw_arrow(sheet: Sheet, tail: Floats, tip: Floats, color: str, width: float, head: float) -> None:
-    """Draw an arrow between two places [inch] in a line of a width, with a head of a length [points]."""
+    """Draw an arrow between two points [inch], with line width and length of the head [points]."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 

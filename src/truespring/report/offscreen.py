@@ -10,16 +10,16 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.report.render import Image, Layer, Shot, inked, read_job, stacked
 
-# Drawn so many times as large and averaged: lines without steps on every graphics library.
+# Images are drawn larger by this factor and averaged, which smooths lines on every graphics library.
 _FINER = 2
 
-# Lines stand this share of the picture's size nearer to the eye than the faces that they lie on.
+# Lines are drawn nearer to the viewer than the faces they lie on, by this share of the picture's size.
 _LIFT = 1.5e-3
 
 
 def main(job: str, answer: str) -> None:
     """Draw every shot of a job into an .npz file of images."""
-    if sys.platform == "linux":  # else VTK complains that there is no display before it goes without
+    if sys.platform == "linux":  # else VTK warns that there is no display before it uses EGL
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     images = [stacked([_draw_layer(layer, shot) for layer in shot.layers]) for shot in read_job(Path(job))]
     named: dict[str, Any] = {f"image_{number}": image for number, image in enumerate(images)}
@@ -27,7 +27,7 @@ def main(job: str, answer: str) -> None:
 
 
 def _draw_layer(layer: Layer, shot: Shot) -> Image:
-    """An image of a layer; of faces that are not to be seen in black, with lines in white: what lines cover."""
+    """Return the image of a layer; faces without colours are black and lines white, as a mask of the lines."""
     import pyvista
 
     filled = layer.colors is not None
@@ -70,9 +70,9 @@ def _strokes(ends: Floats) -> Any:
 
 
 def _look(plotter: Any, layer: Layer, shot: Shot) -> None:
-    """Look along the third direction, in parallel, at the box of the shot."""
+    """Set a parallel camera that looks along the third axis at the box of the shot."""
     width, height = shot.upper - shot.lower
-    room = 3 * max(width, height)  # before and behind what is in the box: a body that ran away is cut off
+    room = 3 * max(width, height)  # in front of and behind what is in the box; parts far away are clipped
     points = np.concatenate([layer.faces.reshape(-1, 3), layer.lines.reshape(-1, 3)])
     shown = ((points[:, :2] >= shot.lower) & (points[:, :2] <= shot.upper)).all(axis=1)
     depths = points[shown, 2] if shown.any() else np.zeros(1)
@@ -87,7 +87,7 @@ def _look(plotter: Any, layer: Layer, shot: Shot) -> None:
 
 
 def _coarser(picture: Any) -> Image:
-    """Average blocks of pixels."""
+    """Return an image averaged over blocks of pixels."""
     total = np.zeros_like(picture[::_FINER, ::_FINER], dtype=np.uint16)
     for row, column in np.ndindex(_FINER, _FINER):
         total += picture[row::_FINER, column::_FINER]

@@ -1,4 +1,4 @@
-"""Numbers as base64, for a page."""
+"""Arrays as base64, for a page."""
 
 import base64
 
@@ -8,9 +8,9 @@ from truespring.arrays import Floats, Ints
 
 
 class Packing:
-    """Places in 65536 steps of a box, far below a pixel, and pairs or triples of the nodes that are kept.
+    """Pack positions in 65536 steps of a box, far below a pixel, and node numbers of the nodes that are kept.
 
-    Places beyond the box are written as single precision numbers of the same steps.
+    Positions beyond the box are packed as single precision numbers of the same steps.
     """
 
     def __init__(self, lower: Floats, extent: float, nodes: Ints, n_nodes: int) -> None:
@@ -24,24 +24,24 @@ class Packing:
         return 65535 * length / self.extent
 
     def number(self, node: int) -> int:
-        """Return the place of a node among those that are kept."""
+        """Return the index of a node among those that are kept."""
         return int(self._number[node])
 
     def places(self, positions: Floats, beyond: bool = False) -> str:
-        """Pack the positions of the nodes that are kept; of all nodes, shape (n_nodes, dim) [m]."""
+        """Pack the positions of the nodes that are kept, from those of all nodes [m], shape (n_nodes, dim)."""
         return self.points(positions[self.nodes], beyond)
 
     def points(self, points: Floats, beyond: bool = False) -> str:
-        """Pack points that are no nodes [m], shape (n, dim)."""
+        """Pack any points [m], shape (n, dim)."""
         steps = 65535 * (points - self.lower) / self.extent
         return _base64(steps.astype("<f4") if beyond else np.rint(steps).astype("<u2"))
 
     def pairs(self, lines: Ints) -> str:
-        """Pack node numbers, shape (n, k), as places among the nodes that are kept."""
+        """Pack node numbers, shape (n, k), as indices among the nodes that are kept."""
         return self.numbers(self._number[lines])
 
     def numbers(self, values: Ints) -> str:
-        """Pack numbers as they are."""
+        """Pack integers unchanged."""
         return _base64(values.astype("<u4"))
 
 

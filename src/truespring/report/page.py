@@ -1,4 +1,4 @@
-"""report.html: one file, self-contained, that tells and shows what one or several studies found."""
+"""report.html: one self-contained file with the results of one or several studies."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
 from truespring.problem import Problem, Region
 from truespring.report.figures import distance_name, over_name, render_figures
-from truespring.report.quantity import given, percent, quantity, significant, tolerance_percent
+from truespring.report.quantity import input_quantity, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.shell import picture, render
 from truespring.report.standing import own_errors
@@ -37,21 +37,21 @@ from truespring.report.verdict import (
 )
 from truespring.report.viewer import viewer
 
-#: Numbers that the viewers of one page may hold together: about a megabyte.
+# Largest number of values in all interactive views of a page, about a megabyte.
 _BUDGET = 400_000
 
 
-def write_page(results: Sequence[Result], file: Path, command: str) -> None:
-    """Write one page over `results`; `command` is what runs them again."""
+def write_page(results: Sequence[Result], file: Path, command: str | None) -> None:
+    """Write one page on `results`; `command` is the command line that repeats the run."""
     file.write_text(render_page(results, command), encoding="utf-8")
 
 
-def render_page(results: Sequence[Result], command: str) -> str:
-    """Return the page as HTML: it loads nothing from anywhere."""
+def render_page(results: Sequence[Result], command: str | None) -> str:
+    """Return the page as HTML."""
     studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
     what, several = ("comparison", "comparisons") if results[0].in_detail else ("study", "studies")
-    turning = any(study["viewer"] and study["in_space"] for study in studies)
-    scene = ("report/scene.min.js",) if turning else ()
+    has_3d_view = any(study["viewer"] and study["in_space"] for study in studies)
+    scene = ("report/scene.min.js",) if has_3d_view else ()
     return render(
         "report/page.html.j2",
         command,
@@ -72,7 +72,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "id": f"study-{place}",
         "title": result.title,
         "verdict": verdict_sentences(result),
-        "more": [text for say in _SENTENCES if (text := say(result))],
+        "more": [text for sentence in _SENTENCES if (text := sentence(result))],
         "converged": result.converged,
         "closest": display_name(result, nearest) if nearest else None,
         "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
@@ -116,10 +116,10 @@ _SENTENCES = (carrying_sentence, closest_sentence, cause_sentence, force_sentenc
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
-    """What was asked, in words."""
+    """Return name and text of the data of a study: body, mesh, material, loads, probe."""
     problem = result.problem
     mesh = problem.mesh
-    size = " × ".join(given(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
+    size = " × ".join(input_quantity(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
     facts = [
         ("body", size),
         ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.kinds})"),
@@ -128,35 +128,37 @@ def _facts(result: Result) -> list[tuple[str, str]]:
         facts.append(("material", _material_words(problem.material)))
     facts += [_region_fact(problem, region) for region in problem.regions]
     if problem.section is not None and problem.section.key:
-        facts.append(("section", f"{problem.section.words}, {given(problem.section.thickness, 'm')} thick"))
+        facts.append(("section", f"{problem.section.words}, {input_quantity(problem.section.thickness, 'm')} thick"))
     facts += _drive_facts(problem)
     facts += _element_facts(result)
-    at = ", ".join(given(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
+    at = ", ".join(input_quantity(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
     facts.append(("probe", f"node {result.probe} at ({at}), the red dot"))
     return facts
 
 
 def _element_facts(result: Result) -> list[tuple[str, str]]:
-    """Elements of FEM that are not linear ones."""
+    """Return the kinds of finite elements that are not linear ones."""
     used = {path.element for path in result.paths.values()}
-    told = {
-        "mean-dilatation": "of mean dilatation, which do not lock where the material is nearly incompressible",
-        "quadratic": "of second order, with nodes in the middle of the edges",
-        "quadratic-mean-dilatation": "of second order and mean dilatation, which do not lock where the material is "
-        "nearly incompressible",
+    kinds = {
+        "mean-dilatation": "mean dilatation, which does not lock in nearly incompressible material",
+        "quadratic": "second order, with mid-side nodes",
+        "quadratic-mean-dilatation": "second order with mean dilatation, which does not lock in nearly incompressible "
+        "material",
     }
-    return [("finite elements", words) for name, words in told.items() if name in used]
+    return [("finite elements", words) for name, words in kinds.items() if name in used]
 
 
 def _material_words(material: Material) -> str:
-    return f"Young’s modulus {given(material.young, 'Pa')}, Poisson’s ratio {material.poisson:.4g}"
+    return f"Young’s modulus {input_quantity(material.young, 'Pa')}, Poisson’s ratio {material.poisson:.4g}"
 
 
 def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
-    """A part of another material: the group's name, or where it lies."""
+    """Return a part of another material: the name of its group, or the corners of its box."""
     named = region.on if isinstance(region.on, str) else "elements by number"
     if isinstance(region.on, Box):
-        corners = (", ".join(given(value, "m") for value in corner) for corner in (region.on.lower, region.on.upper))
+        corners = (
+            ", ".join(input_quantity(value, "m") for value in corner) for corner in (region.on.lower, region.on.upper)
+        )
         named = " to ".join(f"({corner})" for corner in corners)
     count = len(select_elements(problem.mesh, region.on))
     return "region", f"{named}, {count} element{'s' * (count != 1)}: {_material_words(region.material)}"
@@ -165,37 +167,37 @@ def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
 def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
     """Return each support and load, the total force, and the largest prescribed motion."""
     if not problem.stated:
-        return [("loads and supports", "not stated in the file")]
+        return [("loads and supports", "not in the file")]
     facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
     facts += [("load", load.words()) for load in problem.loads]
     total = problem.loading.force(problem.mesh.nodes).sum(axis=0)
     if not problem.loading.driven_by_motion:
-        facts.append(("total force", f"({', '.join(given(float(value), 'N') for value in total)})"))
+        facts.append(("total force", f"({', '.join(input_quantity(float(value), 'N') for value in total)})"))
     motion = problem.loading.motion()
     if motion.any():
         moved = int(motion.any(axis=1).sum())
-        largest = given(float(np.linalg.norm(motion, axis=1).max()), "m")
+        largest = input_quantity(float(np.linalg.norm(motion, axis=1).max()), "m")
         facts.append(("prescribed motion", f"up to {largest}, at {moved} nodes"))
     return facts
 
 
 def _in_short(result: Result) -> str:
-    """The facts that tell one study from another, in a line."""
+    """Return the main data of a study in one line."""
     words = dict(_facts(result))
     problem = result.problem
     parts = [words["body"]]
     if problem.material is not None:
-        parts.append(f"E = {given(problem.material.young, 'Pa')}, ν = {problem.material.poisson:.4g}")
+        parts.append(f"E = {input_quantity(problem.material.young, 'Pa')}, ν = {problem.material.poisson:.4g}")
     parts += [words[name] for name in ("section",) if name in words]
     n_regions = len(problem.regions)
     parts += [f"{n_regions} region{'s' * (n_regions != 1)} of another material"] if n_regions else []
     parts += [f"{name} {words[name]}" for name in ("total force", "prescribed motion") if name in words]
-    parts += ["loads and supports not told"] if not problem.stated else []
+    parts += ["loads and supports not in the file"] if not problem.stated else []
     return " · ".join([*parts, f"{len(problem.mesh.elements)} elements"])
 
 
 def _measures(result: Result) -> list[str]:
-    """The errors of the comparison table, in the order of _comparison_row; the force where supports move."""
+    """Return the names of the errors in the order of `_comparison_row`, with the force if supports move."""
     forced = any(one.force_error is not None for one in result.comparisons.values())
     return ["root mean square", "at the probe", "largest", *(["force"] if forced else [])]
 
@@ -214,17 +216,17 @@ def _comparison_row(result: Result, name: str) -> dict[str, Any]:
 
 
 def _apart(one: Comparison, in_detail: bool) -> Iterator[str]:
-    """Distances in metres, and of energies, beside the relative errors of a comparison."""
+    """Yield distances [m] and the error of the stored energy of a comparison."""
     if in_detail and one.load_factors.size and one.compared.any():
         rms, most = (float(several[-1]) for several in (one.rms_distances, one.max_distances))
-        yield f"nodes {quantity(rms, 'm', 2)} apart (root mean square), {quantity(most, 'm', 2)} at most"
+        yield f"distance of nodes {quantity(rms, 'm', 2)} (root mean square), {quantity(most, 'm', 2)} at most"
     if one.surface is not None:
         outlines = quantity(one.surface.outline_rms, "m", 2), quantity(one.surface.outline_max, "m", 2)
-        yield "outlines {} apart, {} at most".format(*outlines)
-        yield f"nodes {quantity(one.surface.nodes_rms, 'm', 2)} from the nearest of the file"
+        yield "distance of outlines {}, {} at most".format(*outlines)
+        yield f"distance of nodes to the nearest of the file {quantity(one.surface.nodes_rms, 'm', 2)}"
     elif in_detail and one.hausdorff is not None:
         surfaces = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
-        yield "surfaces {} apart, {} at most (Hausdorff)".format(*surfaces)
+        yield "distance of surfaces {}, {} at most (Hausdorff)".format(*surfaces)
     if in_detail and one.energy_error is not None:
         yield f"stored energy {percent(one.energy_error)} off"
 
@@ -234,7 +236,7 @@ def _share(error: float | None) -> str:
 
 
 def _model_row(name: str, path: Solution) -> dict[str, Any]:
-    """What a path cost and how sound it is; a dash where it was read, not solved."""
+    """Return cost, status and stability of a path; a dash for what a path from a file does not have."""
     solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
     areas = [] if path.is_cloud else [state.area_ratio for state in path.states]
@@ -259,7 +261,7 @@ def _model_row(name: str, path: Solution) -> dict[str, Any]:
 
 
 def _effort(path: Solution) -> str | None:
-    """By which choices a path was solved, what they cost, and where a first choice was given up."""
+    """Return solvers and iterations of a path, and notes on solvers that were replaced."""
     cost = path.cost
     if cost is None:
         return None
@@ -279,7 +281,7 @@ def _stability(path: Solution) -> str:
         first = next(state.load_factor for state in path.states if state.negative_eigenvalues)
         return f"unstable at {first:.4g}"
     if None in counts:
-        return "not proven"
+        return "not checked"
     return "stable, after buckling" if any(state.branched for state in path.states) else "stable"
 
 
@@ -291,7 +293,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
         "sentence": moduli_sentence(path),
         "fit": result.fitness[name].fit if name in result.fitness else None,
         "judged": result.fitness[name].sentence if name in result.fitness else "",
-        "wanted": material_name(result) + (", outside its regions" if result.problem.regions else ""),
+        "material": material_name(result) + (", outside its regions" if result.problem.regions else ""),
         "rows": _moduli_rows(moduli),
         "elements": linear_fem(path).removeprefix("linear "),
         "bending": [
@@ -307,7 +309,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
 
 
 def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
-    """What springs realise beside what is wanted of them."""
+    """Return name, effective value of the springs and value of the material of each modulus."""
     plane = moduli.dim == 2
     youngs = [("along x", moduli.young()), *([("at 45°", moduli.young(45))] if plane else [])]
     poissons = [("along x", moduli.poisson()), *([("at 45°", moduli.poisson(45))] if plane else [])]
@@ -325,11 +327,11 @@ def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
 
 
 def _section_note(problem: Problem) -> str | None:
-    """In plane strain, where the wanted moduli come from."""
+    """Return for plane strain how the moduli within the plane follow from those of the material; else None."""
     if problem.material is None or problem.section is None or not problem.section.moduli_words:
         return None
     young, poisson = problem.section.apparent_moduli(problem.material)
     seen = f"E/(1 − ν²) = {quantity(young, 'Pa')} and ν/(1 − ν) = {poisson:.3f}"
-    own = f"E = {given(problem.material.young, 'Pa')} and ν = {problem.material.poisson:.4g}"
-    unbroken = re.sub(r" (?=[−=])|(?<=[−=]) ", "\N{NO-BREAK SPACE}", f"{seen}: the material’s own are {own}")
-    return f"In plane strain a test within the plane finds {unbroken}."
+    own = f"E = {input_quantity(problem.material.young, 'Pa')} and ν = {problem.material.poisson:.4g}"
+    unbroken = re.sub(r" (?=[−=])|(?<=[−=]) ", "\N{NO-BREAK SPACE}", f"{seen}; those of the material are {own}")
+    return f"In plane strain the moduli within the plane are {unbroken}."

@@ -22,7 +22,7 @@ from truespring.report.young import Known, young_figure
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve of a plot, shape (n,) each; a new line in its label begins a fainter second part."""
+    """A line of a plot, shape (n,) each; text after a line break in its label is fainter."""
 
     x: Floats
     y: Floats
@@ -36,9 +36,9 @@ class Curve:
 
 
 def curves_figure(result: Result) -> Sheet:
-    """Displacement of the probe against the force, both along the direction that drives the body.
+    """Return the displacement of the probe against the force, both along the main direction of the loads or motion.
 
-    Against the load factor where loads have no total, as a moment has none.
+    Against the load factor if the loads have no total, such as a moment.
     """
     to, balanced = drive(result), _is_balanced(result)
     styles = path_styles(result)
@@ -72,7 +72,7 @@ def curves_figure(result: Result) -> Sheet:
 
 
 def _is_balanced(result: Result) -> bool:
-    """Whether the force has no total: loads or reactions that cancel, or it is not known of a path."""
+    """Return whether the force has no total: loads or reactions cancel, or are unknown for a path."""
     forces = np.array([path.applied_force(path.states[-1]) for path in result.paths.values() if path.states])
     if not np.isfinite(forces).all() or (not result.problem.stated and not forces.any()):
         return True
@@ -86,13 +86,13 @@ def _is_balanced(result: Result) -> bool:
 
 
 def _of_leading(path: Solution, state: State) -> SupportForce | None:
-    """Force and torque of the support that moves most, None where they are not known."""
+    """Return force and torque of the support that moves most; None if unknown."""
     number = leading_support(path.problem) if path.problem.stated else None
     return next((one for one in path.support_forces(state) if one.support == number), None)
 
 
-def tells_reactions(result: Result) -> bool:
-    """Whether what moved supports take is a figure of its own: beside loads, and where one is turned."""
+def has_reactions(result: Result) -> bool:
+    """Return whether forces of moved supports have a figure: if loads act too, or a support is rotated."""
     problem = result.problem
     moved = moved_supports(problem)
     if not any(path.support_forces(state) for path in result.paths.values() for state in path.states[:1]):
@@ -101,32 +101,32 @@ def tells_reactions(result: Result) -> bool:
 
 
 def reactions_figure(result: Result) -> Sheet:
-    """What the support takes that is moved most: its force along its way, or its torque where it is only turned."""
+    """Return force against displacement of the support that moves most, or torque against angle if it only rotates."""
     number = leading_support(result.problem)
-    assert number is not None  # tells_reactions
+    assert number is not None  # has_reactions
     held = result.problem.held[number]
     turned = held.turn is not None and not held.motion.any()
     styles = path_styles(result)
     forces, moves = {}, {}
     for name, path in result.paths.items():
         both = [(state, _of_leading(path, state)) for state in path.states]
-        told = [(state, one) for state, one in both if one is not None]
-        if not told:
+        known = [(state, one) for state, one in both if one is not None]
+        if not known:
             continue
-        factors = np.array([state.load_factor for state, _ in told])
+        factors = np.array([state.load_factor for state, _ in known])
         if turned and held.turn is not None:
             axis = held.turn.axis if result.problem.mesh.dim == 3 else np.ones(1)
-            forces[name] = np.array([float(one.torque @ axis) for _, one in told])
+            forces[name] = np.array([float(one.torque @ axis) for _, one in known])
             moves[name] = factors * np.degrees(held.turn.angle)
         else:
             way = held.motion / np.linalg.norm(held.motion)
-            forces[name] = np.array([float(one.force @ way) for _, one in told])
+            forces[name] = np.array([float(one.force @ way) for _, one in known])
             moves[name] = factors * np.linalg.norm(held.motion)
     unit, letter = ("N m", "torque") if turned else ("N", "force")
     x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), unit)
     y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
     size, name_of_y = (
-        (1.0, "turn [degrees]") if turned else (y_scale.size, f"displacement along its way [{y_scale.unit}]")
+        (1.0, "rotation [degrees]") if turned else (y_scale.size, f"displacement of the support [{y_scale.unit}]")
     )
     curves = [
         Curve(
@@ -139,12 +139,12 @@ def reactions_figure(result: Result) -> Sheet:
         for name in forces
     ]
     several = len(moved_supports(result.problem)) > 1
-    title = f"What it takes to move support {number + 1}" if several else "What it takes to move the support"
+    title = f"{letter.capitalize()} of {f'support {number + 1}' if several else 'the moved support'}"
     return plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
 
 
 def error_figure(result: Result) -> Sheet:
-    """Error against every reference, level by level, beside the tolerance: of displacement, or of force if larger."""
+    """Return the error, of displacement or of force if larger, against every reference by load level."""
     from matplotlib.patches import Rectangle
 
     styles = path_styles(result)
@@ -174,7 +174,7 @@ def _two_lines(result: Result, name: str) -> str:
     return "\n".join(label_and_name(result, name))
 
 
-# Sizes in the margin that holds the names of curves [inch]: leader, sample of the line, text, and what is left free.
+# Widths in the margin with the names of curves [inch]: leader, sample of the line, gap, free space.
 _LEADER, _SAMPLE, _GAP, _FREE = 0.12, 0.27, 0.07, 0.1
 
 
@@ -186,9 +186,9 @@ def plot(
     to_right: float | None = None,
     far: bool = False,
 ) -> Area:
-    """Curves with their names at their ends, moved apart where they would meet.
+    """Return a plot of lines with their names at their ends, shifted so that they do not overlap.
 
-    The axes end at 0 or below, but for values that lie `far` from 0, and, with `to_right`, span 0 to that.
+    Axes start at 0 or below, unless values are `far` from 0; with `to_right` the x axis spans 0 to that value.
     """
     from matplotlib.lines import Line2D
 
@@ -227,7 +227,7 @@ def plot(
 
 
 def _stretches(curve: Curve) -> Iterator[tuple[slice, bool]]:
-    """Cut a curve into stretches that are stable or not: a step is stable where both its ends are."""
+    """Yield the stable and unstable parts of a curve, and whether unstable; a step is stable if both its ends are."""
     if curve.unstable is None or not curve.unstable.any() or len(curve.unstable) == 1:
         yield slice(None), False
         return
@@ -238,7 +238,7 @@ def _stretches(curve: Curve) -> Iterator[tuple[slice, bool]]:
 
 
 def _span(several: Sequence[Floats]) -> tuple[float, float]:
-    """From the smallest to the largest of all numbers, and a twentieth beyond them."""
+    """Return the range of all finite numbers, extended by 5 % at both ends."""
     values = np.concatenate(several)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
@@ -260,9 +260,9 @@ def _look(curve: Curve) -> dict[str, Any]:
 
 
 def _name_ends(area: Area, curves: Sequence[Curve]) -> None:
-    """Write each curve's name right of the area, by height of their ends, with a sample of its line.
+    """Write the names of curves right of the area, in the order of their ends, each with a sample of its line.
 
-    A leader joins the two where the curve ends near the right edge.
+    Curves that end near the right side get a leader to their name.
     """
     from matplotlib.lines import Line2D
 
@@ -285,9 +285,9 @@ def _name_ends(area: Area, curves: Sequence[Curve]) -> None:
 
 
 def _uncrossed(ends: Floats, to_right: float, places: Floats) -> Floats:
-    """Exchange `places`, shape (n,), until no two lines from `ends`, shape (n, 2), to (to_right, place) cross.
+    """Return `places`, shape (n,), permuted until no two lines from `ends`, shape (n, 2), to (to_right, place) cross.
 
-    To exchange two that cross makes both together shorter, so it comes to an end.
+    It terminates: exchanging two places whose lines cross makes the total length shorter.
     """
     places = places.copy()
 
@@ -306,15 +306,13 @@ def _uncrossed(ends: Floats, to_right: float, places: Floats) -> Floats:
 
 
 def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
-    """Move places along a line so that none is nearer than `gap` to the next, each as little as may be.
+    """Return places on a line, shape (n,), moved as little as possible so that neighbours are at least `gap` apart.
 
-    Of equal places the one with the smaller of `ties` comes first.
-
-    Neighbours that meet are joined to a block about their mean, until no block meets another;
-    the whole is then kept within 0 and 1 as far as it fits.
+    Of equal places the one with the smaller of `ties` is first. Overlapping neighbours are merged into a block about
+    their mean, until no blocks overlap; then all are shifted into 0 ... 1 as far as they fit.
     """
     order = np.lexsort((ties, places.round(3)))
-    blocks: list[list[float]] = []  # [sum of wanted starts, count]
+    blocks: list[list[float]] = []  # [sum of preferred starts, count]
     for rank, index in enumerate(order):
         blocks.append([float(places[index]) - rank * gap, 1.0])
         while len(blocks) > 1 and blocks[-2][0] / blocks[-2][1] >= blocks[-1][0] / blocks[-1][1]:
@@ -329,7 +327,7 @@ def _apart(places: Floats, gap: float, ties: Floats) -> Floats:
 
 
 def moduli_figure(result: Result) -> Sheet:
-    """Young's modulus in a test along every direction: what the springs of a study realise beside the material's."""
+    """Return the effective Young's modulus along every direction of a study's springs, and that of the material."""
     styles = path_styles(result)
     several = [
         Known(display_name(result, name), path.moduli, *styles[name][:2])

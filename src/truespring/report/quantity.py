@@ -1,4 +1,4 @@
-"""Numbers as people read them: natural units, percentages, few digits."""
+"""Numbers as text: units with prefixes, percentages, few digits."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ _PREFIXES: dict[str, tuple[tuple[float, str], ...]] = {
     "Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa")),
 }
 
-#: Distances below this share of a displacement are rounding: there is nothing to draw or to tell.
+#: Distances below this share of a displacement are rounding errors.
 ROUNDING = 1e-6
 
 
@@ -24,9 +24,9 @@ class Scale:
 
 
 def natural_scale(largest: float, unit: str) -> Scale:
-    """Return the largest prefix of `unit` in which `largest`, in SI, is at least 1; any other unit without one."""
+    """Return `unit` with the largest prefix in which `largest`, in SI, is at least 1, if the unit takes prefixes."""
     prefixes = _PREFIXES.get(unit, ((1.0, unit),))
-    # A hair below 1 still is 1: lengths come out of sums.
+    # The tolerance covers rounding in sums of lengths.
     fitting = [Scale(*one) for one in prefixes if abs(largest) >= one[0] * (1 - 1e-9)]
     if largest == 0 or not math.isfinite(largest):
         return Scale(1.0, unit)
@@ -34,20 +34,20 @@ def natural_scale(largest: float, unit: str) -> Scale:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Return a value in SI as a text in its natural unit: 8823.5 Pa is "8.82 kPa"."""
+    """Return a value in SI as text with a prefix: 8823.5 Pa is "8.82 kPa"."""
     scale = natural_scale(value, unit)
     return f"{significant(value / scale.size, digits)} {scale.unit}".replace("-", "\N{MINUS SIGN}")
 
 
-def given(value: float, unit: str) -> str:
-    """Return a value that someone wrote, as a text in its natural unit without digits of our own: 0.04 m is "40 mm"."""
+def input_quantity(value: float, unit: str) -> str:
+    """Return an input value in SI as text with a prefix, with the digits of the input: 0.04 m is "40 mm"."""
     scale = natural_scale(value, unit)
     gap = "" if scale.unit == "°" else " "
     return f"{value / scale.size:.6g}{gap}{scale.unit}".replace("-", "\N{MINUS SIGN}")
 
 
 def significant(value: float, digits: int) -> str:
-    """Return a number with so many significant digits, never in powers of ten: 123.4 with two is "120"."""
+    """Return a number with `digits` significant digits, without exponent: 123.4 with two is "120"."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
@@ -58,7 +58,7 @@ def significant(value: float, digits: int) -> str:
 
 
 def round_factor(share: float, least: float = 0.03, aim: float = 0.12) -> float:
-    """Return the factor 1, 2, 5, 10, 20, ... that brings a share under `least` to `aim` or a little below; else 1."""
+    """Return the factor 1, 2, 5, 10, 20, ... that brings a share below `least` closest to `aim` from below; else 1."""
     if not 0 < share < least:
         return 1.0
     power = 10.0 ** math.floor(math.log10(aim / share))
@@ -66,7 +66,7 @@ def round_factor(share: float, least: float = 0.03, aim: float = 0.12) -> float:
 
 
 def times(factor: float) -> str:
-    """Return a factor as people write it: 20000 is "× 20 000"."""
+    """Return a factor as text: 20000 is "× 20 000"."""
     return f"× {factor:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
 
 
@@ -80,5 +80,5 @@ def percent(share: float) -> str:
 
 
 def tolerance_percent(share: float) -> str:
-    """Return a tolerance as a percentage as its writer wrote it: 0.05 is "5 %"."""
+    """Return a tolerance as a percentage with the digits of the input: 0.05 is "5 %"."""
     return f"{100 * share:.6g} %"

@@ -1,6 +1,6 @@
-"""Bodies in 3D as images: by PyVista in a child process, or by matplotlib where that is not to be had.
+"""Bodies in 3D as images: by PyVista in a child process, or by matplotlib if PyVista is not available.
 
-Both are given the same faces, coloured and lit beforehand, and the same lines: they find what hides what.
+Both take the same faces, coloured and lit beforehand, and the same lines, and remove hidden parts.
 """
 
 import importlib.util
@@ -24,22 +24,22 @@ from truespring.report.sheet import polygons
 #: An image: red, green, blue and opacity in 0 ... 255, shape (height, width, 4), the upper row first.
 Image = NDArray[np.uint8]
 
-# The child that draws may take so many seconds, and so many more for each image: software rendering on a slow machine.
+# Time limit of the child process [s], and more for each image; software rendering is slow.
 _PATIENCE, _PATIENCE_EACH = 60.0, 20.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layer:
-    """Lines, hidden where faces are nearer to the eye. The faces are to be seen where they have colours.
+    """Faces, and lines that are hidden behind nearer faces; faces without colours are not drawn.
 
-    All places are as `surfaces.seen` gives them.
+    All coordinates are those of `surfaces.seen`.
 
     Attributes:
         faces: their corners [m], shape (n_faces, 3 or 4, 3).
-        colors: of every corner, 0 ... 1, shape (n_faces, 3 or 4, 3); None where faces hide lines and no more.
+        colors: of every corner, 0 ... 1, shape (n_faces, 3 or 4, 3); None if faces only hide lines.
         lines: their ends [m], shape (n_lines, 2, 3).
-        owners: two faces that each line lies on, shape (n_lines, 2); empty where lines lie on none.
-        ink: the colour of the lines, as #rrggbb.
+        owners: the two faces that each line lies on, shape (n_lines, 2); empty if lines lie on no face.
+        ink: the colour of the lines, #rrggbb.
         width: of the lines [points].
     """
 
@@ -53,10 +53,10 @@ class Layer:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Shot:
-    """What one image shows: layers, each over the one before.
+    """The content of one image.
 
     Attributes:
-        layers: what is drawn.
+        layers: drawn in order, each over those before it.
         lower, upper: the corners of the image, right and up [m], shape (2,).
         size: width and height [pixels].
         points: the size of a typographical point [pixels].
@@ -70,11 +70,11 @@ class Shot:
 
 
 def render(shots: Sequence[Shot]) -> Callable[[], tuple[list[Image], str]]:
-    """Begin to draw: what is returned waits for an image of each shot, so that meanwhile other figures can be drawn.
+    """Start rendering in the background; return a function that waits for the image of each shot.
 
-    Besides, where PyVista did not draw them, why, and the way out.
+    Its second value is empty, or states why PyVista did not draw the images and how to change that.
     """
-    pool = ThreadPoolExecutor(1)  # it waits for the child, and draws nothing: matplotlib is not for threads
+    pool = ThreadPoolExecutor(1)  # only waits for the child process: matplotlib is not thread-safe
     answer = pool.submit(_by_child, shots)
     pool.shutdown(wait=False)
 
@@ -82,20 +82,20 @@ def render(shots: Sequence[Shot]) -> Callable[[], tuple[list[Image], str]]:
         found, why = answer.result()
         if found is not None:
             return found, ""
-        return [draw(shot) for shot in shots], f"The pictures in 3D are drawn by matplotlib, more coarsely: {why}."
+        return [draw(shot) for shot in shots], f"Pictures in 3D are drawn by matplotlib, less accurately: {why}."
 
     return images
 
 
 def _command(job: Path, answer: Path) -> list[str]:
-    """The child that draws; -P keeps a file of the user's own folder from being taken for a library."""
+    """Return the command of the child process; -P keeps Python from importing files of the current folder."""
     return [sys.executable, "-P", "-m", "truespring.report.offscreen", str(job), str(answer)]
 
 
 def _by_child(shots: Sequence[Shot]) -> tuple[list[Image] | None, str]:
-    """Have a child draw, so that a graphics library that crashes or hangs takes no results with it."""
+    """Render in a child process, so that a graphics library that crashes or hangs does not end this one."""
     if importlib.util.find_spec("pyvista") is None:
-        return None, "PyVista is not installed; pip install 'truespring[3d]' brings it"
+        return None, "PyVista is not installed: pip install 'truespring[3d]'"
     patience = _PATIENCE + _PATIENCE_EACH * len(shots)
     with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
         job, answer = Path(folder) / "job.npz", Path(folder) / "images.npz"
@@ -120,12 +120,12 @@ def _by_child(shots: Sequence[Shot]) -> tuple[list[Image] | None, str]:
 _NEEDS = "on Linux it needs a display, or libegl1 and libgl1-mesa-dri"
 
 
-def _ending(code: int, said: bytes) -> str:
-    """How a process ended, and the last that it said."""
-    lines = re.sub(r"\x1b\[[\d;]*m", "", said.decode(errors="replace")).strip().splitlines()
+def _ending(code: int, output: bytes) -> str:
+    """Return how a process ended, with the last line of its output."""
+    lines = re.sub(r"\x1b\[[\d;]*m", "", output.decode(errors="replace")).strip().splitlines()
     last = lines[-1].split("| ")[-1].strip()[:160].rstrip(".") if lines else ""
     ended = f"was ended by signal {-code}" if code < 0 else f"failed (exit code {code})"
-    return f"{ended}, saying: {last}" if last else ended
+    return f"{ended}: {last}" if last else ended
 
 
 def write_job(shots: Sequence[Shot], file: Path) -> None:
@@ -144,7 +144,7 @@ def write_job(shots: Sequence[Shot], file: Path) -> None:
 
 
 def read_job(file: Path) -> list[Shot]:
-    """Read what `write_job` wrote."""
+    """Return the shots of a file from `write_job`."""
     with np.load(file) as job:
         return [
             Shot(
@@ -169,12 +169,12 @@ def read_job(file: Path) -> list[Shot]:
 
 
 def rgb(color: str) -> Floats:
-    """Return red, green and blue, 0 ... 1, of a colour as #rrggbb."""
+    """Return red, green and blue, 0 ... 1, of a colour #rrggbb, shape (3,)."""
     return np.array([int(color[start : start + 2], 16) for start in (1, 3, 5)]) / 255
 
 
 def inked(coverage: Image, ink: str) -> Image:
-    """Return an image of one colour that covers each pixel by 0 ... 255."""
+    """Return an image of one colour with an opacity 0 ... 255 for each pixel."""
     image = np.empty((*coverage.shape, 4), dtype=np.uint8)
     image[..., :3] = np.rint(255 * rgb(ink))
     image[..., 3] = coverage
@@ -182,10 +182,10 @@ def inked(coverage: Image, ink: str) -> Image:
 
 
 def stacked(images: Sequence[Image]) -> Image:
-    """Return images one over the other as one."""
+    """Return images composed into one, each over those before it."""
     whole = images[0].copy()
     for image in images[1:]:
-        drawn = image[..., 3] > 0  # mostly a few lines
+        drawn = image[..., 3] > 0  # often a small part of the image
         above, below = image[drawn] / 255, whole[drawn] / 255
         share, rest = above[:, 3:], (1 - above[:, 3:]) * below[:, 3:]
         opacity = share + rest
@@ -195,7 +195,7 @@ def stacked(images: Sequence[Image]) -> Image:
 
 
 def draw(shot: Shot) -> Image:
-    """Draw a shot by matplotlib: what is farther first, each face in one colour."""
+    """Return a shot drawn by matplotlib, far faces first, each face in one colour."""
     return stacked([_draw_layer(layer, shot) for layer in shot.layers])
 
 
@@ -203,7 +203,7 @@ def _draw_layer(layer: Layer, shot: Shot) -> Image:
     filled = layer.colors is not None
     n_faces, k = layer.faces.shape[:2]
     depth = layer.faces[:, :, 2].mean(axis=1)
-    # A line comes after the faces that it lies on: a polygon there and back, so that both are of one kind.
+    # Draw a line after the faces it lies on; it is a degenerate polygon, so that both are sorted together.
     near = depth[layer.owners].max(axis=1) if len(layer.owners) else layer.lines[:, :, 2].mean(axis=1)
     strokes = layer.lines[:, [0] + [1] * (k - 1)]
     corners = np.concatenate([layer.faces, strokes])[:, :, :2]

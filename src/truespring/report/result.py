@@ -1,4 +1,4 @@
-"""Result: all that one study gave, which everything in this folder draws, tabulates or writes."""
+"""The results of one study, which this package draws, tabulates and writes."""
 
 import itertools
 from collections.abc import Mapping
@@ -14,29 +14,29 @@ from truespring.refining import Standing
 
 
 def head_note(source: str) -> str:
-    """Return what the comments at the head of a study file say."""
+    """Return the comments at the head of a study file as one text."""
     head = itertools.takewhile(lambda line: line.startswith("#"), source.splitlines())
     return " ".join(line.lstrip("#").strip() for line in head)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """One study, solved.
+    """The solutions and comparisons of one study.
 
     Attributes:
-        title: the study's own.
-        file: the study's file, as it was named.
-        problem: what was asked.
-        paths: by the name of the model in the study, in its order.
-        probe: number of the node that is watched.
-        model: name of the path that is compared with the others; None where nothing is compared.
+        title: title of the study.
+        file: path of the study file, as given.
+        problem: mesh, material, supports and loads.
+        paths: solution of each model, by its name, in the order of the study.
+        probe: number of the watched node.
+        model: name of the model that is compared with the others; None if nothing is compared.
         comparisons: by name of the reference.
-        tolerance: the error, rms or of force, up to which two paths agree.
+        tolerance: relative error, rms or of force, up to which two paths agree.
         source: text of the study file; comments at its head are shown with its results.
-        fitness: whether the springs of a path are fit for the material, by its name.
-        standings: how far each reference is from its own limit, by its name; empty where none was refined.
-        in_detail: whether distances of surfaces, in metres, and energies are told too, and a plane body is coloured by
-            its distance, as where two results are compared.
+        fitness: whether springs fit the material, by name of the model.
+        standings: estimated error of each reference, by its name; empty if none was refined.
+        in_detail: whether distances of surfaces [m] and energies are reported too, and plane bodies coloured by
+            distance, as in comparisons of two results.
     """
 
     title: str
@@ -57,12 +57,12 @@ class Result:
 
     @property
     def stem(self) -> str:
-        """The file's name without its suffix; names the output folder."""
+        """Name of the study file without suffix, and of its output folder."""
         return self.file.stem
 
     @property
     def note(self) -> str:
-        """What the comments at the head of the study file say."""
+        """The comments at the head of the study file."""
         return head_note(self.source)
 
     @cached_property
@@ -72,5 +72,5 @@ class Result:
 
     @property
     def converged(self) -> bool:
-        """Whether every path reached full load through stable equilibria, but for those that were read."""
+        """Whether every solved path reached full load through stable equilibria."""
         return all(path.status in (Status.CONVERGED, Status.READ) for path in self.paths.values())

@@ -1,4 +1,4 @@
-"""Rows of numbers as a table: the one form in which results give them."""
+"""Rows of a result as a table of polars."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 def table_of(rows: Sequence[Mapping[str, Any]]) -> "polars.DataFrame":
-    """Return rows of the same keys as a table of polars; lists, and columns of mixed types, become text.
+    """Return rows with the same keys as a table of polars; lists and columns of mixed types become text.
 
-    Raises TruespringError where polars is not installed.
+    Raises TruespringError if polars is not installed.
     """
     try:
         import polars

@@ -1,4 +1,4 @@
-"""What the scene that turns needs besides a plane viewer's data: surface, springs inside, distances as colours."""
+"""Data of the interactive 3D view beyond those of the 2D view: surface, inner springs, distances as colours."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,12 +17,12 @@ from truespring.report.style import error_colors
 from truespring.report.surfaces import edges_of, facets_of, lines_on, outline
 from truespring.report.undeformed import spring_lines
 
-#: More springs than this are drawn on the surface only.
+# With more springs than this, only those on the surface are drawn.
 _MOST_SPRINGS = 20_000
 
 
 def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
-    """Return the nodes that a scene draws of the paths `shown`, ascending: of the surface, of lines, the probe."""
+    """Return the nodes that a view of the paths `shown` draws: of the surface, of lines, the probe; ascending, (n,)."""
     kept = np.zeros(result.problem.mesh.n_nodes, dtype=bool)
     kept[facets_of(result.problem.mesh)] = True
     kept[result.probe] = True
@@ -33,7 +33,7 @@ def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
 
 
 def _lines(path: Solution) -> tuple[Ints, Ints]:
-    """The lines that a path is drawn by on its surface, and inside it; of a body without surface, all and none."""
+    """Return the lines of a path on its surface and inside, shape (n, 2); of a body without surface, all and none."""
     facets, lines = facets_of(path.problem.mesh), path_lines(path)
     none = np.zeros((0, 2), dtype=np.int64)
     if not len(facets):
@@ -45,7 +45,7 @@ def _lines(path: Solution) -> tuple[Ints, Ints]:
 
 
 def surface_in_scene(mesh: Mesh, pack: Packing) -> dict[str, Any]:
-    """Return the surface that all paths share, and the colours of distances from none to the largest."""
+    """Return the surface that all paths share, and the colours of distances from 0 to the largest."""
     facets = facets_of(mesh)
     edges = outline(mesh.nodes, facets) if len(facets) else mesh.edges
     colors = np.rint(255 * error_colors(np.linspace(0, 1, 33))).astype(int)
@@ -58,7 +58,7 @@ def surface_in_scene(mesh: Mesh, pack: Packing) -> dict[str, Any]:
 
 
 def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Packing, factor: float) -> dict[str, Any]:
-    """Return a path's lines and how far the model is from it: at each level, and the largest of all in steps."""
+    """Return a path's lines and its distance from the model: at each level as text, and the largest in packed steps."""
     surface, inside = _lines(result.paths[name])
     values: dict[str, Any] = {"lines": pack.pairs(surface), "inside": pack.pairs(inside), "most": [], "farthest": None}
     if name == result.model or result.model is None:

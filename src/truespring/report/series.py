@@ -18,12 +18,12 @@ from truespring.report.surfaces import facets_of
 
 
 def write_series(path: Solution, folder: Path, name: str) -> None:
-    """Write NAME.pvd and, in the folder NAME beside it, one .vtu a state; SI units.
+    """Write NAME.pvd and one .vtu per state, in SI units, into the folder NAME next to it.
 
-    Points stand where they were at rest, as is the custom: ParaView's "Warp By Vector" moves them.
-    They carry displacement and reaction; cells what their potential tells: tension, stretch,
-    stiffness and strain energy of springs, stress and strain energy of elements. Of a path that is
-    no more than a surface, the surface. A state that is no equilibrium (Solution.best) is left out.
+    Points are undeformed: apply ParaView's "Warp By Vector". They have displacement and reaction; cells have the
+    fields of their potential: tension, stretch, stiffness and strain energy of springs, stress and strain energy of
+    elements. A path with a surface only is written as that surface. States out of equilibrium (Solution.best) are left
+    out.
     """
     levels = folder / name
     levels.mkdir(parents=True, exist_ok=True)
@@ -49,13 +49,13 @@ def write_series(path: Solution, folder: Path, name: str) -> None:
 
 
 def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:
-    """Write the body at rest by its elements as VTU [m]; with the directions of nodes that supports hold as 1."""
+    """Write the undeformed mesh as VTU [m], with a field `held` that is 1 in the directions that supports hold."""
     fields = {} if held is None else {"held": in_space(held.astype(float))}
     write_vtu(file, mesh.nodes, mesh.cells.items(), fields)
 
 
 def _write_state(path: Solution, state: State, file: Path) -> None:
-    """Write the body at rest with the fields of a state as VTU."""
+    """Write the undeformed body with the fields of a state as VTU."""
     mesh = path.problem.mesh
     visible = path.potential if isinstance(path.potential, Visible) else None
     write_vtu(
@@ -68,10 +68,10 @@ def _write_state(path: Solution, state: State, file: Path) -> None:
 
 
 def write_stl(path: Solution, file: Path) -> None:
-    """Write the body of the last state as binary STL [m]; nothing where there is no body.
+    """Write the deformed body of the last state as binary STL [m]; nothing without states or elements.
 
-    Of a plane body its elements, in the plane z = 0, of one in 3D its surface, seen from outside
-    anticlockwise; quadrilaterals as two triangles.
+    A plane body is written as its elements in the plane z = 0, one in 3D as its surface, anticlockwise from outside;
+    quadrilaterals as two triangles.
     """
     mesh = path.problem.mesh
     if path.surface is not None:
@@ -85,9 +85,9 @@ def write_stl(path: Solution, file: Path) -> None:
 
 
 def write_difference(comparison: Comparison, file: Path) -> None:
-    """Write the nodes at which two paths are compared as VTU: both displacements, their distance, what lies outside.
+    """Write the nodes at which two paths are compared as VTU: both displacements, their distance, nodes outside.
 
-    At the last level that both have; nothing where there is none.
+    The level is the last one that both have; without one, nothing is written.
     """
     level = float(comparison.load_factors[-1]) if comparison.load_factors.size else 0.0
     mine, theirs = comparison.model.at(level), comparison.reference.at(level)

@@ -1,4 +1,4 @@
-"""Shapes in the colours of distances, of a few shades: one path a shade, however many the shapes are."""
+"""Shapes coloured by distance, in a fixed number of shades: one path per shade."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from truespring.arrays import Floats
 from truespring.report.sheet import Area
 from truespring.report.style import error_colors
 
-# As many as an eye tells apart along a bar, and more.
+# More shades than can be distinguished along a bar.
 _SHADES = 48
 
-# The size of a dot, from its middle on [inch].
+# Radius of a dot [inch].
 _DOT = 0.035
 
 
@@ -30,7 +30,7 @@ def draw_shaded(area: Area, shapes: Floats, shares: Floats) -> None:
 
 
 def draw_shaded_dots(area: Area, places: Floats, shares: Floats) -> None:
-    """Draw dots at places, shape (n, 2) in units of the area, dark rimmed, in the colours of shares 0 to 1."""
+    """Draw dots with a dark rim at `places`, shape (n, 2) in units of the area, in the colours of `shares`."""
     around = np.linspace(0, 2 * np.pi, 17)[:-1]
     ring = area.inch * np.stack([np.cos(around), np.sin(around)], axis=1)
     draw_shaded(area, places[:, None] + 1.35 * _DOT * ring, np.ones(len(places)))

@@ -1,6 +1,6 @@
-"""Paper to draw on: matplotlib's artists and renderers without its figures and axes.
+"""Sheets to draw on: matplotlib's artists and renderers without its figures and axes.
 
-Those take longer to import and to make than all that is drawn with them here.
+Importing and creating those takes longer than drawing the figures of this package.
 """
 
 import io
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.transforms import Affine2D
 
-#: PNG files are this fine [pixels an inch].
+#: Resolution of PNG files [pixels/inch].
 DPI = 130
 
 
 class Sheet:
-    """Paper of a width and a height [inch]; its title tells what it shows to those who cannot see it.
+    """A sheet with width and height [inch] and a title, which is its alternative text.
 
-    Artists are drawn by their zorder; `inches` are their transform, of places from the lower left corner on.
+    Artists are drawn in the order of their zorder; `inches` transforms places [inch] from the lower left corner.
     """
 
     def __init__(self, width: float, height: float, title: str) -> None:
@@ -34,17 +34,17 @@ class Sheet:
         self.width, self.height, self.title = width, height, title
         self.artists: list[Artist] = []
         self.areas: list[Area] = []
-        self.inches = Affine2D()  # to the pixels of what is being drawn
+        self.inches = Affine2D()  # to pixels; set while drawing
 
     def add(self, artist: "Artist", to_inches: "Affine2D | None" = None) -> None:
-        """Add an artist whose units are inches, or become inches by a transform."""
+        """Add an artist in inches, or in units that `to_inches` transforms."""
         artist.set_transform(self.inches if to_inches is None else to_inches + self.inches)
         self.artists.append(artist)
 
     def add_image(
         self, image: Any, left: float, bottom: float, width: float, height: float, zorder: float, name: str
     ) -> None:
-        """Add an image, shape (rows, columns, 3 or 4), the upper row first, that fills a rectangle [inch]."""
+        """Add an image, shape (rows, columns, 3 or 4), upper row first, that fills a rectangle [inch]."""
         from matplotlib.image import BboxImage
         from matplotlib.transforms import Bbox, TransformedBbox
 
@@ -53,7 +53,7 @@ class Sheet:
         self.artists.append(drawn)
 
     def pixels(self, dpi: float) -> NDArray[np.uint8]:
-        """Return an image on white paper, shape (height, width, 4), the upper row first."""
+        """Return an image on a white background, shape (height, width, 4), upper row first."""
         renderer = _renderer((round(self.width * dpi), round(self.height * dpi)), dpi, "white")
         self._draw(renderer, dpi)
         return np.array(renderer.buffer_rgba())
@@ -67,7 +67,7 @@ class Sheet:
         return file.getvalue()
 
     def svg(self) -> bytes:
-        """Return the bytes of an SVG file: coordinates to a hundredth of a point, no comments, no indents."""
+        """Return the bytes of an SVG file: coordinates to 0.01 points, without comments and indents."""
         from matplotlib.backends.backend_svg import RendererSVG
 
         file = io.StringIO()
@@ -87,12 +87,12 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """A part of a sheet with units of its own.
+    """A rectangle of a sheet with its own coordinates.
 
     Attributes:
-        sheet: what it is a part of.
-        left, bottom, width, height: its place on the sheet [inch].
-        x, y: what its sides stand for, left and right, bottom and top.
+        sheet: the sheet.
+        left, bottom, width, height: the rectangle [inch].
+        x, y: coordinates of the left and right, and of the bottom and top side.
     """
 
     sheet: Sheet
@@ -108,20 +108,20 @@ class Area:
 
     @cached_property
     def _scale(self) -> Floats:
-        """Inches for each unit, along x and y."""
+        """Inches per unit along x and y, shape (2,)."""
         return np.array([self.width / (self.x[1] - self.x[0]), self.height / (self.y[1] - self.y[0])])
 
     @property
     def inch(self) -> float:
-        """An inch along x, in the area's units."""
+        """One inch along x in units of the area."""
         return (self.x[1] - self.x[0]) / self.width
 
     def place(self, points: Floats) -> Floats:
-        """Return where points of the area, shape (..., 2), are on the sheet [inch]."""
+        """Return the places on the sheet [inch] of points in units of the area, shape (..., 2)."""
         return np.asarray((points - (self.x[0], self.y[0])) * self._scale + (self.left, self.bottom))
 
     def add(self, artist: "Artist") -> None:
-        """Add an artist in the area's units; of what lies outside nothing is seen, unless its clipping is off."""
+        """Add an artist in units of the area, clipped at its sides unless the artist's clipping is off."""
         from matplotlib.transforms import Affine2D, Bbox, TransformedBbox
 
         box = Bbox.from_bounds(self.left, self.bottom, self.width, self.height)
@@ -133,13 +133,13 @@ class Area:
 def polygons(
     size: tuple[int, int], dpi: float, paper: str | None, corners: Floats, fills: Floats, edges: Floats, widths: Floats
 ) -> NDArray[np.uint8]:
-    """Return an image of polygons, each over those before it, as `Sheet.pixels` does; on no paper it is transparent.
+    """Return an image of polygons, each over those before it, shape (height, width, 4), upper row first.
 
     Args:
         size: width and height [pixels].
-        dpi: pixels an inch.
-        paper: its colour, or none.
-        corners: from the lower left corner on [pixels], shape (n, k, 2).
+        dpi: pixels per inch.
+        paper: colour of the background; None is transparent.
+        corners: from the lower left corner [pixels], shape (n, k, 2).
         fills, edges: red, green, blue and opacity, shape (n, 4).
         widths: of the edges [points], shape (n,).
     """

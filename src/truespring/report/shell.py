@@ -1,4 +1,4 @@
-"""The shell of all pages: one environment, one base template, one style sheet. A page loads nothing from a network."""
+"""The shell of all pages: one environment, one base template, one style sheet. Pages load nothing from the network."""
 
 import base64
 import platform
@@ -14,7 +14,7 @@ from truespring.report.drawing import Drawing
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-#: A picture of more bytes as SVG than this is embedded as PNG.
+# Pictures larger than this as SVG [bytes] are embedded as PNG.
 _LARGEST_SVG = 180_000
 
 
@@ -22,10 +22,10 @@ def render(template: str, command: str | None, scripts: tuple[str, ...] = (), **
     """Return a page as HTML.
 
     Args:
-        template: its file below the package, such as "validity/page.html.j2"; it extends "report/base.html.j2".
-        command: the command line that repeats the run, None where there was none.
-        scripts: files of JavaScript below the package, embedded in this order.
-        **values: what the template names; `title` among them.
+        template: file in the package, such as "validity/page.html.j2"; it extends "report/base.html.j2".
+        command: the command line that repeats the run; None if the run had none.
+        scripts: JavaScript files in the package, embedded in this order.
+        **values: variables of the template, among them `title`.
     """
     return (
         _environment()
@@ -36,7 +36,7 @@ def render(template: str, command: str | None, scripts: tuple[str, ...] = (), **
 
 @cache
 def _environment() -> "Environment":
-    """Return the environment of all templates, which keeps those that it has compiled."""
+    """Return the environment of all templates; it caches compiled templates."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(
@@ -47,17 +47,17 @@ def _environment() -> "Environment":
 
 
 def _text(name: str) -> str:
-    """Return the text of a file below the package, named with slashes."""
+    """Return the text of a file in the package, named with slashes."""
     return files("truespring").joinpath(name).read_text(encoding="utf-8")
 
 
 def close(text: str) -> str:
-    """Keep a number and its unit on one line."""
+    """Return a text with no-break spaces between numbers and units."""
     return re.sub(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Pa|N|m))(?:\W|$))", "\N{NO-BREAK SPACE}", text)
 
 
 def versions() -> list[tuple[str, str]]:
-    """Return the packages that a result depends on and their versions, truespring first."""
+    """Return names and versions of the packages that results depend on, truespring first."""
     found = [("python", platform.python_version())]
     for package in ("truespring", "numpy", "scipy", "scikit-fem"):
         try:
@@ -68,7 +68,7 @@ def versions() -> list[tuple[str, str]]:
 
 
 def picture(drawing: Drawing) -> dict[str, str]:
-    """Return what an <img> needs: address (a data URL), width [CSS px] and title of a picture."""
+    """Return the attributes of an <img>: address (a data URL), width [CSS px] and title."""
     if len(drawing.svg) <= _LARGEST_SVG:
         address = "data:image/svg+xml," + quote(
             drawing.svg.decode().replace("\n", " ").replace('"', "'"), safe=" =:/;,'()!*?"

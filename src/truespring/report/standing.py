@@ -1,4 +1,4 @@
-"""How far references are themselves off, in words: what errors against them are worth."""
+"""The estimated errors of references in words."""
 
 from collections.abc import Iterable
 
@@ -8,7 +8,7 @@ from truespring.report.result import Result
 
 
 def own_errors(result: Result, name: str) -> tuple[str, str]:
-    """Return how far a reference is itself off, and the model from the refined reference, as texts for a table."""
+    """Return the error of a reference, and that of the model against the refined reference, as text for a table."""
     known = result.standings.get(name)
     if known is None:
         return "not known", "-"
@@ -23,28 +23,28 @@ def _percent(value: float | None) -> str:
 
 
 def own_error_sentence(result: Result, called: dict[str, str]) -> str | None:
-    """Return how far the references are themselves off on their mesh, and the model from them refined.
+    """Return the errors of the references on their mesh, and of the model against the refined references.
 
-    None where refinement was left out. `called` is how the references are called.
+    None if no reference was refined. `called` has the display name of each reference.
     """
     known = {name: one for name, one in result.standings.items() if name in result.comparisons}
-    told = {name: one.value for name, one in known.items() if one.value is not None}
+    values = {name: one.value for name, one in known.items() if one.value is not None}
     if not known:
         return None
-    if not told:
+    if not values:
         return f"how far {_who(result, list(known), 'is', 'are')} off is not known."
-    low, high = min(told.values()), max(told.values())
+    low, high = min(values.values()), max(values.values())
     shown = _percent(high) if _percent(low) == _percent(high) else f"{_number(low)} to {_percent(high)}"
-    unknown = [name for name in known if name not in told]
+    unknown = [name for name in known if name not in values]
     rest = f"; of {_listed(called[name] for name in unknown)} it is not known" if unknown else ""
     refined = {name: one.refined_error for name, one in known.items() if one.refined_error is not None}
     against = [f"{called[name]} {percent(refined[name])}" for name in sorted(refined, key=lambda name: refined[name])]
     truth = f"; against refined references, {', '.join(against)}" if against else ""
-    return f"{_who(result, list(told), 'is', 'are')} {shown} off{truth}{rest}."
+    return f"{_who(result, list(values), 'is', 'are')} {shown} off{truth}{rest}."
 
 
 def _who(result: Result, names: list[str], one: str, several: str) -> str:
-    """A reference by its label, several by what they are, on their mesh, and their verb."""
+    """Return the subject of a sentence: one reference by its label, several by their kind, with the verb."""
     labels = {result.paths[name].label for name in names}
     paths = [result.paths[name] for name in names]
     if all(path.has_springs for path in paths):
@@ -62,9 +62,9 @@ def _number(value: float) -> str:
 
 
 def equally_wrong_sentence(result: Result, who: str, plural: bool, called: dict[str, str]) -> str | None:
-    """Return that agreement with references which are themselves off by more than the tolerance says little.
+    """Return a warning if the model agrees with references whose own errors exceed the tolerance; else None.
 
-    `who` is how the model is called, `plural` whether that is several; `called` how the references are.
+    `who` is the name of the model, `plural` whether it is plural; `called` has the display name of each reference.
     """
     names = [
         name
@@ -83,9 +83,9 @@ def equally_wrong_sentence(result: Result, who: str, plural: bool, called: dict[
             f"on this mesh {called[worst]} is itself about {percent(known.value)} off, and {who} "
             f"{'are' if plural else 'is'} {percent(known.refined_error)} off the refined solution"
         )
-    return f"that agreement says little: {both}, more than {tolerance_percent(result.tolerance)}."
+    return f"this agreement is not evidence of accuracy: {both}, more than {tolerance_percent(result.tolerance)}."
 
 
 def _agrees(one: Comparison) -> bool:
-    """Whether a model is within the tolerance of a reference at full load."""
+    """Return whether a model is within the tolerance of a reference at full load."""
     return one.error is not None and one.error < one.tolerance

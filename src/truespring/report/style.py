@@ -1,4 +1,4 @@
-"""How figures look: colours, line styles and the names of paths, shared by all of them."""
+"""The style of all figures: colours, line styles and names of paths."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,10 +9,10 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.report.result import Result
 
-#: Colours that stay apart for colour-blind eyes and on grey paper (blue, vermillion, green: Okabe and Ito).
+#: Colours that colour-blind readers and grey prints distinguish (blue, vermillion, green: Okabe and Ito).
 INK, BLUE, RED, LOAD, MOTION, FAINT = "#16191d", "#0072b2", "#d3222a", "#b84a00", "#00795a", "#a9b0b7"
 
-#: How far two paths are apart, from nothing to the largest distance: matplotlib's magma from its light end on.
+# The part of matplotlib's magma for distances, from 0 (light) to the largest (dark).
 _ERROR_RANGE = (0.97, 0.27)
 
 SPRING_STYLES = ((BLUE, "-", "o"), ("#3a9bdc", "--", "s"), ("#00476f", "-.", "^"), ("#5c7fb8", ":", "D"))
@@ -34,13 +34,13 @@ _RC: Any = {
     "svg.hashsalt": "truespring",
     "savefig.facecolor": "white",
 }
-#: A point of type [inch].
+#: A typographical point [inch].
 POINT = 1 / 72
 
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Draw within this: matplotlib's settings, and its former ones afterwards."""
+    """Apply the common settings of matplotlib, and restore the former ones at the end."""
     import matplotlib
 
     with matplotlib.rc_context(_RC):
@@ -48,7 +48,7 @@ def figure_style() -> Iterator[None]:
 
 
 def error_colors(shares: Floats) -> Floats:
-    """Return the colours of distances, each a share 0 ... 1 of the largest: red, green, blue, shape (..., 3)."""
+    """Return the colours of distances, shares 0 ... 1 of the largest: red, green, blue, shape (..., 3)."""
     import matplotlib
 
     light, dark = _ERROR_RANGE
@@ -56,7 +56,7 @@ def error_colors(shares: Floats) -> Floats:
 
 
 def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
-    """Return colour, dashes and marker of each path: springs and what is compared in blues, others in black, greys."""
+    """Return colour, dashes and marker of each path: blues for springs and the compared model, black and greys else."""
     springs = [name for name in result.paths if is_strong(result, name)]
     others = [name for name in result.paths if name not in springs]
     return {
@@ -66,17 +66,17 @@ def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
 
 
 def is_strong(result: Result, name: str) -> bool:
-    """Tell whether a path is drawn in blue: springs, and what is compared."""
+    """Return whether a path is drawn in blue: springs and the compared model."""
     return name == result.model or result.paths[name].has_springs
 
 
 def full_name(result: Result, name: str) -> str:
-    """The label of a path, and its name in the study where that is needed to know it by."""
+    """Return the label of a path, with its name in the study if the label does not identify it."""
     return " · ".join(label_and_name(result, name))
 
 
 def label_and_name(result: Result, name: str) -> tuple[str, ...]:
-    """Return the label of a path and its name in the study, where the label does not hold it or is not its own."""
+    """Return the label of a path, and its name in the study if the label does not contain it or is not unique."""
     label = result.paths[name].label
     alone = sum(path.label == label for path in result.paths.values()) == 1
     return (label,) if alone and name.casefold() in label.casefold() else (label, name)

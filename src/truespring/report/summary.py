@@ -1,4 +1,4 @@
-"""summary.json: status, cost, warnings and errors of one study in plain values."""
+"""summary.json: status, cost, warnings and errors of one study as JSON values."""
 
 import math
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from truespring.support_errors import SupportError
 
 
 def summary(result: Result) -> dict[str, Any]:
-    """Return the summary of a study as values that JSON can hold; what is not known is None."""
+    """Return the summary of a study as JSON values; unknown values are None."""
     return {
         "title": result.title,
         "truespring": version("truespring"),
@@ -41,7 +41,7 @@ def _model(path: Solution, probe: int) -> dict[str, Any]:
         "probe_displacement": last.displacement[probe].tolist() if last else None,
         "energies": [[s.load_factor, s.energy] for s in path.states if math.isfinite(s.energy + s.load_factor)],
         "force": [_known(force) for force in path.applied_force(last).tolist()] if last else None,
-        # Where a level was not reached, that of the best state there.
+        # If a level was not reached, the residual of the best state there.
         "residual": _known((path.best or last).residual) if last else None,
         "negative_eigenvalues": last.negative_eigenvalues if last else None,
         "smallest_area_ratio": min((state.area_ratio for state in path.states), default=None),
@@ -56,7 +56,7 @@ def _model(path: Solution, probe: int) -> dict[str, Any]:
 
 
 def moduli_values(moduli: Moduli) -> dict[str, Any]:
-    """Return the moduli that springs realise, beside those wanted; Young's moduli in Pa, bending by elements deep."""
+    """Return the effective moduli of springs and those of the material; Young's moduli in Pa, bending by depth."""
     plane = moduli.dim == 2
     return {
         "young": moduli.young(),
@@ -85,7 +85,7 @@ def moduli_values(moduli: Moduli) -> dict[str, Any]:
     }
 
 
-# Directions in which moduli are told.
+# Directions of the moduli listed.
 _PLANE = ((1, 0), (0, 1), (1, 1), (1, -1))
 _SPACE = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1))
 
@@ -106,7 +106,7 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
 
 
 def _standing(result: Result, name: str) -> dict[str, float | None]:
-    """How far a reference is from its own limit, and the model from that; None where it is not known."""
+    """Return the error of a reference, and that of the model against the refined reference; None if unknown."""
     known = result.standings.get(name)
     return {
         "reference_error": known.value if known else None,
@@ -115,7 +115,7 @@ def _standing(result: Result, name: str) -> dict[str, float | None]:
 
 
 def _of_forces(comparison: Comparison, level: int | None) -> dict[str, Any]:
-    """The errors of what moved supports take at a level by its number, and what decides there."""
+    """Return the force errors of moved supports at a level, by its index, and the quantity with the largest error."""
     if level is None:
         return {"force_error": None, "decided_by": None, "supports": []}
     return {
@@ -138,12 +138,12 @@ def _support(one: SupportError) -> dict[str, Any]:
 
 
 def difference(result: Result) -> dict[str, Any]:
-    """Return how far two results are apart at the last load level that both have, as values that JSON can hold.
+    """Return the difference of two results at the last load level that both have, as JSON values.
 
-    Relative errors as in the summary of a study; distances in metres; what is not known is None.
+    Relative errors are those of the summary of a study; distances are in metres; unknown values are None.
     """
     (one,) = result.comparisons.values()
-    model, reference = result.paths  # in this order, whichever of both is drawn over the other
+    model, reference = result.paths  # in this order, whichever is drawn over the other
     surfaces = one.hausdorff
     met = bool(one.load_factors.size)
 

@@ -1,4 +1,4 @@
-"""What moved supports take, in words: force and torque of a model beside those of its references."""
+"""Forces and torques of moved supports as text, of a model and its references."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from truespring.report.verdict import display_name
 
 @dataclass(frozen=True, slots=True)
 class SupportRow:
-    """A force or a torque, of the model and of one reference, as text; empty where there is nothing to tell.
+    """A force or torque of a support, of the model and of one reference, as text; empty where unknown.
 
     Attributes:
-        support: what the support is on.
+        support: the selection of the support.
         quantity: "force" or "torque".
         name, label: of the reference.
-        mine, theirs: along each axis, of model and reference.
-        error: length of the difference over that of the reference's.
-        share_of_load: the reference's force over the total load.
+        mine, theirs: the vector of the model, of the reference.
+        error: norm of the difference over the norm of the reference.
+        share_of_load: force of the reference over the total load.
     """
 
     support: str
@@ -35,9 +35,9 @@ class SupportRow:
 
 
 def support_rows(result: Result) -> Iterator[SupportRow]:
-    """Yield force and torque of each moved support beside each reference, at the last level that both have.
+    """Yield force and torque of each moved support for each reference, at the last level that both have.
 
-    What vanishes in both is left out.
+    Those that vanish in both are left out.
     """
     for name, one in result.comparisons.items():
         called = (name, display_name(result, name))
@@ -54,7 +54,7 @@ def support_rows(result: Result) -> Iterator[SupportRow]:
 
 
 def _vector(vector: Floats, unit: str) -> str:
-    """A vector as text, in the unit of its largest component; components that are rounding beside that are zero."""
+    """Return a vector as text, in the unit of its largest component; rounding errors are zero."""
     largest = float(np.abs(vector).max())
     scale = natural_scale(largest, unit)
     parts = [0.0 if abs(part) <= 1e-9 * largest else part / scale.size for part in vector.tolist()]

@@ -1,4 +1,4 @@
-"""Supports of a body in 3D: clamped faces hatched at their rim, other nodes on pins and rollers."""
+"""Supports of a body in 3D: hatching at the rim of clamped faces, pins and rollers at other nodes."""
 
 import numpy as np
 
@@ -14,13 +14,13 @@ _SUPPORT = "#3d4248"
 
 
 def clamped_nodes(problem: Problem) -> Bools:
-    """Tell which nodes are held in every direction, shape (n_nodes,)."""
+    """Return which nodes are held in every direction, shape (n_nodes,)."""
     loading = problem.loading
     return np.asarray((loading.held & (loading.motion() == 0)).all(axis=1))
 
 
 def draw_supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
-    """Hatch the rim of clamped faces; nodes that are held besides stand on pins or rollers. `size` of a stroke [m]."""
+    """Hatch the rim of clamped faces, draw other held nodes on pins or rollers; `size` is that of a stroke [m]."""
     mesh, loading = problem.mesh, problem.loading
     points, facets = seen(mesh.nodes), facets_of(mesh)
     facing = normals(points, facets)
@@ -45,13 +45,13 @@ def draw_supports(area: Area, problem: Problem, scale: Scale, size: float) -> No
 
 
 def _thinned(places: Floats, nodes: Ints, spacing: float) -> Ints:
-    """Of nodes, one in each cube of an edge `spacing` [m]."""
+    """Return one of the nodes in each cube with edge `spacing` [m], shape (n,)."""
     cubes = np.floor(places[nodes] / spacing + 1e-6)
     return np.asarray(nodes[np.unique(cubes, axis=0, return_index=True)[1]])
 
 
 def _hatch(area: Area, points: Floats, facets: Ints, facing: Floats, scale: Scale, size: float) -> None:
-    """Short strokes out of the rim of a patch of facets, those that face away behind the body."""
+    """Draw short strokes at the rim of a patch of facets; those that face away are drawn behind the body."""
     if not len(facets):
         return
     edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)

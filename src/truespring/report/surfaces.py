@@ -1,14 +1,14 @@
-"""The surface of a body in 3D: triangles, normals, the lines that lie on it, and how it is seen on paper."""
+"""The surface of a body in 3D: facets, normals, lines on it, and its projection to the picture plane."""
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.mesh import Mesh
 
-# Where the eye is: at the front, to the right and above, far away. y is up, as bottom and top say.
+# Direction to the viewer, far away: in front, to the right, above. y is up, as in the selections bottom and top.
 _TOWARDS = (0.55, 0.5, 1.0)
 
-# Neighbours that meet at more than this angle have a sharp edge between them.
+# Facets whose normals differ by more than this angle have a sharp edge between them.
 _SHARP = np.cos(np.radians(30))
 
 
@@ -19,17 +19,17 @@ def _axes_of_view() -> Floats:
     return np.stack([right, np.cross(towards, right), towards])
 
 
-#: Unit vectors to the right, upwards and towards the eye, shape (3, 3).
+#: Unit vectors to the right, upwards and towards the viewer, shape (3, 3).
 VIEW = _axes_of_view()
 
 
 def seen(points: Floats) -> Floats:
-    """Return how far points, shape (..., 3), lie to the right, up and towards the eye, in their own unit."""
+    """Return points, shape (..., 3), in coordinates of the view: right, up, towards the viewer; units stay."""
     return np.asarray(points @ VIEW.T)
 
 
 def facets_of(mesh: Mesh) -> Ints:
-    """Return the facets that bound a body, outward and anticlockwise, shape (n, 3 or 4); of a network none."""
+    """Return the boundary facets of a body, anticlockwise from outside, shape (n, 3 or 4); none of a network."""
     return mesh.boundary if mesh.boundary.shape[1] > 2 else np.zeros((0, 3), dtype=np.int64)
 
 
@@ -42,9 +42,9 @@ def normals(points: Floats, facets: Ints) -> Floats:
 
 
 def lines_on(facets: Ints, lines: Ints) -> tuple[Bools, Ints]:
-    """Tell which lines, shape (n, 2), join two nodes of one facet, and of these the first and last such facet.
+    """Return which lines, shape (n, 2), join two nodes of a facet, and of those the first and last such facet.
 
-    Shapes (n,) and (m, 2).
+    The results have shapes (n,) and (m, 2).
     """
     k = facets.shape[1]
     pairs = np.array([(i, j) for j in range(k) for i in range(j)])
@@ -56,8 +56,8 @@ def lines_on(facets: Ints, lines: Ints) -> tuple[Bools, Ints]:
 
     of_facets = keys(facets[:, pairs]).ravel()
     order = np.argsort(of_facets, kind="stable")
-    known, wanted = of_facets[order], keys(lines)
-    first, last = (np.searchsorted(known, wanted, side) for side in ("left", "right"))
+    known, sought = of_facets[order], keys(lines)
+    first, last = (np.searchsorted(known, sought, side) for side in ("left", "right"))
     on = first < last
     return on, np.stack([order[first[on]], order[last[on] - 1]], axis=1) // len(pairs)
 
@@ -68,13 +68,13 @@ def edges_of(facets: Ints) -> Ints:
 
 
 def rims(facets: Ints) -> Ints:
-    """Return the edges of each facet as they go round it, shape (n, 2), facet after facet."""
+    """Return the edges of each facet in their order round it, shape (n, 2), facet after facet."""
     around = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
     return np.asarray(around[around[:, 0] != around[:, 1]])
 
 
 def outline(points: Floats, facets: Ints, silhouette: bool = False) -> Ints:
-    """Return the sharp edges of a surface, and with `silhouette` those where `seen` points turn away, shape (n, 2)."""
+    """Return the sharp edges of a surface, with `silhouette` also those between visible and hidden facets, (n, 2)."""
     edges = edges_of(facets)
     if not len(edges):
         return edges

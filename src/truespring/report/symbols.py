@@ -1,4 +1,4 @@
-"""Marks on a picture of a body: the probe, loads and prescribed motions as arrows, supports on pins and rollers."""
+"""Marks on a picture of a body: the probe, arrows of loads and prescribed motions, pins and rollers of supports."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ from truespring.arrays import Floats, Ints
 from truespring.loading import Mark
 from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
-from truespring.report.quantity import Scale, given
+from truespring.report.quantity import Scale, input_quantity
 from truespring.report.sheet import Area
 from truespring.report.style import LOAD, MOTION, POINT, RED
 from truespring.report.words import draw_words
 
-#: From places of a body [m], shape (n, dim), to places on paper [m], shape (n, 2).
+#: A projection from positions [m], shape (n, dim), to the picture plane [m], shape (n, 2).
 View = Callable[[Floats], Floats]
 
 
-def as_it_is(points: Floats) -> Floats:
-    """Look at a plane body."""
+def plane_view(points: Floats) -> Floats:
+    """Return the points of a plane body unchanged."""
     return points
 
 
@@ -30,7 +30,7 @@ def draw_dot(area: Area, point: Floats) -> None:
 
 
 def draw_outside(area: Area, points: Floats) -> None:
-    """Draw crosses at nodes that lie outside of the other body, in units of the area."""
+    """Draw crosses at nodes outside of the other body, shape (n, 2) in units of the area."""
     _draw_marks(area, points, "outside", marker="x", color=LOAD, ms=4.5, mew=1.2, zorder=9, clip_on=False)
 
 
@@ -42,9 +42,14 @@ def _draw_marks(area: Area, points: Floats, name: str, **style: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A load or a prescribed motion on paper: from tail to head [m], the nodes it acts on, what is written beside it.
+    """The arrow of a load or a prescribed motion in the picture plane.
 
-    `side` is 1 where the text stands to the right, -1 where to the left; it ends before `room`.
+    Attributes:
+        ends: tail and head [m], shape (2,) each.
+        side: 1 if the text is on the right, -1 if on the left.
+        room: the far end of the text [m], shape (2,).
+        nodes: the nodes it acts on.
+        text, color: of the label.
     """
 
     ends: tuple[Floats, Floats]
@@ -74,11 +79,11 @@ def find_acting(problem: Problem) -> Iterator[Acting]:
 
 
 def _acting(mark: Mark, color: str) -> Acting:
-    text = f"{mark.symbol} = {given(float(f'{mark.size:.4g}'), mark.unit)}"
+    text = f"{mark.symbol} = {input_quantity(float(f'{mark.size:.4g}'), mark.unit)}"
     return Acting(mark.nodes, mark.vector, text, color)
 
 
-def find_arrows(problem: Problem, size: float, view: View = as_it_is) -> list[Arrow]:
+def find_arrows(problem: Problem, size: float, view: View = plane_view) -> list[Arrow]:
     """Return the arrows of all loads and motions of a body that is about `size` [m] large."""
     mesh = problem.mesh
     middle = (mesh.lower + mesh.upper) / 2
@@ -92,9 +97,9 @@ def find_arrows(problem: Problem, size: float, view: View = as_it_is) -> list[Ar
         along = float(direction @ outward)
         length = 0.13 * size * direction
         gap = 0.025 * size
-        if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # it pulls or presses: off the body's face
+        if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # mainly normal to the face: outside of it
             tail = centre + gap * direction if along > 0 else centre - gap * direction - length
-        else:  # it shears: beside the face
+        else:  # mainly tangential: along the face
             beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
             tail = centre + 2 * gap * beside - length / 2
         start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
@@ -116,11 +121,11 @@ def draw_drive(area: Area, arrow: Arrow, scale: Scale) -> None:
 
 
 def draw_loaded(area: Area, points: Floats, color: str) -> None:
-    """Draw dots where a load or a motion acts, in units of the area."""
+    """Draw dots at the nodes of a load or a motion, shape (n, 2) in units of the area."""
     _draw_marks(area, points, "loaded", marker="o", color=color, ms=3, zorder=8)
 
 
-# A unit of a pin is half of 11 points; the line under a roller is its widest part.
+# Twice the unit length of a pin [points]; the line under a roller is its widest part.
 _SYMBOL = 11.0
 #: The width of a roller [inch].
 ROLLER = 1.4 * _SYMBOL / 2 * POINT
@@ -134,9 +139,9 @@ def draw_pin(
     roller: bool = True,
     zorder: float = 6,
 ) -> None:
-    """Draw a triangle whose tip touches the node; under a roller a line, set off. Sized in points, as text is.
+    """Draw a triangle with its tip at the node, for a roller with a line below; its size is fixed, as that of text.
 
-    With `beside` it stands off the node on an arm, so that it does not cover the edge that it runs along.
+    `beside`, shape (2,), shifts it off the node on an arm, so that it does not cover the edge it slides along.
     """
     from matplotlib.path import Path as Outline
 
@@ -150,5 +155,5 @@ def draw_pin(
         corners = [np.zeros(2)] + [corner + beside for corner in corners]
         codes = [Outline.MOVETO, Outline.LINETO, *codes[1:]]
     symbol = Outline(np.array(corners), codes)
-    size = _SYMBOL * float(np.abs(corners).max())  # markers are scaled to one extent, the triangle is to stay the same
+    size = _SYMBOL * float(np.abs(corners).max())  # undo matplotlib's scaling of markers to unit extent
     _draw_marks(area, point, "support", marker=symbol, ms=size, color="white", mec="#3d4248", mew=0.9, zorder=zorder)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def moduli_line(title: str, moduli: Moduli) -> str:
-    """Return the effective moduli of springs in one line, beside those of the material in its section."""
+    """Return the effective moduli of springs and those of the material in its section, in one line."""
     (low, high), (least, most) = moduli.young_range, moduli.poisson_range
     scale = natural_scale(high, "Pa")
     young = _span(f"{low / scale.size:.4g}", f"{high / scale.size:.4g}")
@@ -28,14 +28,14 @@ def _span(first: str, last: str) -> str:
 
 
 def moduli_table(title: str, moduli: Moduli) -> "Table":
-    """Return the effective moduli of springs beside those of the material in its section."""
+    """Return a table of the effective moduli of springs and those of the material in its section."""
     plane = moduli.dim == 2
-    # Finite elements realise the material, but for bending on a coarse mesh.
+    # The moduli of finite elements are those of the material, except in bending on a coarse mesh.
     elements = ("four-node FEM" if plane else "eight-node FEM",) if moduli.bending else ()
     table = new_table(title, "", "springs", *elements, "material")
 
-    def add(what: str, found: str, wanted: str = "") -> None:
-        table.add_row(what, found, *[wanted] * (1 + len(elements)))
+    def add(what: str, springs: str, material: str = "") -> None:
+        table.add_row(what, springs, *[material] * (1 + len(elements)))
 
     young, poisson = f"{moduli.material_young:.6g}", f"{moduli.material_poisson:.4f}"
     directions = _PLANE if plane else _SPACE
@@ -57,7 +57,7 @@ def moduli_table(title: str, moduli: Moduli) -> "Table":
     return table
 
 
-# Directions in which moduli are told: angles from x to y, or vectors.
+# Directions of the moduli listed: angles from x to y [degrees], or vectors.
 _PLANE: dict[str, float | tuple[int, ...]] = {"at 0 degrees": 0.0, "at 45 degrees": 45.0}
 _SPACE: dict[str, float | tuple[int, ...]] = {
     "along x": (1, 0, 0),
@@ -69,7 +69,7 @@ _SPACE: dict[str, float | tuple[int, ...]] = {
 
 
 def _section(moduli: Moduli, depth: int) -> str:
-    """The section that is bent: this mesh's own, or of so many elements, in space as many across."""
+    """Return the name of a bending factor: of this mesh, or of a section with `depth` elements (squared in 3D)."""
     elements = "element" if depth == 1 else "elements"
     if depth == moduli.depth:
         return f"bending factor EI, {depth} {elements} deep (this mesh)"
@@ -79,7 +79,7 @@ def _section(moduli: Moduli, depth: int) -> str:
 
 
 def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
-    """Return the stiffness rules: what each is made for, what it realises, and where it comes from."""
+    """Return a table of the stiffness rules: elements, idea, effective moduli and source."""
     table = new_table("Stiffness rules", "rule", "", "uses nu", "")
     for name, rule in rules.items():
         uses = "yes" if rule["follows_poisson"] else "no"
@@ -89,7 +89,7 @@ def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
 
 
 def result_tables(result: Result) -> "Iterator[Table | str]":
-    """Yield the status of every model, errors, notes and warnings of a study."""
+    """Yield tables and texts: status of every model, errors, notes and warnings of a study."""
     table = new_table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
     for name, path in result.paths.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
@@ -122,13 +122,13 @@ def _error_table(result: Result) -> "Table":
 
 
 def support_table(result: Result) -> "Table | None":
-    """Return force and torque of each moved support, of the model and of each reference; None where none are known."""
+    """Return force and torque of each moved support, of the model and of each reference; None if none is known."""
     rows = list(support_rows(result))
     if not rows:
         return None
     loaded = any(row.share_of_load for row in rows)
     columns = ("", f"'{result.model}'", "reference", "error", *(("of the load",) if loaded else ()))
-    table = new_table("What moved supports take", "support", *columns)
+    table = new_table("Forces and torques of moved supports", "support", *columns)
     for row in rows:
         shares = [row.share_of_load or "-"] if loaded else []
         table.add_row(row.support, f"{row.quantity}, {row.label}", row.mine, row.theirs, row.error or "-", *shares)
@@ -140,7 +140,7 @@ def _share(error: float | None) -> str:
 
 
 def new_table(title: str, *columns: str) -> "Table":
-    """Return an empty table; named columns but the first are aligned right."""
+    """Return an empty table; the first column and columns without a name are aligned left, others right."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left")

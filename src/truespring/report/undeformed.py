@@ -1,4 +1,4 @@
-"""A body before it moves, as it is drawn: its mesh and springs, supports, loads and the probe."""
+"""The undeformed body of a figure: mesh, springs, supports, loads and the probe."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from truespring.report.style import BLUE, INK, RED
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Undeformed:
-    """A body before it moves.
+    """An undeformed body.
 
     Attributes:
         problem: mesh, supports and loads.
-        probe: number of the node that is marked; None where it is not known before solving.
-        springs: pairs of nodes that springs join, shape (n, 2); None where the model has none.
-        springs_are: what these are called, "springs" or "links".
-        is_cloud: whether the body was read as points alone.
+        probe: number of the watched node; None if it is not known before solving.
+        springs: pairs of nodes joined by springs, shape (n, 2); None without springs.
+        springs_are: "springs" or "links".
+        is_cloud: whether the body was read as points without elements.
     """
 
     problem: Problem
@@ -38,7 +38,7 @@ class Undeformed:
         return f"Undeformed: {', '.join(counts)}"
 
     def legend(self, elements: bool) -> tuple[Entry, ...]:
-        """Return the legend, with an entry for `elements` where they are drawn."""
+        """Return the legend, with an entry for elements if `elements` are drawn."""
         entries = [Entry("elements", INK)] if elements else []
         entries += [Entry(self.springs_are, BLUE)] if self.springs is not None else []
         entries += [Entry("probe", RED, "o", "")] if self.probe is not None else []
@@ -46,12 +46,12 @@ class Undeformed:
 
 
 def spring_lines(path: Solution) -> Ints | None:
-    """Return the pairs of nodes that the springs of a model join, shape (n, 2); None where it has none."""
+    """Return the pairs of nodes joined by the springs of a model, shape (n, 2); None without springs."""
     springs: Ints | None = getattr(path.potential, "springs", None)
     return springs
 
 
 def undeformed_of(result: Result) -> Undeformed:
-    """Return the undeformed body of a result, with the springs of the compared model, else of the first one."""
+    """Return the undeformed body of a result, with the springs of the compared or, without one, the first model."""
     model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
     return Undeformed(result.problem, result.probe, spring_lines(model), model.lines, model.is_cloud)

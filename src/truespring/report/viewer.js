@@ -1,5 +1,5 @@
-// Draws the model over a reference at each load level. Plain JavaScript, no library, nothing is fetched.
-// Bodies in 3D are painted by truespringScene, of scene.min.js.
+// Draws the model over a reference at each load level. Plain JavaScript without library or network access.
+// Bodies in 3D are drawn by truespringScene of scene.min.js.
 "use strict";
 (() => {
   const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7";
@@ -11,7 +11,7 @@
 
   for (const host of document.querySelectorAll("[data-viewer]")) {
     const data = JSON.parse(document.getElementById(host.dataset.viewer).textContent);
-    host.hidden = false; // first: hidden it has no width to draw in
+    host.hidden = false; // first: a hidden element has no width
     start(host, unpack(data));
   }
 
@@ -50,7 +50,7 @@
     for (const box of boxes) box.addEventListener("change", () => draw());
     play.addEventListener("click", () => (playing ? stop() : run()));
     let width = 0, asked = 0;
-    new ResizeObserver(([entry]) => { // once a frame, and not for the height that draw() itself sets
+    new ResizeObserver(([entry]) => { // once per frame, and not for the height that draw() sets
       if (entry.contentRect.width === width) return;
       width = entry.contentRect.width;
       cancelAnimationFrame(asked);
@@ -66,7 +66,7 @@
 
     function run() {
       const last = model.levels.length - 1, from = Number(slider.value) >= last ? 0 : Number(slider.value);
-      const began = performance.now(), pace = Math.max(120, 3000 / Math.max(last, 1)); // ms a level
+      const began = performance.now(), pace = Math.max(120, 3000 / Math.max(last, 1)); // ms per level
       play.textContent = "Pause";
       const step = (now) => {
         const at = Math.min(last, from + Math.max(0, now - began) / pace);
@@ -77,7 +77,7 @@
       playing = requestAnimationFrame(step);
     }
 
-    // Positions at a place between two levels: between equilibria a straight line, for the eye only.
+    // Positions between two levels, interpolated linearly for the animation only.
     function at(path, place) {
       const low = Math.floor(place), high = Math.ceil(place);
       const a = index(path, low), b = index(path, high);
@@ -87,8 +87,8 @@
     }
 
     function index(path, level) {
-      const wanted = model.levels[level];
-      return path.positions.length ? path.levels.findIndex((one) => Math.abs(one - wanted) < 1e-9) : -1;
+      const sought = model.levels[level];
+      return path.positions.length ? path.levels.findIndex((one) => Math.abs(one - sought) < 1e-9) : -1;
     }
 
     function surface(level) {
@@ -104,7 +104,7 @@
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
       };
       paint(shown);
-      say(level, reference && reference.beyond && leaves(shown.outline ? shown.outline.points : shown.theirs));
+      write(level, reference && reference.beyond && leaves(shown.outline ? shown.outline.points : shown.theirs));
     }
 
     function leaves(points) {
@@ -112,20 +112,20 @@
       return points && points.some((value, i) => value < -1 || value > ends[i % dim] + 1);
     }
 
-    function say(level, gone) {
+    function write(level, gone) {
       const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
       const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
-      // Under loads the force is the same for all; a motion takes another of each.
-      const told = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
+      // Under loads the force is the same for all paths; under a prescribed motion it is not.
+      const state = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
       if (!data.motion) parts.push(force(model, level));
-      parts.push(`<i class="blue"></i>${told(model, level)}`);
+      parts.push(`<i class="blue"></i>${state(model, level)}`);
       if (reference) {
         const other = index(reference, level);
-        if (other >= 0) parts.push(`<i class="black"></i>${told(reference, other)}`);
-        if (gone) parts.push("it leaves the picture");
+        if (other >= 0) parts.push(`<i class="black"></i>${state(reference, other)}`);
+        if (gone) parts.push("the reference leaves the picture");
         if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
         if (other >= 0 && level && reference.most && reference.most[other]) parts.push(`at most <b>${reference.most[other]}</b>`);
-        if (other < 0 && level) parts.push(surface(level) ? "an outline only" : "the reference is not known at this level");
+        if (other < 0 && level) parts.push(surface(level) ? "outline only" : "the reference has no result at this level");
       }
       readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
     }
@@ -156,7 +156,7 @@
           context.lineTo(x(q, lines[i + 1]), y(q, lines[i + 1]));
         }
         context.strokeStyle = color;
-        context.lineWidth = thick * Math.min(1, Math.max(0.3, Math.sqrt(1500 / lines.length))); // fine meshes finer
+        context.lineWidth = thick * Math.min(1, Math.max(0.3, Math.sqrt(1500 / lines.length))); // thinner lines for fine meshes
         context.stroke();
       };
       const dot = (p, i, radius, fill, edge) => {
@@ -173,7 +173,7 @@
       context.save();
       context.beginPath();
       context.rect(0, 0, width, scale * high + 2 * pad);
-      context.clip(); // of paths that leave the picture
+      context.clip(); // clips paths that leave the picture
       context.setLineDash([4, 3]);
       stroke(data.rest, data.outline, FAINT, 1);
       context.setLineDash([]);
@@ -199,7 +199,7 @@
     };
   }
 
-  // A bar of a round length, so that the picture has a size; `scale` is pixels a unit.
+  // A scale bar of a round length; `scale` is pixels per unit.
   function bar(context, unit, scale, bottom, left) {
     const aim = 90 / scale, power = 10 ** Math.floor(Math.log10(aim));
     const length = [5, 2, 1].map((digit) => digit * power).find((value) => value <= aim) || power;
@@ -215,7 +215,7 @@
     context.fillText(`${+length.toPrecision(3)} ${unit}`, left + length * scale + 7, bottom + 1);
   }
 
-  // Without WebGL: the picture that the page has of the model over a reference, and why.
+  // Without WebGL: the figure of the model over a reference, and the reason.
   function instead(host) {
     const picture = host.parentElement.querySelector("figure.over img");
     for (const part of host.querySelectorAll("canvas, .controls, output")) part.remove();

@@ -1,4 +1,4 @@
-"""What the page's pictures that move are drawn from: the positions of every path at every load level, packed."""
+"""Data of the interactive views of a page: packed positions of every path at every load level."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,9 +17,9 @@ from truespring.report.verdict import drive
 
 
 def viewer(result: Result, budget: int) -> dict[str, Any] | None:
-    """Return what a study's moving picture is drawn from, as values that JSON can hold.
+    """Return the data of a study's interactive view as JSON values.
 
-    None where nothing moves, or where it would take more than `budget` numbers.
+    None if nothing moves, or if more than `budget` numbers were needed.
     """
     mesh = result.problem.mesh
     shown = _shown(result)
@@ -55,7 +55,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
 
 
 def _shown(result: Result) -> list[str]:
-    """The paths that are drawn: the model, then all that it can be laid over; none where the model does not move."""
+    """Return the names of the paths to draw: the model, then its references; none if the model does not move."""
     order = [result.model] if result.model is not None else []
     names = order + [name for name in result.paths if name not in order]
     shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
@@ -64,24 +64,24 @@ def _shown(result: Result) -> list[str]:
 
 
 def _only_surface(path: Solution) -> bool:
-    """Whether a path was read from a file that does not tell where each node went."""
+    """Return whether a path was read from a file with a surface but without displacements of nodes."""
     return path.surface is not None and not path.states
 
 
 def _cloud(path: Solution, factor: float) -> Floats:
-    """Every place [m] that the viewer draws of a path, shape (n, dim)."""
+    """Return all points [m] that the view draws of a path, shape (n, dim)."""
     clouds = [path.problem.mesh.nodes + factor * state.displacement for state in path.states]
     return np.concatenate(clouds + ([path.surface.points] if path.surface is not None and factor == 1 else []))
 
 
 def _levels(path: Solution, budget: int) -> list[float]:
-    """The load levels to keep so that no more than `budget` states are: every n-th, first and last always."""
+    """Return the load levels to keep, at most `budget`: every n-th, with the first and the last."""
     levels = path.load_factors.tolist()
     step = max(1, -(-len(levels) // max(budget - 1, 1)))
     return [levels[0], *levels[:0:-step][::-1]] if budget > 1 else []
 
 
-# A resultant of reactions below this share of their sum is rounding.
+# A resultant of reactions below this share of their sum is a rounding error.
 _ROUNDING = 1e-9
 
 
@@ -95,7 +95,7 @@ def _force(along: float, state: State) -> str:
 def _path(
     result: Result, name: str, levels: Sequence[float], pack: Packing, factor: float, beyond: bool
 ) -> dict[str, Any]:
-    """What is drawn and told of a path; `beyond` tells that it leaves the picture, `factor` magnifies."""
+    """Return positions and text of a path by level; `beyond`: it leaves the picture; `factor`: magnification."""
     path = result.paths[name]
     to = drive(result)
     rest = path.problem.mesh.nodes

@@ -1,4 +1,4 @@
-"""Words in figures as outlines, laid out once for all figures and files; matplotlib's own take most of the time."""
+"""Text in figures as outlines, laid out once for all figures; matplotlib's text would take most of the drawing time."""
 
 from functools import cache
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
 
-# The height of DejaVu's capital letters and digits, over its size.
+# Height of DejaVu's capital letters and digits over the font size.
 _CAPITAL = 0.729
 
 
@@ -29,10 +29,10 @@ def draw_words(
     upright: bool = False,
     halo: bool = False,
 ) -> None:
-    """Draw words whose capital letters have their middle at height y, and the share `align` of their width left of x.
+    """Draw a text, its capital letters centred at height y, with the share `align` of its width left of x.
 
-    Places are in inches, the `size` in points. `upright` words run upwards; a `halo` keeps them legible on
-    lines. The artist's label is the text.
+    x and y are in inches, `size` is in points. `upright` text runs upwards; a `halo` keeps it legible on lines. The
+    label of the artist is the text.
     """
     from matplotlib.patches import PathPatch
     from matplotlib.transforms import Affine2D
@@ -51,7 +51,7 @@ def draw_words(
 
 @cache
 def text_width(text: str, size: float, bold: bool = False) -> float:
-    """Return the width of a text in figures [inch]; `size` in points."""
+    """Return the width of a text [inch]; `size` is in points."""
     from matplotlib.textpath import text_to_path
 
     width, _, _ = text_to_path.get_text_width_height_descent(text, _font(bold), ismath=False)
@@ -60,7 +60,7 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
 
 @cache
 def _outline(text: str, bold: bool) -> "Path":
-    """The outline of a text of size 1, its baseline from (0, 0) on."""
+    """Return the outline of a text of size 1, with its baseline starting at (0, 0)."""
     from matplotlib.path import Path
     from matplotlib.textpath import text_to_path
 

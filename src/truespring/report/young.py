@@ -1,4 +1,4 @@
-"""Young's modulus by direction: a curve about the origin in the plane, a surface in space."""
+"""Young's modulus by direction: a polar curve in 2D, a surface in 3D."""
 
 import itertools
 import math
@@ -27,16 +27,16 @@ _TITLE = "Young's modulus by direction"
 _DASHES = (0, (5, 2))
 _MOST_COLUMNS = 3
 
-# A panel of the figure in space, what stands above and below all of them [inch].
+# Size of a panel in 3D, height of its caption, of the title above and the colour bar below all panels [inch].
 _PANEL, _CAPTION, _TOP, _FOOT = 2.5, 0.42, 0.36, 0.62
 
-# Light on surfaces comes from above, left of the eye; the least that a facet away from it gets.
+# Direction of the light, from above, left of the viewer; smallest brightness of a facet.
 _LIGHT, _DIMMEST = np.array([-0.35, 0.55, 0.76]), 0.62
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Known:
-    """Moduli to be drawn, how they are called, and the colour and dashes of their curve."""
+    """Moduli to draw, with label, colour and dashes of their curve."""
 
     label: str
     moduli: Moduli
@@ -45,7 +45,7 @@ class Known:
 
 
 def save_young(several: Mapping[str, Moduli], material: str, folder: FilePath) -> FilePath:
-    """Write the figure of springs by their labels as moduli.png and moduli.svg into `folder`; return the first."""
+    """Write the figure of several springs, by label, as moduli.png and moduli.svg into `folder`; return the first."""
     looks = itertools.cycle(SPRING_STYLES)
     known = [Known(label, moduli, *look[:2]) for (label, moduli), look in zip(several.items(), looks, strict=False)]
     folder.mkdir(parents=True, exist_ok=True)
@@ -57,20 +57,20 @@ def save_young(several: Mapping[str, Moduli], material: str, folder: FilePath) -
 
 
 def young_figure(several: Sequence[Known], material: str) -> Sheet:
-    """Young's modulus in a test along every direction, of springs beside the `material`, as its moduli are called."""
+    """Return Young's modulus in a tensile test along every direction, of springs and of the `material` (its name)."""
     return (_surfaces if several[0].moduli.dim == 3 else _polar)(several, material)
 
 
 def _polar(several: Sequence[Known], material: str) -> Sheet:
-    """The springs' curves against the material's circle."""
+    """Return polar curves of springs, and the circle of the material."""
     from matplotlib.lines import Line2D
 
-    wanted = several[0].moduli.material_young
+    young = several[0].moduli.material_young
     angles = np.radians(np.arange(0.0, 361.0))
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    largest = max(wanted, *(known.moduli.young_range[1] for known in several))
+    largest = max(young, *(known.moduli.young_range[1] for known in several))
     scale = natural_scale(largest, "Pa")
-    legend = [Entry(f"{material}: {quantity(wanted, 'Pa')}", INK, linestyle=_DASHES)]
+    legend = [Entry(f"{material}: {quantity(young, 'Pa')}", INK, linestyle=_DASHES)]
     for known in several:
         extremes = dict.fromkeys(quantity(value, "Pa") for value in known.moduli.young_range)
         legend.append(Entry(f"{known.label}: {' to '.join(extremes)}", known.color, linestyle=known.dashes))
@@ -81,7 +81,7 @@ def _polar(several: Sequence[Known], material: str) -> Sheet:
     place = (0.12 * width, 0.65 + ROW * len(several), 0.76 * width, 0.76 * width)
     area = Area(sheet, *place, (-end, end), (-end, end))
     _draw_compass(area)
-    area.add(Line2D(*(wanted / scale.size * directions.T), color=INK, lw=1.3, ls=_DASHES))
+    area.add(Line2D(*(young / scale.size * directions.T), color=INK, lw=1.3, ls=_DASHES))
     for known in several:
         values = known.moduli.young_along(directions)[:, None] / scale.size
         area.add(Line2D(*(values * directions).T, color=known.color, lw=2, ls=known.dashes))
@@ -91,15 +91,15 @@ def _polar(several: Sequence[Known], material: str) -> Sheet:
 
 
 def _draw_compass(area: Area) -> None:
-    """Draw rings about the middle of an area, at round numbers, and rays at every 45 degrees."""
+    """Draw rings at round numbers and rays at every 45 degrees around the centre of an area."""
     from matplotlib.patches import Circle
 
     end = area.x[1]
     numbers = round_numbers(0.0, end, 5)[1:]
-    for number, told in zip(numbers, written(numbers), strict=True):
+    for number, label in zip(numbers, written(numbers), strict=True):
         area.add(Circle((0, 0), number, fill=False, ec=GRID, lw=0.6, zorder=0.5))
         x, y = area.place(number * np.array([np.cos(np.pi / 8), np.sin(np.pi / 8)]))
-        draw_words(area.sheet, x, y + 3 * POINT, told, SIZE)
+        draw_words(area.sheet, x, y + 3 * POINT, label, SIZE)
     angles = np.arange(0, 360, 45)
     rays = end * np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     draw_lines(area, np.stack([0 * rays, rays], axis=1), GRID, 0.6, 0.5, "rays")
@@ -107,11 +107,11 @@ def _draw_compass(area: Area) -> None:
         draw_words(area.sheet, x, y, f"{angle}°", SIZE, align=0.5)
 
 
-# --- in space ---------------------------------------------------------------------------------------
+# --- 3D ---------------------------------------------------------------------------------------------
 
 
 def _surfaces(several: Sequence[Known], material: str) -> Sheet:
-    """A surface for each springs model, its radius and colour E over the material's, which is the sphere of wires."""
+    """Return a surface for each springs model, with radius and colour E over that of the material (the sphere)."""
     columns = min(len(several), _MOST_COLUMNS)
     rows = math.ceil(len(several) / columns)
     width = max(columns * _PANEL, 3.6)
@@ -139,14 +139,14 @@ def _surfaces(several: Sequence[Known], material: str) -> Sheet:
     marks = np.array(_marks(farthest))
     shown = colors(np.linspace(0, 1, 256))[:, :3]
     draw_bar(sheet, width / 2 - 1.2, 0.49, 2.4, shown, np.asarray(norm(marks)), [f"{mark:g}" for mark in marks])
-    wanted = quantity(several[0].moduli.material_young, "Pa")
-    under = f"times that of the {material}, {wanted} (the sphere)"
-    draw_words(sheet, width / 2, 0.11, under, 7.5, align=0.5)
+    young = quantity(several[0].moduli.material_young, "Pa")
+    caption = f"times that of the {material}, {young} (the sphere)"
+    draw_words(sheet, width / 2, 0.11, caption, 7.5, align=0.5)
     return sheet
 
 
 def _colors(farthest: float) -> "tuple[Colormap, Normalize]":
-    """Orange where springs are softer than the material, blue where stiffer, on a scale of factors."""
+    """Return colours and a logarithmic scale: orange for springs softer than the material, blue for stiffer ones."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
     middle = "#eef0f2"
@@ -154,14 +154,14 @@ def _colors(farthest: float) -> "tuple[Colormap, Normalize]":
 
 
 def _marks(farthest: float) -> list[float]:
-    """Round factors below, at and above 1."""
+    """Return round factors below, at and above 1, as labels of the colour bar."""
     above = [factor for factor in (1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0) if factor <= farthest]
     below = [factor for factor in (0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02) if factor >= 1 / farthest]
     return [*below[-2:][::-1], 1.0, *above[-2:]]
 
 
 def _draw_surface(area: Area, corners: Floats, share: Floats, color: Callable[[Floats], Any]) -> None:
-    """Facets that face the eye, the ones behind first, as an image: in an SVG they would be thousands of elements."""
+    """Draw the facets that face the viewer, far ones first, as an image: as SVG they would be thousands of elements."""
     across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     towards = np.flatnonzero(across[:, 2] > 0)
     order = towards[np.argsort(corners[towards, :, 2].mean(axis=1))]
@@ -193,7 +193,7 @@ def _share(moduli: Moduli, directions: Floats) -> Floats:
 
 
 def _facets(moduli: Moduli) -> tuple[Floats, Floats]:
-    """Corners of the surface's facets as the eye sees them, anticlockwise, shape (n, 4, 3), and their shares."""
+    """Return the corners of the surface's facets in the view, (n, 4, 3), and E over the material's, (n,)."""
     polar, around = np.meshgrid(np.linspace(0, np.pi, 91), np.linspace(0, 2 * np.pi, 181), indexing="ij")
     n = _on_sphere(polar, around)
     share = _share(moduli, n.reshape(-1, 3)).reshape(polar.shape)
@@ -204,13 +204,13 @@ def _facets(moduli: Moduli) -> tuple[Floats, Floats]:
 
 
 def _on_sphere(polar: Floats, around: Floats) -> Floats:
-    """Unit vectors by the angle from y and that about it from z on, shape (..., 3)."""
+    """Return unit vectors, shape (..., 3), by the polar angle from y and the azimuth about y from z [rad]."""
     polar, around = np.broadcast_arrays(polar, around)
     return np.stack([np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=-1)
 
 
 def _draw_sphere(area: Area, moduli: Moduli) -> None:
-    """Outline, meridians and parallels of the material's sphere, where neither it nor the surface hides them."""
+    """Draw outline, meridians and parallels of the material's sphere where neither it nor the surface hides them."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -223,7 +223,7 @@ def _draw_sphere(area: Area, moduli: Moduli) -> None:
 
 
 def _visible_pieces(line: Floats, moduli: Moduli) -> list[Floats]:
-    """What the eye sees of a line, each piece as places on paper, shape (n, 2)."""
+    """Return the visible pieces of a line, shape (n, 3), each projected to the picture plane, shape (m, 2)."""
     visible = _visible(line, moduli)
     cuts = np.flatnonzero(visible[1:] != visible[:-1]) + 1
     runs = zip(np.split(line, cuts), np.split(visible, cuts), strict=True)
@@ -231,7 +231,7 @@ def _visible_pieces(line: Floats, moduli: Moduli) -> list[Floats]:
 
 
 def _visible(points: Floats, moduli: Moduli) -> Bools:
-    """Whether the eye sees points on or outside the sphere: on this side of it, and not behind the surface."""
+    """Return which points on or outside the sphere are visible: on the near side of it and not behind the surface."""
     far = 1 + moduli.young_range[1] / moduli.material_young
     ray = points[:, None] + np.linspace(0, far, 100)[:, None] * VIEW[2]
     distance = np.linalg.norm(ray, axis=2)

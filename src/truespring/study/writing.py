@@ -1,13 +1,13 @@
 """Write the results of a study: curves, summary, VTU series, STL, figures and report."""
 
 import json
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from truespring.equilibrium import Solution
 from truespring.outputs import Output, write_whole
 from truespring.reactions import moved_supports
+from truespring.report.command import command_line
 from truespring.report.curves import write_curves, write_reactions
 from truespring.report.result import Result
 from truespring.report.series import write_mesh, write_series, write_stl
@@ -69,4 +69,4 @@ def write_overview(results: Sequence[Result], out: Path) -> None:
 
 def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
     """Return the command line that runs `verify` on the studies."""
-    return shlex.join(["truespring", "verify", *(str(study.file) for study in studies), "--out", str(out)])
+    return command_line(["verify", *(str(study.file) for study in studies), "--out", str(out)])

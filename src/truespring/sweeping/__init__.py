@@ -1,4 +1,4 @@
-"""Many points of one study: solved on all cores or a cluster, kept whole, gone on with where they broke off."""
+"""Sweeps: one study with many values, solved on all cores or a cluster; an interrupted sweep can be continued."""
 
 from truespring.sweeping.pool import Failure as Failure
 from truespring.sweeping.pool import Pool as Pool

@@ -1,4 +1,4 @@
-"""Plots of a sweep: curves against one number, a map over two, dots by value for all else."""
+"""Plots of a sweep: lines over one number, maps over two numbers, dots by value otherwise."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ from truespring.report.words import draw_words, text_width
 
 Row = Mapping[str, Any]
 
-# So many curves can be told apart in one plot, so many plots be looked through on one page.
+# Largest number of lines in a plot, and of plots on a page.
 _MOST_CURVES, _MOST_PLOTS = 8, 12
 
 _UNITS = {
@@ -42,12 +42,12 @@ _STYLES: tuple[tuple[str, Any, str], ...] = (
 
 @dataclass(frozen=True)
 class Measured:
-    """What is drawn: a figure of each row by name of what it is of, None where it is not known.
+    """The quantity that is drawn.
 
     Attributes:
-        title: what it is, in words.
-        label: the same for an axis, with its unit.
-        values: by the name of the reference or model.
+        title: its name.
+        label: label of an axis, with its unit.
+        values: one value per row, None if unknown, by the name of the reference or model.
     """
 
     title: str
@@ -56,9 +56,9 @@ class Measured:
 
 
 def measured(rows: Sequence[Row]) -> Measured:
-    """Return the rms error against each reference [%]; where there is none, how far the probe of each model moves.
+    """Return the rms error against each reference [%]; without references, the probe's displacement in each model.
 
-    Of a point that failed nothing is drawn: what it reached is no result.
+    Values of failed points are None.
     """
     errors = [column for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")]
     if errors:
@@ -88,7 +88,7 @@ def _length(row: Row, prefix: str) -> float | None:
 
 
 def sweep_figures(keys: Sequence[str], rows: Sequence[Row]) -> Iterator[Sheet]:
-    """Yield the figures of a sweep, by how many of its keys are numbers of several values."""
+    """Yield the figures of a sweep; their kind depends on how many keys are numbers with several values."""
     what = measured(rows)
     if not any(value is not None for values in what.values.values() for value in values):
         return
@@ -110,7 +110,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _groups(rows: Sequence[Row], others: Sequence[str]) -> dict[str, list[int]]:
-    """Places of the rows that have the same values of all keys but the numbers, by those values in words."""
+    """Return the indices of rows with the same values of `others`, by those values as text."""
     groups: dict[str, list[int]] = {}
     for place, row in enumerate(rows):
         groups.setdefault(", ".join(_words(row[key]) for key in others), []).append(place)
@@ -122,7 +122,7 @@ def _words(value: Any) -> str:
 
 
 def _axis(key: str, values: Sequence[Any]) -> tuple[Floats, str]:
-    """Numbers of a key in their natural unit, and what the axis is called."""
+    """Return the values of a key with a unit prefix, shape (n,), and the label of the axis."""
     name = next((part for part in reversed(key.split(".")) if not part.isdigit()), key)
     numbers = np.array(values, dtype=np.float64)
     if name not in _UNITS:
@@ -131,25 +131,25 @@ def _axis(key: str, values: Sequence[Any]) -> tuple[Floats, str]:
     return numbers / scale.size, f"{key} [{scale.unit}]"
 
 
-# --- curves against one number --------------------------------------------------------------------
+# --- lines over one number ------------------------------------------------------------------------
 
 
 def _curves(key: str, rows: Sequence[Row], what: Measured, groups: Mapping[str, list[int]]) -> Iterator[Sheet]:
-    """A curve a reference; where more than the number is varied, a plot a reference and a curve a group."""
+    """Yield one plot with a line per reference; if other keys vary too, one plot per reference and a line per group."""
     x, label = _axis(key, [row[key] for row in rows])
     alone = len(groups) == 1
     names = list(what.values)
     plots = [(f"{what.title} against {key}", names, list(groups))] if alone else []
     plots += [] if alone else [(f"{what.title}: {name}", [name], list(groups)) for name in names]
-    for title, chosen, called in plots:
+    for title, columns, labels in plots:
         curves = []
-        for place, (name, group) in enumerate(itertools.product(chosen, called)):
+        for place, (name, group) in enumerate(itertools.product(columns, labels)):
             known = [at for at in groups[group] if what.values[name][at] is not None]
             if known:
                 y = np.array([what.values[name][at] for at in known], dtype=np.float64)
                 color, dashes, marker = _STYLES[place % len(_STYLES)]
-                called_so = name if alone else group
-                curves.append(Curve(x[known], y, color, dashes, marker, called_so, strong=False))
+                label_of_line = name if alone else group
+                curves.append(Curve(x[known], y, color, dashes, marker, label_of_line, strong=False))
         if curves:
             yield plot(title, label, what.label, curves).sheet
 
@@ -160,7 +160,7 @@ def _curves(key: str, rows: Sequence[Row], what: Measured, groups: Mapping[str, 
 def _maps(
     keys: tuple[str, str], rows: Sequence[Row], what: Measured, groups: Mapping[str, list[int]]
 ) -> Iterator[Sheet]:
-    """A map a reference and group, each in colours up to its own largest: cells where points fill a grid, else dots."""
+    """Yield one map per reference and group, each with its own colour range: cells if points fill a grid, else dots."""
     (x, x_label), (y, y_label) = (_axis(key, [row[key] for row in rows]) for key in keys)
     for name, (group, places) in itertools.product(what.values, groups.items()):
         values = np.array([np.nan if what.values[name][at] is None else what.values[name][at] for at in places])
@@ -197,7 +197,7 @@ def _map(
 
 
 def _cell_edges(values: Floats) -> Floats:
-    """Edges of cells about the distinct values: half way between them."""
+    """Return the edges of cells around the distinct values, half way between them."""
     at = np.unique(values)
     if len(at) == 1:
         return _about(values)
@@ -212,7 +212,7 @@ def _about(values: Floats) -> Floats:
 
 
 def _cells(edges: Sequence[Floats], places: tuple[Floats, Floats]) -> Floats:
-    """The corners of the cell about each place, shape (n, 4, 2)."""
+    """Return the corners of the cell around each place, shape (n, 4, 2)."""
     (left, right), (low, high) = (
         (cut[number], cut[number + 1])
         for cut, at in zip(edges, places, strict=True)
@@ -223,7 +223,7 @@ def _cells(edges: Sequence[Floats], places: tuple[Floats, Floats]) -> Floats:
 
 
 def _hatched(area: Area, corners: Floats) -> None:
-    """Cells without a value are crossed out."""
+    """Cross out cells without a value."""
     if len(corners):
         draw_lines(area, corners[:, [[0, 2], [1, 3]]].reshape(-1, 2, 2), FAINT, 0.8, 2, "failed")
 
@@ -237,7 +237,7 @@ def _crosses(area: Area, points: Floats) -> None:
 
 
 def _dots(area: Area, points: Floats, shares: Floats) -> None:
-    """Dots that are round on a sheet whose area has different units along its sides."""
+    """Draw round dots in an area with different scales along its sides."""
     if len(points):
         inches = Area(area.sheet, area.left, area.bottom, area.width, area.height, (0, area.width), (0, area.height))
         draw_shaded_dots(inches, area.place(points) - (area.left, area.bottom), shares)
@@ -247,7 +247,7 @@ def _dots(area: Area, points: Floats, shares: Floats) -> None:
 
 
 def _strips(key: str, rows: Sequence[Row], what: Measured) -> Sheet:
-    """All points by the value of one key, a kind of dot a reference, whatever else is varied."""
+    """Return all points by the value of one key, with one marker per reference."""
     values = [row[key] for row in rows]
     if all(map(_is_number, values)):
         x, label = _axis(key, values)
@@ -268,7 +268,7 @@ def _strips(key: str, rows: Sequence[Row], what: Measured) -> Sheet:
     draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)
     for place, (name, column) in enumerate(what.values.items()):
         color, _, marker = _STYLES[place % len(_STYLES)]
-        # Those of one value stand side by side, a reference beside the next.
+        # Points of the same value are shifted sideways by reference.
         aside = (place + 1) / (len(what.values) + 1) - 0.5 if names else 0.0
         at = [number for number, value in enumerate(column) if value is not None]
         _marks(area, x[at] + 0.7 * aside, np.array([column[number] for number in at], dtype=float), color, marker)

@@ -1,4 +1,4 @@
-"""What a sweep tells: a table for a terminal, and one page of plots that loads nothing from anywhere."""
+"""A sweep as a table for a terminal and as a page."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
 
 Row = Mapping[str, Any]
 
-# More rows than a page can show, or a reader read: sweep.csv has all of them.
+# Largest number of rows on a page; sweep.csv has all of them.
 _MOST_ROWS = 300
 
 
 def sweep_table(keys: Sequence[str], rows: Sequence[Row]) -> "Table":
-    """Return the smallest and largest rms error against each reference, and where they are."""
+    """Return a table of the smallest and largest rms error against each reference, with their points."""
     from rich.table import Table
 
     failed = sum(row["status"] != "converged" for row in rows)
-    title = f"{len(rows)} points" + (f", {failed} of them failed" if failed else ", all converged")
+    title = f"{len(rows)} points" + (f", {failed} failed" if failed else ", all converged")
     table = Table(title=title, title_justify="left")
     table.add_column("rms error against")
     table.add_column("")
     table.add_column("", justify="right")
-    table.add_column("where")
+    table.add_column("point")
     for reference, extremes in _extremes(rows).items():
         for which, row in extremes.items():
             value = f"{row[_error_of(reference)]:.2%}"
@@ -41,7 +41,7 @@ def _error_of(reference: str) -> str:
 
 
 def _extremes(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
-    """The rows of the smallest and of the largest rms error, by reference, of points that converged."""
+    """Return the rows with the smallest and the largest rms error of converged points, by reference."""
     references = [
         column.split(".")[1] for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")
     ]
@@ -59,10 +59,10 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
     """Return the page as HTML.
 
     Args:
-        file, title: of the study that was varied.
-        keys: what was varied.
-        rows: a point each, as in the table.
-        command: what does it again, where it was a command line.
+        file, title: of the study.
+        keys: the varied keys.
+        rows: one per point, as in the table.
+        command: the command line that repeats the run, if there is one.
     """
     drawn = drawings((str(number), sheet) for number, sheet in enumerate(sweep_figures(keys, rows)))
     failed = [row for row in rows if row["status"] != "converged"]

@@ -1,4 +1,4 @@
-"""The points of a sweep, checked before any is solved, each known by all that its result depends on."""
+"""The points of a sweep, checked before any is solved, each named by a digest of all input of its result."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from truespring.opening import open_file
 from truespring.study import StudyText, value_at
 from truespring.study.changes import changed
 
-# So many faults are told one by one.
+# Largest number of errors that are listed.
 _MOST_FAULTS = 8
 
 
@@ -23,10 +23,10 @@ class Point:
     """One study of a sweep.
 
     Attributes:
-        name: digest of all that its result depends on: study, values, files that it names, version of truespring.
-        changes: the varied values as they were given, by key.
-        values: the same as the study has them, in SI.
-        files: digest of each file that the study names, beside it.
+        name: digest of the study, its values, the files it refers to, and the version of truespring.
+        changes: the varied values as given, by key.
+        values: the varied values in SI, by key.
+        files: digest of each file that the study refers to.
     """
 
     name: str
@@ -37,13 +37,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Plan:
-    """All points of a sweep, none twice.
+    """The distinct points of a sweep.
 
     Attributes:
-        text: the study that is varied.
-        keys: what is varied, in the order it was given.
+        text: the study.
+        keys: the varied keys, in the order given.
         points: by name.
-        n_twice: how many points were given again.
+        n_twice: number of duplicate points.
     """
 
     text: StudyText
@@ -53,28 +53,30 @@ class Plan:
 
     @cached_property
     def frame(self) -> str:
-        """Digest of all that is not varied."""
+        """Digest of the study without the varied values."""
         fixed = changed(self.text.document, dict.fromkeys(self.keys))
         files = digests(self.text.file.parent, fixed, {})
         return _digest(json.dumps([fixed, files, version("truespring")], sort_keys=True, default=str))
 
 
 def make_plan(text: StudyText, several: Sequence[Mapping[str, Any]]) -> Plan:
-    """Check every point against the schema of studies; raise StudyError with the faults of all of them.
+    """Check every point against the schema of studies and return the plan; raise StudyError with all errors.
 
     Args:
         text: the study.
-        several: the changes of each point, by key; all have the same keys.
+        several: the changes of each point by key, all with the same keys.
     """
     if not several:
-        raise TruespringError("there is no point")
+        raise TruespringError("no points: give at least one")
     keys = tuple(several[0])
     points: dict[str, Point] = {}
     faults: dict[str, str] = {}
     known: dict[Path, str] = {}
     for number, changes in enumerate(several, 1):
         if set(changes) != set(keys):
-            raise TruespringError(f"point {number} sets {', '.join(changes)}, the first one {', '.join(keys)}")
+            raise TruespringError(
+                f"point {number} has the keys {', '.join(changes)}, the first one {', '.join(keys)}: use the same keys"
+            )
         try:
             point = _point(text, changes, keys, known)
         except StudyError as error:
@@ -82,27 +84,27 @@ def make_plan(text: StudyText, several: Sequence[Mapping[str, Any]]) -> Plan:
         else:
             points.setdefault(point.name, point)
     if faults:
-        told = list(faults.values())[:_MOST_FAULTS]
-        more = len(faults) - len(told)
-        raise StudyError("\n".join([*told, *([f"and {more} more like these"] if more else [])]))
+        shown = list(faults.values())[:_MOST_FAULTS]
+        more = len(faults) - len(shown)
+        raise StudyError("\n".join([*shown, *([f"and {more} more errors"] if more else [])]))
     return Plan(text, keys, points, len(several) - len(points))
 
 
 def _point(text: StudyText, changes: Mapping[str, Any], keys: Sequence[str], known: dict[Path, str]) -> Point:
-    table = text.keys(changes)
+    checked = text.keys(changes)
     files = digests(text.file.parent, changed(text.document, changes), known)
-    # The checked table, not the text: comments, and 4 kPa beside 4000, change nothing.
-    name = _digest(json.dumps([repr(table), files, version("truespring")], sort_keys=True))[:20]
-    return Point(name, changes, {key: _plain(value_at(table, key), changes[key]) for key in keys}, files)
+    # Use the checked keys, not the text, so that comments and units (4 kPa or 4000) do not matter.
+    name = _digest(json.dumps([repr(checked), files, version("truespring")], sort_keys=True))[:20]
+    return Point(name, changes, {key: _plain(value_at(checked, key), changes[key]) for key in keys}, files)
 
 
 def in_words(values: Mapping[str, Any]) -> str:
-    """Return values as people write them: material.young = 4 kPa, mesh.elements = [8, 2]."""
+    """Return values by key as text: material.young = 4 kPa, mesh.elements = [8, 2]."""
     return ", ".join(f"{key} = {value}" for key, value in values.items())
 
 
 def digests(folder: Path, tables: Any, known: dict[Path, str]) -> dict[str, str]:
-    """Return the digest of every file beside the study that any text of its tables names."""
+    """Return the digest of every file in the folder of the study that a string of its tables names."""
     found = {}
     for text in sorted(set(_texts(tables))):
         file = folder / text
@@ -114,13 +116,13 @@ def digests(folder: Path, tables: Any, known: dict[Path, str]) -> dict[str, str]
 
 
 def _digest_of(file: Path) -> str:
-    """The digest of a file, nothing where there is none."""
+    """Return the digest of a file, empty if there is none."""
     try:
         if not file.is_file():
             return ""
         with open_file(file, TruespringError) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
-    except (OSError, ValueError, TruespringError):  # a text that no file can be called
+    except (OSError, ValueError, TruespringError):  # not a valid file name
         return ""
 
 
@@ -139,10 +141,10 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _plain(value: Any, given: Any) -> Any:
-    """A value of the checked study as JSON can hold it; where it is an object by then, as it was given."""
+def _plain(value: Any, original: Any) -> Any:
+    """Return a value of the checked study if JSON can hold it, else the original value."""
     try:
         json.dumps(value)
     except TypeError:
-        return given
+        return original
     return value

@@ -1,4 +1,4 @@
-"""Independent points on a Dask cluster: each is solved, or its failure is told, whatever dies meanwhile."""
+"""Solve independent points on a Dask cluster, with recovery from workers and schedulers that die."""
 
 import itertools
 import logging
@@ -18,44 +18,44 @@ from truespring.sweeping.cluster import LocalCluster
 
 Key = TypeVar("Key", bound=Hashable)
 
-#: Told in words what goes on beside the points: a scheduler that is lost, workers that are waited for.
-Report = Callable[[str], None]
+#: Called with messages on the cluster: a scheduler is lost, or has no workers.
+Note = Callable[[str], None]
 
-# How often it is looked whether the scheduler still lives, while no point comes in [s].
+# Interval of checks of the scheduler while no point is finished [s].
 _LOOK = 0.5
 
-#: How long a scheduler may take to answer for the first time [s].
+#: Time limit of the first connection to a scheduler [s].
 FIRST_PATIENCE = 10.0
 
-# So many clusters of this machine in a row may die without one point solved.
+# Largest number of restarts of the local cluster in a row without a solved point.
 _MOST_STARTS = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A point that has no result, and why."""
+    """A point without result, and the reason."""
 
     reason: str
 
 
 class _LostError(Exception):
-    """The scheduler is no more, or cannot be reached."""
+    """The scheduler has died or cannot be reached."""
 
 
 class Pool:
-    """Workers that solve points, of this machine or of a cluster; closed at the end of a `with` block.
+    """Workers of this machine or of a cluster that solve points; a context manager.
 
-    A worker that is killed costs no point: another tries again. A point that kills its workers is a Failure. A
-    scheduler of our own that dies is started anew; one of others is waited for, `patience` seconds long. Only what
-    has no result yet is then solved again.
+    If a worker dies, another one solves its point. A point that kills its workers is a Failure. If the local scheduler
+    dies it is restarted; an external one is waited for up to `patience` seconds. Only points without result are solved
+    again.
 
     Args:
-        workers: processes on this machine, by default as many as cores.
-        scheduler: address of any Dask cluster, such as "tcp://10.0.0.1:8786"; its workers are taken instead.
-        threads: of BLAS and of our own kernels, in each worker.
-        patience: how long a scheduler may be out of reach [s].
-        timeout: after how long a worker that is still at one point is killed [s]; None is never.
-        report: told in words what goes on beside the points.
+        workers: number of processes on this machine, by default the number of cores.
+        scheduler: address of a Dask cluster to use instead, such as "tcp://10.0.0.1:8786".
+        threads: threads of BLAS and of the compiled loops in each worker.
+        patience: time limit to reconnect to a scheduler [s].
+        timeout: time limit of one point, after which its worker is killed [s]; None is no limit.
+        note: called with messages on the cluster.
     """
 
     def __init__(
@@ -66,17 +66,17 @@ class Pool:
         threads: int = 1,
         patience: float = 60.0,
         timeout: float | None = None,
-        report: Report | None = None,
+        note: Note | None = None,
     ) -> None:
-        """Start the workers, or connect; raise TruespringError where neither can be."""
+        """Start the workers or connect to the scheduler; raise TruespringError if that fails."""
         require_dask()
         if workers is not None and scheduler is not None:
-            raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one")
+            raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one of them")
         if workers is not None and workers < 1:
-            raise TruespringError(f"workers = {workers} is not allowed: 1 or more, or None for as many as cores")
+            raise TruespringError(f"workers = {workers}: it must be at least 1, or None for the number of cores")
         self.scheduler, self.threads, self.patience, self.timeout = scheduler, threads, patience, timeout
         self.workers = workers
-        self._report = report or (lambda _: None)
+        self._note = note or (lambda _: None)
         self._cluster: LocalCluster | None = None
         self._client: Any = None  # a distributed.Client, whose methods have no types
         self._waiting = False
@@ -95,9 +95,9 @@ class Pool:
         self.close()
 
     def close(self) -> None:
-        """Leave the cluster; one of our own ends."""
+        """Disconnect from the cluster; end a local one."""
         if self._client is not None:
-            with suppress(Exception):  # whatever is wrong with a connection, it is left
+            with suppress(Exception):  # errors of a connection that is closed do not matter
                 self._client.close(timeout=2)
             self._client = None
         if self._cluster is not None:
@@ -107,15 +107,15 @@ class Pool:
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Processes of our own cluster: that of the scheduler, then the workers; none where it is of others."""
+        """Process ids of the local cluster: scheduler, then workers; empty for an external cluster."""
         if self._cluster is None or self._client is None:
             return ()
         return (self._cluster.pid, *self._client.run(os.getpid).values())
 
     def run(self, points: Mapping[Key, Any], task: Callable[[Any], Any]) -> Iterator[tuple[Key, Any | Failure]]:
-        """Yield the key and the result, or the Failure, of task(value) for every point, as they end.
+        """Yield key and result, or Failure, of task(value) for every point, in the order in which they finish.
 
-        Both task and values travel to the workers, results back; an exception of the task is a Failure with its text.
+        Task and values are pickled to the workers, results back; an exception of the task is a Failure with its text.
         """
         left = dict(points)
         suspects: dict[Key, Any] = {}
@@ -131,8 +131,8 @@ class Pool:
                         yield key, outcome[0]
             except _LostError:
                 starts += 1
-                self._again(starts)
-        # Whoever was with a worker that died may not be what killed it: alone nobody else can be blamed.
+                self._reconnect(starts)
+        # A point on a worker that died may not be the cause: solve each suspect alone.
         for key, value in suspects.items():
             outcome = self._alone(key, value, task)
             yield key, Failure(_KILLED) if outcome is None else outcome[0]
@@ -143,11 +143,11 @@ class Pool:
                 ((_, outcome),) = self._round({key: value}, task)
                 return outcome
             except _LostError:
-                self._again(starts)
+                self._reconnect(starts)
         return None
 
     def _round(self, points: dict[Key, Any], task: Callable[[Any], Any]) -> Iterator[tuple[Key, tuple[Any] | None]]:
-        """Yield each point's outcome in a tuple, None where it is suspected of killing workers."""
+        """Yield the outcome of each point in a tuple, None if it is suspected of killing workers."""
         client = self._client
         if client is None or client.status != "running":
             raise _LostError
@@ -173,36 +173,36 @@ class Pool:
                 try:
                     future = ended.get(timeout=_LOOK)
                 except queue.Empty:
-                    self._look()
+                    self._check()
                     continue
                 key, outcome = future.key, _outcome(future)
-                del held[key], future  # a worker may forget its result
+                del held[key], future  # lets the worker release its result
                 yield futures[key], outcome
         finally:
             with suppress(Exception):
                 client.cancel(list(held.values()))
 
-    def _look(self) -> None:
-        """Raise where nothing can come in any more."""
+    def _check(self) -> None:
+        """Raise _LostError if the scheduler is lost; note if it has no workers."""
         gone = self._cluster is not None and not self._cluster.alive
         if gone or self._client is None or self._client.status != "running":
             raise _LostError
         if self.scheduler is not None and not self._waiting and not self._client.scheduler_info()["workers"]:
             self._waiting = True
-            self._report(
-                f"the scheduler {self.scheduler} has no workers: waiting; `dask worker {self.scheduler}` is one"
+            self._note(
+                f"the scheduler {self.scheduler} has no workers: waiting; start one by `dask worker {self.scheduler}`"
             )
 
-    def _again(self, starts: int) -> None:
-        """Find a way back to a scheduler."""
+    def _reconnect(self, starts: int) -> None:
+        """Restart the local cluster, or reconnect to the external scheduler."""
         self.close()
         if self.scheduler is None:
             if starts > _MOST_STARTS:
-                raise TruespringError(f"the scheduler died {starts} times without a point solved: {_KEPT}")
-            self._report("the scheduler died: another is started, what was solved is kept")
+                raise TruespringError(f"the scheduler died {starts} times without a solved point: {_KEPT}")
+            self._note("the scheduler died: restarting it; solved points are kept")
             self._connect(self.patience)
             return
-        self._report(f"the scheduler {self.scheduler} is lost: waiting for it, {self.patience:g} s at most")
+        self._note(f"the scheduler {self.scheduler} is lost: reconnecting for up to {self.patience:g} s")
         try:
             self._connect(self.patience)
         except TruespringError as error:
@@ -222,32 +222,30 @@ class Pool:
         while self._client is None:
             try:
                 with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")  # versions that differ: what matters fails, and says so
+                    warnings.simplefilter("ignore")  # of differing versions; those that matter raise errors
                     connected: Any = Client
                     timeout = max(1.0, min(5.0, deadline - time.monotonic()))
                     self._client = connected(address, timeout=timeout, security=security)
             except ValueError as error:
                 raise TruespringError(
-                    f"scheduler {address!r}: is no address such as tcp://10.0.0.1:8786: {error}"
+                    f"scheduler {address!r} is not an address such as tcp://10.0.0.1:8786: {error}"
                 ) from None
             except (OSError, RuntimeError):
                 if time.monotonic() < deadline:
                     time.sleep(0.5)
                     continue
                 raise TruespringError(
-                    f"scheduler {address}: no Dask scheduler answers there within {patience:g} s; start one by "
-                    "`dask scheduler`, or leave the address out to take the cores of this machine"
+                    f"scheduler {address}: no Dask scheduler answers within {patience:g} s; start one by "
+                    "`dask scheduler`, or omit the address to use the cores of this machine"
                 ) from None
 
 
-_KEPT = "what was solved is kept, and the same command goes on with it"
-_KILLED = (
-    "every worker that tried it was killed: perhaps it needs more memory or time than there is, or a library crashed"
-)
+_KEPT = "solved points are kept; the same command continues"
+_KILLED = "every worker that tried it was killed: it may need more memory or time, or a library crashed"
 
 
 class _Guarded:
-    """The task as workers run it: threads and time limited, failures as values, which always find their way back."""
+    """The task as workers run it, with limits of threads and time, and errors returned as Failure."""
 
     def __init__(self, task: Callable[[Any], Any], threads: int, timeout: float | None) -> None:
         self.task, self.threads, self.timeout = task, threads, timeout
@@ -255,7 +253,7 @@ class _Guarded:
     def __call__(self, value: Any) -> Any:
         if self.timeout is None:
             return self._result(value)
-        # Nothing else ends a library that does not return; whoever watches over the worker starts another one.
+        # Only ending the process stops a library that does not return; the nanny restarts the worker.
         end = threading.Timer(self.timeout, os._exit, (1,))
         end.daemon = True
         end.start()
@@ -276,13 +274,13 @@ class _Guarded:
             except TruespringError as error:
                 return Failure(str(error))
             except MemoryError:
-                return Failure("out of memory: take fewer elements")
+                return Failure("out of memory: use fewer elements")
             except Exception as error:
                 return Failure(f"{type(error).__name__}: {error}")
 
 
 def _outcome(future: Any) -> tuple[Any] | None:
-    """The result of a future that ended, in a tuple; None where workers died of it, or of its neighbour."""
+    """Return the result of a finished future in a tuple; None if workers died at it."""
     from distributed import CancelledError, KilledWorker
 
     try:
@@ -291,12 +289,12 @@ def _outcome(future: Any) -> tuple[Any] | None:
         return None
     except (CancelledError, OSError):
         raise _LostError from None
-    except Exception as error:  # not of the task: it could not travel, or a worker lacks what it needs
+    except Exception as error:  # not of the task: it cannot be pickled, or a worker lacks a package
         return (Failure(f"a worker could not run it: {type(error).__name__}: {error}"),)
 
 
 class _Quiet:
-    """Silences what Dask logs of connections that end: it is told as points that fail, or are solved again."""
+    """Silence Dask's log messages on closed connections, which are handled here."""
 
     _LOGGERS = ("distributed", "distributed.client", "distributed.core", "distributed.comm", "distributed.batched")
 
@@ -315,13 +313,13 @@ class _Quiet:
 
 
 def require_dask() -> None:
-    """Raise TruespringError with the way out where what sweeps need is not installed."""
+    """Raise TruespringError if a package that sweeps need is not installed."""
     try:
         import cryptography
         import distributed
         import polars
     except ImportError as error:
         raise TruespringError(
-            f"{error.name} is not installed: sweeps need it; pip install 'truespring[sweep]'"
+            f"{error.name} is not installed, sweeps need it: pip install 'truespring[sweep]'"
         ) from None
     del cryptography, distributed, polars

@@ -1,4 +1,4 @@
-"""Records of points, each whole or not there at all, however the process ends that writes them."""
+"""Records of points, written atomically."""
 
 import json
 import time
@@ -8,7 +8,7 @@ from typing import Any
 
 from truespring.outputs import write_whole
 
-# What a killed process left half written is of no use after so long [s].
+# Age at which temporary files of killed processes are removed [s].
 _STALE = 3600.0
 
 
@@ -16,7 +16,7 @@ class Store:
     """The records in OUT/points: NAME.json for each point that was solved or failed."""
 
     def __init__(self, out: Path) -> None:
-        """Make the folder where there is none; raise OSError where it cannot be."""
+        """Create the folder if it does not exist; raise OSError if that fails."""
         self.folder = out / "points"
         self.folder.mkdir(parents=True, exist_ok=True)
         for left in self.folder.glob(".*.tmp"):
@@ -24,12 +24,12 @@ class Store:
                 left.unlink(missing_ok=True)
 
     def write(self, record: Mapping[str, Any]) -> None:
-        """Keep the record of the point that its `point` names."""
+        """Write a record under the name in its `point`."""
         text = json.dumps(record, indent=1, allow_nan=False)
         write_whole(self.folder / f"{record['point']}.json", f"{text}\n".encode())
 
     def read(self) -> Iterator[dict[str, Any]]:
-        """Yield all records; what is none is passed over, and written anew by who solves its point."""
+        """Yield all records; damaged files are skipped, so that their points are solved again."""
         for file in sorted(self.folder.glob("*.json")):
             try:
                 record = json.loads(file.read_text(encoding="utf-8"))

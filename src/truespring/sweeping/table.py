@@ -1,4 +1,4 @@
-"""The tidy table of a sweep: a row a point, a column for each varied key and each figure of the summary."""
+"""The tidy table of a sweep: one row per point, one column per varied key and per number of the summary."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from truespring.report.rows import table_of
 
-# What of each model, and of each comparison, is a column; a vector has one for each direction.
+# Values of each model, and of each comparison, that are columns; vectors have one column per direction.
 _OF_MODELS = (
     "status",
     "load_factor",
@@ -34,7 +34,7 @@ _VECTORS = ("probe_displacement", "force")
 
 
 def rows_of(keys: Sequence[str], records: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row a record, sorted by the varied keys; all rows have the same columns, None where one has no value."""
+    """Return one row per record, sorted by the varied keys; all have the same columns, None without a value."""
     rows = [_row(keys, record) for record in records]
     rows.sort(key=lambda row: [_rank(row[key]) for key in keys])
     columns: dict[str, None] = {}
@@ -49,16 +49,16 @@ def _row(keys: Sequence[str], record: Mapping[str, Any]) -> dict[str, Any]:
     row = {key: record["values"][key] for key in keys}
     row |= {"status": record["status"], "reason": record["reason"], "closest": summary["closest"]}
     for name, model in summary["models"].items():
-        row.update(_figures(f"models.{name}", model, _OF_MODELS))
+        row.update(_columns(f"models.{name}", model, _OF_MODELS))
         if "moduli" in model:
-            row.update(_figures(f"models.{name}", model["moduli"], _OF_MODULI))
+            row.update(_columns(f"models.{name}", model["moduli"], _OF_MODULI))
     for name, comparison in summary["comparison"].items():
-        row.update(_figures(f"comparison.{name}", comparison, _OF_COMPARISONS))
+        row.update(_columns(f"comparison.{name}", comparison, _OF_COMPARISONS))
     return row
 
 
-def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    for name in wanted:
+def _columns(prefix: str, values: Mapping[str, Any], names: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    for name in names:
         value = values.get(name)
         if name in _VECTORS:
             for axis, component in zip("xyz", value or (), strict=False):
@@ -68,7 +68,7 @@ def _figures(prefix: str, values: Mapping[str, Any], wanted: Sequence[str]) -> I
 
 
 def _gathered(columns: Iterable[str]) -> list[str]:
-    """Columns in the order of the first row that has them, those of one model or comparison side by side."""
+    """Return columns in their first order, with those of one model or comparison next to each other."""
     names = list(columns)
     first: dict[str, int] = {}
     for place, name in enumerate(names):
@@ -82,7 +82,7 @@ def _group(column: str) -> str:
 
 
 def _rank(value: Any) -> tuple[int, Any]:
-    """What values are sorted by: numbers before lists before texts, those left out last."""
+    """Return the sort key of a value: numbers before lists before texts before missing values."""
     if isinstance(value, int | float):
         return 0, value
     if isinstance(value, list):

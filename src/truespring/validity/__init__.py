@@ -1,4 +1,4 @@
-"""Validity maps: up to which load, on which meshes, springs may be trusted."""
+"""Validity maps: up to which load, and on which meshes, springs agree with FEM."""
 
 from truespring.validity.axes import read_range as read_range
 from truespring.validity.loads import LOAD_TYPES as LOAD_TYPES

@@ -1,4 +1,4 @@
-"""The body of a map: on any mesh that an axis asks for, under any load type, of any Poisson's ratio."""
+"""The body of a map with any mesh, load type and Poisson's ratio of its axes."""
 
 from dataclasses import dataclass, replace
 
@@ -7,17 +7,20 @@ from truespring.mesh import Mesh, box, nearest_node, rectangle, refined, refuse_
 from truespring.models import Fem
 from truespring.problem import Problem
 from truespring.study import Study, schema
-from truespring.validity.loads import LOAD_TYPES, Asked, Bar, LoadType
+from truespring.validity.loads import LOAD_TYPES, Bar, LoadType, StandardLoad
 
-# Element counts off a whole number by less are whole.
+# Tolerance of element counts that are integers.
 _WHOLE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A mesh and a material: `depth` elements through the depth, `aspect` their length over height, Poisson's ratio.
+    """A point of a map: mesh and material; None is the value of the study.
 
-    What is None is the study's own.
+    Attributes:
+        depth: number of elements through the depth.
+        aspect: length over height of the elements.
+        poisson: Poisson's ratio.
     """
 
     depth: int | None = None
@@ -27,12 +30,12 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What is mapped.
+    """The body of a map.
 
     Attributes:
-        problem: the study's own, on its own mesh.
-        shape: the rectangle or box as the study has it, None for a mesh that was read.
-        probe: where the study's own probe is [m], None where it has none.
+        problem: that of the study.
+        shape: rectangle or box of the study; None for a mesh from a file.
+        probe: probe of the study [m]; None without one.
     """
 
     problem: Problem
@@ -41,34 +44,34 @@ class Body:
 
     @staticmethod
     def of(study: Study) -> "Body":
-        """Return the body of a study; raise StudyError where it is none of elements."""
+        """Return the body of a study; raise StudyError if it has no elements."""
         keys = study.keys.mesh
         shape = keys if isinstance(keys, schema.ShapeKeys) and keys.is_bar else None
         problem = study.problem
         if problem.material is None or problem.mesh.element == "line":
-            raise StudyError(f"{study.file}: a plain network has no material: there is no FEM to map it against")
+            raise StudyError(f"{study.file}: a plain network has no material and no FEM to compare with")
         probe = None if study.probe is None else tuple(problem.mesh.nodes[study.probe].tolist())
         return Body(problem, shape, probe)
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Number of space dimensions."""
         return self.problem.mesh.dim
 
     @property
     def extent(self) -> tuple[float, ...]:
-        """The sides of the body [m]."""
+        """Lengths of the sides of the body [m]."""
         mesh = self.problem.mesh
         return tuple(float(side) for side in mesh.upper - mesh.lower)
 
     @property
     def depth(self) -> int:
-        """Elements through the depth of the study's own mesh, 0 for a mesh that was read."""
+        """Number of elements through the depth of the study's mesh; 0 for a mesh from a file."""
         return 0 if self.shape is None else self.shape.elements[1]
 
     @property
     def aspect(self) -> float:
-        """Length over height of the study's own elements, 1 for a mesh that was read."""
+        """Length over height of the study's elements; 1 for a mesh from a file."""
         if self.shape is None:
             return 1.0
         (length, height), (n_x, n_y) = self.extent[:2], self.shape.elements[:2]
@@ -76,17 +79,17 @@ class Body:
 
     @property
     def poisson(self) -> float:
-        """Poisson's ratio of the body's own material."""
+        """Poisson's ratio of the study's material."""
         material = self.problem.material
-        assert material is not None  # `of` has asked for it
+        assert material is not None  # checked by `of`
         return material.poisson
 
     def counts(self, depth: int, aspect: float) -> tuple[tuple[int, ...], bool]:
-        """Return the elements along each direction, and whether all are whole without being rounded."""
+        """Return the number of elements along each side, and whether they are integers without rounding."""
         length, height, *width = self.extent
-        wanted = [length * depth / height / aspect, depth, *(side * depth / height for side in width)]
-        found = tuple(max(1, round(count)) for count in wanted)
-        return found, max(abs(count - one) for count, one in zip(wanted, found, strict=True)) <= _WHOLE * max(wanted)
+        exact = [length * depth / height / aspect, depth, *(side * depth / height for side in width)]
+        found = tuple(max(1, round(count)) for count in exact)
+        return found, max(abs(count - one) for count, one in zip(exact, found, strict=True)) <= _WHOLE * max(exact)
 
     def mesh(self, spot: Spot) -> Mesh:
         """Return the mesh of the springs."""
@@ -97,15 +100,15 @@ class Body:
         return shape.divided(counts)
 
     def springs_problem(self, load: LoadType, factor: float, spot: Spot) -> Problem:
-        """Return the problem of the springs at a share of the load."""
+        """Return the problem of the springs under a factor times the load."""
         return self._loaded(self.mesh(spot), load, factor, spot.poisson)
 
     def reference_problem(self, load: LoadType, factor: float, poisson: float | None, level: int) -> Problem:
-        """Return that of the reference on the mesh of a level, each of elements half as large as on the one before."""
+        """Return the problem of the reference on the mesh of a level; each level halves the elements."""
         return self._loaded(self._reference_mesh(level), load, factor, poisson)
 
     def _reference_mesh(self, level: int) -> Mesh:
-        """Triangles and tetrahedra, about as long as high; of a mesh that was read, itself divided."""
+        """Return triangles or tetrahedra, about as long as high; a mesh from a file is refined."""
         if self.shape is None:
             mesh = self.problem.mesh
             for _ in range(level):
@@ -118,41 +121,41 @@ class Body:
         return box(self.shape.size, counts, "tetrahedron")
 
     def reference_model(self, law: str) -> Fem:
-        """Return finite elements that do not lock: of second order on triangles and tetrahedra, the default there."""
+        """Return finite elements that do not lock: second order on triangles and tetrahedra, the default there."""
         return Fem(law)
 
-    def asked(self, load: LoadType) -> Asked:
-        """Return supports and loads of a standard type on this body, and its probe."""
+    def standard_load(self, load: LoadType) -> StandardLoad:
+        """Return supports, loads and probe of a standard load type on this body."""
         problem, material = self.problem, self.problem.material
-        assert material is not None and problem.section is not None  # `of` has asked for them
+        assert material is not None and problem.section is not None  # checked by `of`
         modulus, _ = problem.section.apparent_moduli(material)
-        assert load.standard is not None  # own loads are the study's
+        assert load.standard is not None  # not the load of the study
         return load.standard(Bar(self.extent, problem.section.thickness, modulus))
 
     def probe_in(self, problem: Problem, load: LoadType) -> int | None:
-        """Return the number of the probe's node, None where it is the one that moves most."""
-        place = self.probe if load.own else self.asked(load).probe
+        """Return the node number of the probe; None for the node that moves most."""
+        place = self.probe if load.own else self.standard_load(load).probe
         return None if place is None else nearest_node(problem.mesh, list(place))
 
     def _loaded(self, mesh: Mesh, load: LoadType, factor: float, poisson: float | None) -> Problem:
-        given = self.problem
+        problem = self.problem
         if poisson is not None:
-            assert given.material is not None  # `of` has asked for it
-            regions = [replace(one, material=replace(one.material, poisson=poisson)) for one in given.regions]
-            given = replace(given, material=replace(given.material, poisson=poisson), regions=regions)
+            assert problem.material is not None  # checked by `of`
+            regions = [replace(one, material=replace(one.material, poisson=poisson)) for one in problem.regions]
+            problem = replace(problem, material=replace(problem.material, poisson=poisson), regions=regions)
         if not load.own:
-            asked = self.asked(load)
-            given = replace(given, supports=asked.supports, loads=asked.loads)
-        return (replace(given, mesh=mesh) if mesh is not given.mesh else given).scaled(factor)
+            standard = self.standard_load(load)
+            problem = replace(problem, supports=standard.supports, loads=standard.loads)
+        return (replace(problem, mesh=mesh) if mesh is not problem.mesh else problem).scaled(factor)
 
-    def refuse(self, load: str) -> LoadType:
-        """Return a load type by name; raise StudyError where it is not for this body."""
+    def load_type(self, load: str) -> LoadType:
+        """Return a load type by name; raise StudyError if it is not for this body."""
         known = LOAD_TYPES[load]
         if self.shape is None and not known.own:
             raise StudyError(
-                f"load {load}: standard loads are made for rectangles and boxes; a mesh from a file is mapped under "
-                "the study's own load only: --load own"
+                f"load {load}: standard loads need a rectangle or a box; a mesh from a file takes the load of the "
+                "study only: --load own"
             )
         if self.dim not in known.dims:
-            raise StudyError(f"load {load}: is for bodies in space, this one is plane")
+            raise StudyError(f"load {load} needs a body in 3D, this one is plane")
         return known

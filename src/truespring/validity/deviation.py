@@ -1,4 +1,4 @@
-"""How far springs are off the reference at every size of the load: from levels to all sizes between them."""
+"""Errors of springs against the reference at every size of the load, interpolated between levels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,27 +12,29 @@ from truespring.support_errors import Decisive, SupportError, largest
 from truespring.validity.reference import Reference
 from truespring.validity.solving import Solved, conjugate_force
 
-# Levels that are nearer to each other than this share of the whole are one.
+# Levels closer than this share of the largest are equal.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Deviation:
-    """Errors of one springs model on one mesh under one load type, all relative.
+    """Relative errors of one springs model on one mesh under one load type.
 
     Attributes:
-        sizes, rms_errors, probe_errors, stiffness: at the levels that were solved, the small one first, shape (n,):
-            rms and probe errors as in a Comparison; `stiffness` how much stiffer than the reference the springs are, by
-            the displacement along the load under the same load, or the force of the same motion.
-        force_errors: the largest of forces and torques of moved supports, as in a Comparison; zero where none moves.
-        grid: sizes from 0 on, shape (m,).
-        errors: the error that decides there, by the one rule of `comparison.decisive`; not a number where springs or
-            reference do not reach, or nothing is known.
-        stiffness_on_grid: `stiffness` there.
-        reached: the largest size for which there is an error.
-        end: why the springs end there, empty where they do not.
-        interpolation: what levels left out are off when told from the others: a bound for what lies between levels.
-        n_nodes: nodes of the springs; seconds: of their solution.
+        sizes: sizes of the load at the solved levels, the small one first, shape (n,).
+        rms_errors, probe_errors: as in a Comparison, shape (n,).
+        stiffness: stiffness of the springs over that of the reference, minus 1, by the displacement along the same load
+            or the force of the same motion, shape (n,).
+        force_errors: largest error of forces and torques of moved supports, as in a Comparison, shape (n,); zero
+            without moved supports.
+        grid: sizes from 0, shape (m,).
+        errors: decisive error at the grid, see `comparison.decisive`; NaN if springs or reference do not reach a size.
+        stiffness_on_grid: `stiffness` at the grid.
+        reached: the largest size with an error.
+        end: why the springs end there; empty if they do not.
+        interpolation: estimated error of the interpolation between levels.
+        n_nodes: number of nodes of the springs.
+        seconds: time of their solution.
     """
 
     sizes: Floats
@@ -51,11 +53,11 @@ class Deviation:
 
 
 def deviation_of(springs: Solved, reference: Reference, grid: Floats, probe: int | None) -> Deviation:
-    """Compare springs with the reference, carried to their nodes, at each level, and between levels.
+    """Compare springs with the reference, interpolated to their nodes, at each level and between levels.
 
-    Between levels not the error but the difference of the two displacements, over the size of the reference's, is
-    interpolated by a cubic spline over the size of the load: where springs cross the reference the error has a valley
-    that no interpolation of the errors themselves would find.
+    Between levels the relative difference of the displacements is interpolated by a cubic spline over the size of the
+    load, not the error: where springs cross the reference the error has a minimum that an interpolation of errors
+    would miss.
     """
     theirs = reference.solved
     small = compare(springs.small, theirs.small, probe)
@@ -71,7 +73,7 @@ def deviation_of(springs: Solved, reference: Reference, grid: Floats, probe: int
     norms = np.sqrt((other[:, compared] ** 2).sum(axis=(1, 2)))
     apart = (mine - other)[:, compared].reshape(n, -1) / norms[:, None]
     moved = np.linalg.norm(other[:, full.probe], axis=1)
-    told_at_probe = bool((moved > 0).all())  # a probe that is held tells nothing
+    has_probe = bool((moved > 0).all())  # a held probe has no relative error
     at_probe = (mine - other)[:, full.probe] / np.where(moved > 0, moved, 1.0)[:, None]
     forces = _apart((small.support_errors[-1], *full.support_errors)[:n])
     loading = springs.path.problem.loading
@@ -82,24 +84,24 @@ def deviation_of(springs: Solved, reference: Reference, grid: Floats, probe: int
     else:
         load = loading.force(springs.path.problem.mesh.nodes)
         stiffness = (load * other).sum(axis=(1, 2)) / (load * mine).sum(axis=(1, 2)) - 1
-    told = [apart, at_probe, *forces, stiffness[:, None]]
-    ends = np.cumsum([one.shape[1] for one in told])
+    columns = [apart, at_probe, *forces, stiffness[:, None]]
+    ends = np.cumsum([one.shape[1] for one in columns])
 
     def split(rows: Floats) -> tuple[Floats, Floats, list[Floats], Floats]:
         fields, probed, *forced, stiff = np.split(rows, ends[:-1], axis=1)
         unknown = np.full(len(rows), np.nan)
         return (
             np.linalg.norm(fields, axis=1) if compared.any() else unknown,
-            np.linalg.norm(probed, axis=1) if told_at_probe else unknown,
+            np.linalg.norm(probed, axis=1) if has_probe else unknown,
             [np.linalg.norm(one, axis=1) for one in forced],
             stiff[:, 0],
         )
 
     size = size[:n]
-    together = np.hstack(told)
+    together = np.hstack(columns)
     between = _spline(size, together)
     reached = float(size[-1])
-    there = grid <= reached * (1 + 1e-3)  # what a load was scaled to is met to a hair
+    there = grid <= reached * (1 + 1e-3)  # loads are scaled to their last size with this accuracy
     rms, _, forced, stiff = split(between(np.minimum(grid[there], reached)))
     on_grid = np.full((2, len(grid)), np.nan)
     on_grid[:, there] = _deciding(rms, forced), stiff
@@ -122,13 +124,13 @@ def deviation_of(springs: Solved, reference: Reference, grid: Floats, probe: int
 
 
 def _deciding(rms: Floats, forced: Sequence[Floats]) -> Floats:
-    """Return the error that decides at each size, shape (m,), as `comparison.decisive` does at a level."""
+    """Return the decisive error at each size, shape (m,), as `comparison.decisive` at a level."""
     rows = zip(rms, *forced, strict=True)
     return np.array([largest([Decisive(float(error), "") for error in row]).error for row in rows])
 
 
 def _apart(levels: Sequence[tuple[SupportError, ...]]) -> list[Floats]:
-    """How far forces and torques of moved supports are apart, relative, a row a level; zero where they vanish."""
+    """Return relative differences of forces and torques of moved supports, (n, dim) each; zero where they vanish."""
     found = []
     for several in zip(*levels, strict=True):
         for parts in ([one.force_difference for one in several], [one.torque_difference for one in several]):
@@ -145,8 +147,10 @@ def _spline(size: Floats, rows: Floats) -> CubicSpline:
 
 
 def _left_out(size: Floats, fields: Floats) -> float:
-    """The rms error with which every second level is told from the others, over 8: halving the steps of a cubic
-    spline divides its error by 16, near its ends by less."""
+    """Return the interpolation error: of every second level from the others, rms, over 8.
+
+    Halving the steps of a cubic spline divides its error by 16, near its ends by less.
+    """
     if len(size) < 5:
         return 0.0
     kept = np.unique([*range(0, len(size), 2), len(size) - 1])

@@ -1,4 +1,4 @@
-"""Pictures of a map: areas between the 1, 2, 5 and 10 % lines, the lines named, what was solved and what ended."""
+"""Figures of a map: areas between the 1, 2, 5 and 10 % lines, labels of lines, marks of solved points."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,18 +22,18 @@ from truespring.validity.sentences import headline, row_words
 if TYPE_CHECKING:
     from matplotlib.path import Path
 
-# From within the smallest line to beyond the largest: dark is near, also on grey paper and to colour-blind eyes.
+# From below the smallest line to above the largest; dark is a small error, also in grey and for colour-blind readers.
 COLORS = ("#0b4f7d", "#3f87b8", "#8fbddb", "#d3e5f2", "#f7e6d8")
 _HATCH, _BEYOND = "#b4bac0", 1e9
 
-# Sizes [inch]: the margins, the area, the legend on the right, a strip, and how near two names of lines may be.
+# Sizes [inch]: margins, area, legend on the right, strip, smallest distance of two labels of lines.
 _LEFT, _BOTTOM, _TOP, _LEGEND = 0.62, 0.5, 0.62, 1.5
 _WIDTH, _HEIGHT, _STRIP, _APART = 3.6, 2.6, 0.34, 0.42
 
 
 def figures(validity: Maps) -> Iterator[tuple[str, Sheet]]:
-    """Yield each picture and the stem of its files: one a map, or one for all rows of a map whose y has names."""
-    shown = [one for one in validity.maps if not one.refused]
+    """Yield figures with the stem of their files: one per map, or one for all rows if y has names."""
+    shown = [one for one in validity.maps if not one.unavailable]
     if validity.y in ("rule", "load-type"):
         kept = "load" if validity.y == "rule" else "rule"
         for name, group in itertools.groupby(
@@ -55,7 +55,7 @@ def _safe(name: str) -> str:
 
 
 def map_figure(validity: Maps, one: Map) -> Sheet:
-    """A map over two axes of numbers."""
+    """Return a map over two axes of numbers."""
     title = f"{one.load.did}: {one.rule.words}"
     sheet = Sheet(_LEFT + _WIDTH + _LEGEND, _BOTTOM + _HEIGHT + _TOP, f"{title}. {headline(validity, one)}")
     scale = one.load.scale if validity.x == "load" else 1.0
@@ -77,7 +77,7 @@ def map_figure(validity: Maps, one: Map) -> Sheet:
 
 
 def strips_figure(validity: Maps, maps: Sequence[Map]) -> Sheet:
-    """A strip of areas a map, for an axis of names or one axis alone; sizes of several loads as shares of each."""
+    """Return one strip per map, for an axis of names or a single axis; sizes of several loads are shares of each."""
     first = maps[0]
     shared = validity.x == "load" and len({one.load.name for one in maps}) > 1
     names = [row_words(validity, one, shared) for one in maps]
@@ -110,7 +110,7 @@ def strips_figure(validity: Maps, maps: Sequence[Map]) -> Sheet:
 
 
 def _rows(validity: Maps, one: Map) -> tuple[Floats, Floats]:
-    """The values along y and the errors there; a whole number is drawn as a row of its own, from middle to middle."""
+    """Return values along y and errors there, (n_y,) and (n_y, n_x); each depth becomes a row of constant error."""
     if validity.y != "depth":
         return one.smooth
     middles = (one.y[:-1] + one.y[1:]) / 2
@@ -158,7 +158,7 @@ def _add_filled(area: Area, path: "Path", color: str) -> None:
 
 
 def _draw_background(area: Area) -> None:
-    """Hatching, seen where there is no error to tell."""
+    """Draw the hatching of areas without an error."""
     from matplotlib.patches import Rectangle
 
     (x, right), (y, top) = area.x, area.y
@@ -184,29 +184,29 @@ def _draw_marks(area: Area, at: Sequence[float], bottom: float) -> None:
 
 
 def _draw_axes(area: Area, x_label: str, y_label: str = "", whole: Floats | None = None) -> None:
-    """Draw axes, ticks, numbers and what they stand for; along y none without a label, and `whole` numbers as given."""
+    """Draw axes, ticks, numbers and labels; no y axis without a label; `whole` are integers to label along y."""
     sheet, tick = area.sheet, 3.5 * POINT
     left, bottom, right, top = area.left, area.bottom, area.left + area.width, area.bottom + area.height
     values = round_numbers(*area.x)
     places = [float(area.place(np.array([at, area.y[0]]))[0]) for at in values]
     edges = [((left, bottom), (right, bottom)), *(((at, bottom), (at, bottom - tick)) for at in places)]
-    for at, told in zip(places, written(values), strict=True):
-        draw_words(sheet, at, bottom - tick - 7 * POINT, told, SIZE, align=0.5)
+    for at, number in zip(places, written(values), strict=True):
+        draw_words(sheet, at, bottom - tick - 7 * POINT, number, SIZE, align=0.5)
     draw_words(sheet, left + area.width / 2, bottom - tick - 21 * POINT, x_label, SIZE, align=0.5)
     if y_label:
         values = round_numbers(*area.y) if whole is None else whole[:: 1 + len(whole) // 12]
         heights = [float(area.place(np.array([area.x[0], at]))[1]) for at in values]
         edges += [((left, bottom), (left, top)), *(((left, at), (left - tick, at)) for at in heights)]
         numbers = written(values) if whole is None else [f"{value:g}" for value in values]
-        for at, told in zip(heights, numbers, strict=True):
-            draw_words(sheet, left - 2 * tick, at, told, SIZE, align=1.0)
-        beside = left - 2 * tick - max(text_width(told, SIZE) for told in numbers) - 7 * POINT
+        for at, number in zip(heights, numbers, strict=True):
+            draw_words(sheet, left - 2 * tick, at, number, SIZE, align=1.0)
+        beside = left - 2 * tick - max(text_width(number, SIZE) for number in numbers) - 7 * POINT
         draw_words(sheet, beside, (bottom + top) / 2, y_label, SIZE, align=0.5, upright=True)
     draw_lines(sheet, np.array(edges), EDGE, 0.7, 2.5, "axes")
 
 
 def _draw_solved(area: Area, validity: Maps, one: Map) -> None:
-    """Marks at what was solved: rows at the left edge, or points."""
+    """Draw marks at solved rows, at the left side, or at solved points."""
     from matplotlib.lines import Line2D
 
     look: dict[str, Any] = {
@@ -228,7 +228,7 @@ def _draw_solved(area: Area, validity: Maps, one: Map) -> None:
 
 
 def _draw_lines(area: Area, lines: Mapping[float, Sequence[Floats]]) -> None:
-    """The lines, and the name of each where it is longest and no other name is near."""
+    """Draw lines with labels at their longest parts, away from other labels."""
     from matplotlib.lines import Line2D
 
     taken: list[Floats] = []
@@ -257,7 +257,7 @@ def _length(part: Floats) -> float:
 
 
 def _along(part: Floats, share: float) -> Floats:
-    """The place at a share of the length of a polyline."""
+    """Return the point at a share of the length of a polyline, shape (2,)."""
     way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
     return np.array([np.interp(share * way[-1], way, part[:, axis]) for axis in (0, 1)])
 

@@ -1,4 +1,4 @@
-"""Lines of equal error through a map, and the stretches between them."""
+"""Lines of equal error in a map, and the intervals between them."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from truespring.validity.refine import LINES, crossings
 
 
 def polylines(one: Map) -> dict[float, list[Floats]]:
-    """Return the lines of a map by error: each a list of polylines of (x, y), shape (n, 2); of one row, of points."""
+    """Return the lines of a map by error, each a list of polylines, shape (n, 2); of a single row, a list of points."""
     if len(one.y) < 2:
         span = one.x[-1] - one.x[0]
         row = np.nan if not len(one.y) else float(one.y[0])
@@ -18,7 +18,7 @@ def polylines(one: Map) -> dict[float, list[Floats]]:
 
 
 def contours(x: Floats, y: Floats, errors: Floats) -> dict[float, list[Floats]]:
-    """Return the lines of errors, shape (n_y, n_x), by error: each a list of polylines of (x, y), shape (n, 2)."""
+    """Return the lines of errors, shape (n_y, n_x), by error, each a list of polylines, shape (n, 2)."""
     from contourpy import contour_generator
 
     made = contour_generator(x, y, np.ma.masked_invalid(errors))
@@ -26,7 +26,7 @@ def contours(x: Floats, y: Floats, errors: Floats) -> dict[float, list[Floats]]:
 
 
 def spans(x: Floats, errors: Floats, line: float) -> list[tuple[float, float]]:
-    """Return the stretches along x over which errors are within a line, each from and to."""
+    """Return the intervals along x in which errors are within a line."""
     within = np.isfinite(errors) & (np.nan_to_num(errors, nan=np.inf) <= line)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], within.astype(int), [0]])))
     found = []
@@ -41,6 +41,6 @@ def spans(x: Floats, errors: Floats, line: float) -> list[tuple[float, float]]:
 
 
 def _place(x: Floats, errors: Floats, line: float, left: int) -> float:
-    """Where the line is passed between a value and the next."""
+    """Return where errors cross the line between two neighbouring values."""
     share = (line - errors[left]) / (errors[left + 1] - errors[left])
     return float(x[left] + share * (x[left + 1] - x[left]))

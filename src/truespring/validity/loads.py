@@ -1,6 +1,6 @@
-"""Load types of a map: the study's own, and standard ones for rectangles and boxes.
+"""Load types of a map: the load of the study, and standard ones for rectangles and boxes.
 
-A load type is a function that returns supports and loads of size 1 for a bar, and an entry of LOAD_TYPES.
+A standard load type is an entry of LOAD_TYPES with a function that returns supports and loads of size 1 for a bar.
 """
 
 import math
@@ -22,8 +22,8 @@ class Bar:
 
     Attributes:
         extent: its sides [m].
-        thickness: of a plane one [m], 1 in space.
-        modulus: Young's, as a test within the mesh's directions finds it [Pa].
+        thickness: of a plane bar [m], 1 in 3D.
+        modulus: Young's modulus, in plane strain the one within the plane [Pa].
     """
 
     extent: tuple[float, ...]
@@ -32,7 +32,7 @@ class Bar:
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Number of space dimensions."""
         return len(self.extent)
 
     @property
@@ -41,13 +41,13 @@ class Bar:
         return self.extent[2] if self.dim == 3 else self.thickness
 
     def along_x(self, length: float) -> tuple[float, ...]:
-        """Return a motion along x [m]."""
+        """Return a vector along x [m], shape (dim,)."""
         return tuple(length * (axis == 0) for axis in range(self.dim))
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """Supports and loads of size 1, by linear theory where a force drives the body, and where the probe is [m]."""
+class StandardLoad:
+    """Supports and loads of size 1, for forces by linear theory, and the probe [m]."""
 
     supports: tuple[Fixed, ...]
     loads: tuple[Load, ...]
@@ -74,18 +74,20 @@ class Course(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LoadType:
-    """A way to load a body.
+    """A load type of a map.
 
     Attributes:
-        name: its value of `--load` and of the axis load-type.
-        did: what was done to the body, the beginning of a sentence.
+        name: value of `--load` and of the axis load-type.
+        did: beginning of sentences on it: "Stretched along x".
         how: supports and load in words.
-        size: a noun for its size; `unit` is the unit of texts and figures, `scale` how many of it a size of 1 is.
-        last: the size up to which it is mapped by default; of the study's own load, as far as that goes.
+        size: name of its size.
+        unit: unit of the size in texts and figures.
+        scale: a size of 1 in that unit.
+        last: largest size by default; None for the full load of the study.
         sizes: returns the size at each level of a path, shape (n_levels,).
         standard: returns supports and loads of size 1; None for those of the study.
-        moved: whether a support drives the body instead of a force, so that the load factor is the size.
-        dims: the dimensions of the bodies it is for.
+        moved: whether a moved support drives the body, so that the load factor is the size.
+        dims: space dimensions of bodies that it is for.
     """
 
     name: str
@@ -96,23 +98,23 @@ class LoadType:
     scale: float
     last: float | None
     sizes: Callable[[Course], Floats]
-    standard: Callable[[Bar], Asked] | None = None
+    standard: Callable[[Bar], StandardLoad] | None = None
     moved: bool = False
     dims: tuple[int, ...] = (2, 3)
 
     @property
     def own(self) -> bool:
-        """Whether supports and loads are those of the study."""
+        """Whether it is the load of the study."""
         return self.standard is None
 
-    def told(self, size: float) -> str:
-        """Return a size in its unit: "12 % strain"."""
+    def text(self, size: float) -> str:
+        """Return a size with its unit: "12 % strain"."""
         number = f"{self.scale * size:.2g}" if abs(self.scale * size) < 10 else f"{self.scale * size:.0f}"
         return f"{number}{'' if self.unit.startswith('°') else ' '}{self.unit}"
 
     @property
     def axis(self) -> str:
-        """The label of an axis of it."""
+        """Label of an axis of sizes."""
         return f"{self.size} [{self.unit.split()[0]}]"
 
 
@@ -120,12 +122,12 @@ class LoadType:
 
 
 def _by_probe(course: Course) -> Floats:
-    """The probe's displacement over the largest side."""
+    """Return the probe's displacement over the longest side, shape (n_levels,)."""
     return np.asarray(np.linalg.norm(course.displacements[:, course.probe], axis=1) / np.max(course.extent))
 
 
 def _by_motion(side: int) -> Callable[[Course], Floats]:
-    """The motion of the last support along an axis, over a side."""
+    """Return a function for the motion of the last support over a side."""
 
     def sizes(course: Course) -> Floats:
         motion = np.sum(course.problem.supports[-1].displacement or 0.0) / course.extent[side]
@@ -135,12 +137,12 @@ def _by_motion(side: int) -> Callable[[Course], Floats]:
 
 
 def _by_rotation(course: Course) -> Floats:
-    """The rotation of the last support [rad]."""
+    """Return the rotation of the last support [rad], shape (n_levels,)."""
     return np.asarray(course.levels * abs(course.problem.supports[-1].rotation))
 
 
 def _by_work(course: Course) -> Floats:
-    """The mean displacement along the force, over the length."""
+    """Return the mean displacement along the force over the length, shape (n_levels,)."""
     force = course.problem.loading.external_force
     work = np.einsum("ni,lni->l", force, course.displacements)
     return np.asarray(work / np.abs(force).sum() / course.extent[0])
@@ -149,51 +151,51 @@ def _by_work(course: Course) -> Floats:
 # --- standard loads -----------------------------------------------------------------------------------
 
 
-def _between_plates(bar: Bar, motion: float) -> Asked:
-    """Smooth plates, the right one moved along x [m]: uniform uniaxial stress. The probe is free to move across."""
+def _between_plates(bar: Bar, motion: float) -> StandardLoad:
+    """Return frictionless plates, the right one moved along x [m]; the probe moves laterally."""
     length, height = bar.extent[:2]
     smooth = [("left", "x"), ("bottom", "y"), ("back", "z")][: bar.dim]
     held = tuple(Fixed(on, [axis]) for on, axis in smooth)
     corner = (length / 2, height, bar.width)[: bar.dim]
-    return Asked((*held, Fixed("right", ["x"], displacement=bar.along_x(motion))), (), corner)
+    return StandardLoad((*held, Fixed("right", ["x"], displacement=bar.along_x(motion))), (), corner)
 
 
-def _stretch(bar: Bar) -> Asked:
+def _stretch(bar: Bar) -> StandardLoad:
     return _between_plates(bar, bar.extent[0])
 
 
-def _compress(bar: Bar) -> Asked:
+def _compress(bar: Bar) -> StandardLoad:
     return _between_plates(bar, -bar.extent[0])
 
 
-def _bend(bar: Bar) -> Asked:
+def _bend(bar: Bar) -> StandardLoad:
     length, height = bar.extent[:2]
     slender = bar.modulus * bar.width * height**3 / (4 * length**3)  # 3 EI / length^3
     stocky = 0.4 * bar.modulus * bar.width * height / length  # about G A / length
     force = length / (1 / slender + 1 / stocky)
     total = tuple(-force * (axis == 1) for axis in range(bar.dim))
-    return Asked((Fixed("left"),), (Force("right", total),), (length, height / 2, bar.width / 2)[: bar.dim])
+    return StandardLoad((Fixed("left"),), (Force("right", total),), (length, height / 2, bar.width / 2)[: bar.dim])
 
 
-def _shear(bar: Bar) -> Asked:
+def _shear(bar: Bar) -> StandardLoad:
     length, height = bar.extent[:2]
     middle = (length / 2, height / 2, bar.width / 2)[: bar.dim]
-    return Asked((Fixed("bottom"), Fixed("top", displacement=bar.along_x(height))), (), middle)
+    return StandardLoad((Fixed("bottom"), Fixed("top", displacement=bar.along_x(height))), (), middle)
 
 
-def _twist(bar: Bar) -> Asked:
+def _twist(bar: Bar) -> StandardLoad:
     length, height = bar.extent[:2]
     clamps = (Fixed("left"), Fixed("right", rotation=1.0, axis=(1.0, 0.0, 0.0)))
-    return Asked(clamps, (), (length / 2, height, bar.width))
+    return StandardLoad(clamps, (), (length / 2, height, bar.width))
 
 
 _ALL = (
     LoadType(
         "own",
         "Loaded as in the study",
-        "the study's own supports and loads; its size is how far the probe moves in the reference, over the "
-        "largest extent of the body",
-        "movement of the probe over the length of the body",
+        "supports and loads of the study; the size is the displacement of the probe in the reference over the longest "
+        "side of the body",
+        "displacement of the probe over the length of the body",
         "% of the length",
         100.0,
         None,
@@ -202,8 +204,8 @@ _ALL = (
     LoadType(
         "stretch",
         "Stretched along x",
-        "between smooth plates: the left end stands still, the right one is moved along x, the bottom lies on a "
-        "smooth table (in space the back against another): uniform uniaxial stress; its size is the nominal strain",
+        "between frictionless plates: the left end is fixed along x, the right one is moved along x, the bottom is "
+        "fixed along y (in 3D the back along z): uniform uniaxial stress; the size is the nominal strain",
         "nominal strain",
         "% strain",
         100.0,
@@ -215,7 +217,7 @@ _ALL = (
     LoadType(
         "compress",
         "Compressed along x",
-        "as stretch, pushed together instead of pulled apart",
+        "as stretch, with the right end moved toward the left one",
         "nominal compressive strain",
         "% strain",
         100.0,
@@ -227,7 +229,7 @@ _ALL = (
     LoadType(
         "bend",
         "Bent as a cantilever",
-        "left end clamped, a dead force along -y spread over the right end; its size is the mean deflection of "
+        "left end clamped, a dead force along -y distributed over the right end; the size is the mean deflection of "
         "that end over the length",
         "deflection of the end over the length",
         "% of the length",
@@ -238,9 +240,9 @@ _ALL = (
     ),
     LoadType(
         "shear",
-        "Sheared top against bottom",
-        "bottom and top clamped to plates that keep their distance, the top one moved along x; its size is that "
-        "movement over the height",
+        "Sheared along x",
+        "bottom and top clamped to plates at a fixed distance, the top one moved along x; the size is that motion "
+        "over the height",
         "nominal shear strain",
         "% shear strain",
         100.0,
@@ -252,7 +254,7 @@ _ALL = (
     LoadType(
         "twist",
         "Twisted about x",
-        "both ends clamped, the right one turned about the axis of the body; its size is the angle from end to end",
+        "both ends clamped, the right one rotated about the axis of the body; the size is the angle from end to end",
         "twist from end to end",
         "° from end to end",
         180 / math.pi,
@@ -264,5 +266,5 @@ _ALL = (
     ),
 )
 
-#: The load types by name; a size of 1 is a strain of 1, a movement by the body's length, a radian.
+#: Load types by name; a size of 1 is a strain of 1, a displacement by the body's length, or a radian.
 LOAD_TYPES: Mapping[str, LoadType] = MappingProxyType({one.name: one for one in _ALL})

@@ -1,4 +1,4 @@
-"""Solving a validity map, round by round, on one process or many."""
+"""Solve a validity map in rounds, in one process or many."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,12 +24,12 @@ from truespring.validity.result import Validity
 from truespring.validity.rules import MappedSprings, mapped_springs
 from truespring.validity.solving import Solved, Task, run_task
 
-#: Told what is solved, how many paths are, and how many are known to be needed so far.
+#: Called with the path that was solved, the number of solved paths, and the number needed so far.
 Progress = Callable[[str, int, int], None]
 
-# Load steps at first, in the plane and in space; they are doubled up to so many where levels lie too far apart.
+# Initial number of load steps in 2D and 3D, and largest number; steps are doubled if the interpolation is inaccurate.
 _STEPS, _MOST_STEPS = {2: 10, 3: 6}, 48
-# What may be lost between levels, relative: a tenth of the smallest line.
+# Largest relative interpolation error between levels: a tenth of the smallest line.
 _BETWEEN = 0.001
 
 
@@ -48,24 +48,24 @@ def map_validity(
     threads: int = 1,
     progress: Progress | None = None,
 ) -> Validity:
-    """Map how far the springs of a study are off FEM, by load level, mesh, material, rule or load type.
+    """Map the error of a study's springs against FEM by load level, mesh, material, rule or load type.
 
     Args:
-        study: a study file, or one that was read.
-        law: of the reference, a key of LAWS; it is solved on finer and finer meshes until it changes no more.
-        loads: load types, keys of LOAD_TYPES, or "all"; by default the study's own load.
-        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the study's springs,
-            or all rules where it has none.
-        x: "load", "depth", "aspect" or "poisson"; where it is not the load, errors are those at its last size.
-        y: another of them, or "rule" or "load-type", or None. A mesh from a file has no depth: "rule" there.
-        ranges: first, last and, optionally, the number of values on the finest grid, by axis; the load's from 0 on.
-        adaptive: solve only where a line passes; else the whole grid.
-        workers: processes on this machine; 1 solves in this one. None takes as many as cores.
-        scheduler: address of a Dask cluster whose workers are taken instead.
+        study: a study or its file.
+        law: law of the reference, a key of LAWS; the reference is solved on finer meshes until it converges.
+        loads: load types, keys of LOAD_TYPES, or "all"; by default the load of the study.
+        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the springs of the
+            study, or all rules if it has none.
+        x: "load", "depth", "aspect" or "poisson"; without the load, errors are those at its last size.
+        y: another of them, "rule", "load-type" or None; for a mesh from a file "depth" becomes "rule".
+        ranges: first, last and, optionally, the number of values on the finest grid, by axis; the load starts at 0.
+        adaptive: whether to solve only where a line passes, instead of the whole grid.
+        workers: number of processes on this machine; 1 solves in this process, None uses the number of cores.
+        scheduler: address of a Dask cluster to use instead.
         threads: threads of each worker.
-        progress: told what goes on.
+        progress: called with the path that was solved, the number of solved paths, and the number needed so far.
 
-    Raises StudyError where something does not go together.
+    Raises StudyError for invalid arguments or combinations of them.
     """
     read = study if isinstance(study, Study) else read_study(study)
     if law not in LAWS:
@@ -96,8 +96,8 @@ def map_validity(
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Wanted:
-    """A reference to be solved: what travels to a worker."""
+class _ReferenceJob:
+    """A reference to solve; it is pickled to a worker."""
 
     body: Body
     load: LoadType
@@ -107,18 +107,18 @@ class _Wanted:
     steps: int
 
 
-def _solve(job: Task | _Wanted) -> Solved | Reference:
+def _solve(job: Task | _ReferenceJob) -> Solved | Reference:
     if isinstance(job, Task):
         return run_task(job)
     return solve_reference(job.body, job.load, job.law, job.poisson, job.last, job.steps)
 
 
-# Rows that are drawn for each of the grid where y is no whole number.
+# Number of drawn rows per row of the grid, unless y is a depth.
 _PARTS = 4
 
 
 class _Run:
-    """One map on its way."""
+    """The state of a running map."""
 
     def __init__(
         self,
@@ -138,11 +138,11 @@ class _Run:
             y = "rule"
         check_axes([x, y])
         self.x, self.y, self.law, self.pool = x, y, law, pool
-        given = {known(name, {"load": 0, "depth": 0, "aspect": 0, "poisson": 0}): one for name, one in ranges.items()}
-        self.ranges = {name: range_of(name, one) for name, one in given.items()}
+        bounds = {known(name, {"load": 0, "depth": 0, "aspect": 0, "poisson": 0}): one for name, one in ranges.items()}
+        self.ranges = {name: range_of(name, one) for name, one in bounds.items()}
         numbers = [name for name in (x, y) if name not in (None, "load", *NAMES)]
         if idle := [name for name in self.ranges if name not in (*numbers, "load")]:
-            raise StudyError(f"a range of {idle[0]} is given, which is no axis of this map: x = {x}, y = {y}")
+            raise StudyError(f"the range of {idle[0]} has no effect: the axes of this map are x = {x}, y = {y}")
         self.axes = {str(name): axis_of(str(name), self.body, self.ranges) for name in numbers}
         if not adaptive:
             self.axes = {name: replace(axis, start=tuple(range(len(axis.values)))) for name, axis in self.axes.items()}
@@ -156,31 +156,31 @@ class _Run:
                 raise StudyError(
                     f"load '{name}' is unknown{nearest(name, LOAD_TYPES)}; allowed: {', '.join(LOAD_TYPES)}, all"
                 )
-        self.loads = [self.body.refuse(name) for name in dict.fromkeys(names)]
+        self.loads = [self.body.load_type(name) for name in dict.fromkeys(names)]
         self.rules = {one.name: one for one in mapped_springs(study, rules, "poisson" in self.axes)}
-        self.progress = progress or (lambda what, done, wanted: None)
+        self.progress = progress or (lambda what, done, needed: None)
         self.references: dict[tuple[str, float | None], Reference] = {}
         self.steps = {load.name: _STEPS[self.body.dim] for load in self.loads}
         self.spent: list[Reference] = []
         self.found: dict[Key, Deviation | Failure] = {}
-        self.solved, self.done, self.wanted = 0, 0, 0
+        self.solved, self.done, self.needed = 0, 0, 0
 
     @property
     def reference_order(self) -> list[tuple[str, float | None]]:
-        """The references by load as they were asked for, then by Poisson's ratio."""
+        """Keys of the references, by load in the given order, then by Poisson's ratio."""
         names = [load.name for load in self.loads]
         return sorted(self.references, key=lambda key: (names.index(key[0]), key[1] or 0.0))
 
     def maps(self) -> Iterator[Map]:
-        """Solve round by round, each of what all maps want next; yield them at the end."""
+        """Solve the pending points of all maps, round by round; yield the maps at the end."""
         grids = {(load.name, rule): self._grid() for load in self.loads for rule in self.rules}
         while True:
-            asked = {pair: {place: self._spot(place) for place in grid.wanted()} for pair, grid in grids.items()}
-            keys = [Key(*pair, spot) for pair, places in asked.items() for spot in places.values()]
+            pending = {pair: {place: self._spot(place) for place in grid.pending()} for pair, grid in grids.items()}
+            keys = [Key(*pair, spot) for pair, places in pending.items() for spot in places.values()]
             if not keys:
                 break
             self._solve_all(keys)
-            for pair, places in asked.items():
+            for pair, places in pending.items():
                 values = {place: self._errors(Key(*pair, spot)) for place, spot in places.items()}
                 grids[pair].add(values)
         for (load, rule), grid in grids.items():
@@ -197,7 +197,7 @@ class _Run:
         return Cells((len(x.values), len(y.values)), (x.start, y.start))
 
     def _spot(self, place: int | tuple[int, int]) -> Spot:
-        """What is solved at a place of a grid."""
+        """Return mesh and material at a place of a grid."""
         at = {}
         if isinstance(place, tuple):
             at[self.x] = self.axes[self.x].values[place[0]]
@@ -213,7 +213,7 @@ class _Run:
         )
 
     def _errors(self, key: Key) -> Any:
-        """The errors, with what has a sign of them as the real part: see Rows."""
+        """Return the errors as complex numbers with a signed real part, see Rows; shape (n_sizes,) or a number."""
         found = self.found[key]
         if isinstance(found, Failure):
             return np.full(len(sizes_to(1.0)), np.nan) if self.x == "load" else np.nan
@@ -222,7 +222,7 @@ class _Run:
         return errors if self.x == "load" else complex(errors[-1])
 
     def _solve_all(self, keys: list[Key]) -> None:
-        """Solve references, then springs, then both once more in more steps where levels lie too far apart."""
+        """Solve references, then springs, then both again in more steps where the interpolation is inaccurate."""
         keys = [key for key in dict.fromkeys(keys) if key not in self.found]
         while keys:
             self._solve_references(keys)
@@ -247,11 +247,11 @@ class _Run:
                     del self.references[one]
 
     def _solve_references(self, keys: list[Key]) -> None:
-        wanted = {(key.load, key.spot.poisson) for key in keys} - self.references.keys()
+        missing = {(key.load, key.spot.poisson) for key in keys} - self.references.keys()
         last = self.ranges["load"].last if "load" in self.ranges else None
         jobs = {
-            (load, poisson): _Wanted(self.body, LOAD_TYPES[load], self.law, poisson, last, self.steps[load])
-            for load, poisson in sorted(wanted, key=str)
+            (load, poisson): _ReferenceJob(self.body, LOAD_TYPES[load], self.law, poisson, last, self.steps[load])
+            for load, poisson in sorted(missing, key=str)
         }
         for key, found in self._run(jobs, lambda key: f"{key[0]}: reference"):
             if isinstance(found, Failure):
@@ -269,15 +269,17 @@ class _Run:
             return solved
         reference = self.references[key.load, key.spot.poisson]
         if not solved.states:
-            return Failure(f"the springs have no equilibrium under a small load: {solved.end or 'unstable at rest'}")
+            return Failure(
+                f"the springs have no equilibrium under a small load: {solved.end or 'unstable when unloaded'}"
+            )
         probe = self.body.probe_in(solved.path.problem, LOAD_TYPES[key.load])
-        return deviation_of(solved, reference, sizes_to(reference.asked), probe)
+        return deviation_of(solved, reference, sizes_to(reference.target), probe)
 
-    def _run(self, jobs: Mapping[Any, Any], say: Callable[[Any], str]) -> Iterator[tuple[Any, Any]]:
-        self.wanted += len(jobs)
+    def _run(self, jobs: Mapping[Any, Any], words: Callable[[Any], str]) -> Iterator[tuple[Any, Any]]:
+        self.needed += len(jobs)
         for key, found in self._each(jobs):
             self.done += 1
-            self.progress(say(key), self.done, self.wanted)
+            self.progress(words(key), self.done, self.needed)
             yield key, found
 
     def _each(self, jobs: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:
@@ -296,7 +298,7 @@ class _Run:
         references = {poisson: one for (name, poisson), one in self.references.items() if name == load.name}
         y = self.axes.get(self.y or "")
         if self.x == "load":
-            x = sizes_to(max(one.asked for one in references.values()))
+            x = sizes_to(max(one.target for one in references.values()))
             full = grid.rows
         else:
             x = self.axes[self.x].values

@@ -14,7 +14,7 @@ from truespring.validity.rules import MappedSprings
 
 
 class Key(NamedTuple):
-    """What one path of springs is of."""
+    """Load type, rule, and mesh and material of a path of springs."""
 
     load: str
     rule: str
@@ -26,14 +26,14 @@ class Map:
     """Errors of one springs model under one load type.
 
     Attributes:
-        load, rule: of what.
-        x, y: the values along both axes, shapes (n_x,) and (n_y,); y is (0,) where there is one row only.
-        errors: relative, shape (n_y, n_x); not a number where springs or reference do not reach.
-        smooth: values along y, and errors there, between those of the grid too, for lines and pictures.
-        deviations: what was solved, by its place along y, or along x and y where x is not the load.
-        failures: where springs cannot be had, and why.
+        load, rule: load type and springs.
+        x, y: values along both axes, shapes (n_x,) and (n_y,); y is empty for a single row.
+        errors: relative errors, shape (n_y, n_x); NaN if springs or reference do not reach a point.
+        smooth: values along y and errors there on a finer grid, for lines and figures.
+        deviations: of the solved springs, by mesh and material.
+        failures: reasons for springs that could not be solved, by mesh and material.
         references: by Poisson's ratio.
-        full: the number of springs paths that the whole grid would have taken.
+        full: number of springs paths on the whole grid.
     """
 
     load: LoadType
@@ -48,8 +48,8 @@ class Map:
     full: int
 
     @property
-    def refused(self) -> str:
-        """Why there is no map at all, empty where there is one."""
+    def unavailable(self) -> str:
+        """Why there is no map; empty if there is one."""
         return "" if self.deviations else next(iter(self.failures.values()))
 
 
@@ -58,16 +58,17 @@ class Maps:
     """Maps of a study.
 
     Attributes:
-        title, stem: of the study; `body` what was mapped.
-        law: of the reference.
-        x, y: names of the axes; y is None where there is one only.
-        axes: those of numbers other than the load, by name.
-        maps: one a load type and springs model.
-        references: all that were solved.
-        tolerance: what "agrees" means in the first verdict.
-        solves: paths of springs and of references that were solved; `full` what the whole grid would have taken.
+        title, stem, body: of the study.
+        law: law of the reference.
+        x, y: names of the axes; y is None for a single axis.
+        axes: axes of numbers other than the load, by name.
+        maps: one per load type and springs model.
+        references: all references.
+        tolerance: relative error up to which springs agree with the reference.
+        solves: number of solved paths of springs, and of references.
+        full: number of springs paths on the whole grid.
         seconds: wall time.
-        notes: what was left out.
+        notes: remarks on values that were left out.
     """
 
     title: str
@@ -87,5 +88,5 @@ class Maps:
 
     @property
     def converged(self) -> bool:
-        """Whether every reference is, and there is a map of all that was asked for."""
-        return all(one.converged for one in self.references) and not any(one.refused for one in self.maps)
+        """Whether every reference converged and every map is available."""
+        return all(one.converged for one in self.references) and not any(one.unavailable for one in self.maps)

@@ -34,7 +34,7 @@ def render_validity(validity: Maps, drawings: Mapping[str, Drawing], command: st
 
 
 def _groups(validity: Maps, drawings: Mapping[str, Drawing]) -> Iterator[dict[str, Any]]:
-    """What is told together: of one load type its verdicts and pictures, or of one rule where loads lie along y."""
+    """Yield verdicts and figures grouped by load type, or by rule if y is the load type."""
     by_rule = validity.y == "load-type"
     for name in dict.fromkeys(one.rule.name if by_rule else one.load.name for one in validity.maps):
         maps = [one for one in validity.maps if (one.rule.name if by_rule else one.load.name) == name]
@@ -45,7 +45,9 @@ def _groups(validity: Maps, drawings: Mapping[str, Drawing]) -> Iterator[dict[st
             "how": "" if by_rule else maps[0].load.how,
             "verdicts": [verdict(validity, one).partition(one.rule.words) for one in maps],
             "same": [
-                f"{', '.join(one.rule.same)}: the same springs here as {one.rule.name}" for one in maps if one.rule.same
+                f"{', '.join(one.rule.same)}: the same springs on this mesh as {one.rule.name}"
+                for one in maps
+                if one.rule.same
             ],
             "pictures": [picture(drawn) for drawn in kept],
         }
@@ -57,15 +59,15 @@ def _warnings(validity: Maps) -> Iterator[str]:
             yield f"{one.load.did}: {unconverged(one)}"
         if one.end:
             yield (
-                f"{one.load.did}: {Fem(one.law).label} ends at {one.load.told(one.reached)} of the "
-                f"{one.load.told(one.asked)} asked for ({one.end}); what lies beyond is hatched"
+                f"{one.load.did}: {Fem(one.law).label} ends at {one.load.text(one.reached)}, before "
+                f"{one.load.text(one.target)} ({one.end}); the rest is hatched"
             )
 
 
 def _reference_row(one: Reference) -> dict[str, str]:
     return {
         "load": one.load.name + ("" if one.poisson is None else f", Poisson's ratio {one.poisson:.3g}"),
-        "reached": one.load.told(one.reached),
+        "reached": one.load.text(one.reached),
         "depth": "–" if one.elements is None else str(one.elements),
         "nodes": " → ".join(f"{count:,}" for count in one.n_nodes),
         "error": percent(one.error) if one.error > 1e-9 else "exact",

@@ -1,4 +1,4 @@
-"""The reference of a map: finite elements on finer and finer meshes, until they change by less than is asked."""
+"""The reference of a map: finite elements on finer meshes until their estimated error is within the tolerance."""
 
 import math
 from dataclasses import dataclass
@@ -15,22 +15,21 @@ from truespring.validity.bodies import Body
 from truespring.validity.loads import Course, LoadType
 from truespring.validity.solving import Solved, Task, conjugate_force, run_task
 
-#: What the reference may still be off, relative, in the plane and in space: a fifth, and half of the smallest line.
+#: Largest relative error of the reference in 2D and 3D: a fifth, and half, of the smallest line.
 TOLERANCE = {2: 0.002, 3: 0.005}
 
-# A mesh of more unknowns is not solved for a reference, in the plane and in space.
+# Largest number of unknowns of a reference in 2D and 3D.
 _MOST_UNKNOWNS = {2: 60_000, 3: 65_000}
-# The order of convergence where none is shown: elements of second order have no higher one at clamps and corners.
+# Assumed order of convergence if the meshes show none, as at clamps and corners.
 _CAUTIOUS = 1.0
-# Orders are shown where those of three meshes and of the three before differ by this share at most: there meshes are
-# fine enough for the order to be that of all finer ones too. Higher ones than the second are not believed: what a
-# corner makes may still be hidden, and comes to light last.
+# The meshes show an order if those of two consecutive triples of meshes differ by at most this share. Orders above the
+# second are limited: the error of a corner may still be hidden by others.
 _ASYMPTOTIC, _HIGHEST = 0.25, 2.0
-# The lowest order that is believed: a mesh that changes more than the one before may do anything.
+# The lowest plausible order.
 _LOWEST = 0.3
-# What Richardson's estimate is multiplied by: Roache's factor for three meshes.
+# Factor of Richardson's estimate: Roache's safety factor for three meshes.
 _SAFETY = 1.25
-# Loads are scaled until the reference reaches the size that is asked to this share of it; so often at most.
+# Loads are scaled until the reference reaches the target size with this relative accuracy; largest number of trials.
 _NEAR, _MOST_TRIALS = 0.02, 8
 
 
@@ -39,20 +38,22 @@ class Reference:
     """The converged path of the reference under one load type.
 
     Attributes:
-        load, law, poisson: of what; None is the study's own Poisson's ratio.
-        factor: the share of the load that reaches the size asked for.
+        load, law, poisson: load type, law, Poisson's ratio; None is that of the study.
+        factor: factor of the load that reaches the target size.
         solved: the path on the finest mesh.
-        sizes: the size of the load at each of its states, shape (n_states,).
-        asked: the size asked for.
-        error: what the finest mesh is off, relative, as estimated: the larger of the rms displacement and of what it
-            does work with, by Richardson's extrapolation and Roache's factor, with the order that four meshes show or,
-            where they show none, with a cautious one.
-        order: the order of convergence of the displacement that four meshes show, None where they show none.
-        changes: of the displacement from mesh to mesh, relative rms, the worst load level.
-        n_nodes, elements: of each mesh; `elements` of the finest through the depth.
-        settling: what the displacement along the load (of moved supports the force) does over the meshes.
-        tolerance: the error that was asked for.
-        solves: the paths that were solved for it; seconds: their wall time.
+        sizes: size of the load at each of its states, shape (n_states,).
+        target: the target size.
+        error: estimated relative error of the finest mesh: the larger one of the rms displacement and of the work
+            conjugate of the load, by Richardson's extrapolation with Roache's factor and the order that four meshes
+            show, or an assumed order.
+        order: order of convergence of the displacement that four meshes show; None if they show none.
+        changes: relative rms change of the displacement from mesh to mesh, at the worst load level.
+        n_nodes: number of nodes of each mesh.
+        elements: number of elements through the depth of the finest mesh; None for a mesh from a file.
+        settling: displacement along the load, or force of moved supports, on the meshes.
+        tolerance: largest error of a converged reference.
+        solves: number of solved paths.
+        seconds: their wall time.
     """
 
     load: LoadType
@@ -61,7 +62,7 @@ class Reference:
     factor: float
     solved: Solved
     sizes: Floats
-    asked: float
+    target: float
     error: float
     order: float | None
     changes: tuple[float, ...]
@@ -74,7 +75,7 @@ class Reference:
 
     @property
     def converged(self) -> bool:
-        """Whether it is as near to the solution as was asked."""
+        """Whether the error is within the tolerance."""
         return self.error <= self.tolerance
 
     @property
@@ -84,13 +85,13 @@ class Reference:
 
     @property
     def driven(self) -> bool:
-        """Whether supports that move drive the body, not loads."""
+        """Whether moved supports drive the body, without loads."""
         return self.solved.path.problem.loading.driven_by_motion
 
     @property
     def end(self) -> str:
-        """Why it ends before the size that was asked for, empty where it does not."""
-        return self.solved.end if self.reached < (1 - _NEAR) * self.asked else ""
+        """Why it ends before the target size; empty if it does not."""
+        return self.solved.end if self.reached < (1 - _NEAR) * self.target else ""
 
 
 def solve_reference(
@@ -101,13 +102,12 @@ def solve_reference(
     last: float | None = None,
     steps: int = 12,
 ) -> Reference:
-    """Return the reference up to the size `last`, by default as far as the load goes, refined to TOLERANCE.
+    """Return the reference up to the size `last`, by default the last one of the load type, refined to TOLERANCE.
 
-    Raises StudyError where it has no equilibrium even under a small load.
+    Raises StudyError if it has no equilibrium even under a small load.
     """
     search, tolerance = _Search(body, load, law, poisson, steps), TOLERANCE[body.dim]
-    asked = load.last if last is None else last
-    factor, asked = search.factor(asked)
+    factor, target = search.factor(load.last if last is None else last)
     meshes: list[Solved] = []
     values: list[float] = []
     changes: list[float] = []
@@ -137,7 +137,7 @@ def solve_reference(
         factor=factor,
         solved=meshes[-1],
         sizes=search.sizes(meshes[-1]),
-        asked=asked,
+        target=target,
         error=error,
         order=order,
         changes=tuple(changes),
@@ -151,7 +151,7 @@ def solve_reference(
 
 
 class _Search:
-    """Solves the reference on its meshes, and finds the load that reaches a size."""
+    """Solve the reference on its meshes, and find the load that reaches a size."""
 
     def __init__(self, body: Body, load: LoadType, law: str, poisson: float | None, steps: int) -> None:
         self.body, self.load, self.law, self.poisson, self.steps = body, load, law, poisson, steps
@@ -163,11 +163,11 @@ class _Search:
         self.solves, self.seconds = self.solves + 1, self.seconds + solved.seconds
         if not solved.states:
             what = "under the study's own load" if self.load.own else f"under {self.load.name}"
-            raise StudyError(f"the reference {solved.path.label} has no equilibrium {what}, however small that is")
+            raise StudyError(f"the reference {solved.path.label} has no equilibrium {what}, however small the load")
         return solved
 
     def sizes(self, solved: Solved) -> Floats:
-        """The size at each state."""
+        """Return the size of the load at each state, shape (n_states,)."""
         problem = solved.path.problem
         probe = self.body.probe_in(problem, self.load)
         if probe is None:
@@ -176,27 +176,27 @@ class _Search:
         displacements = np.array([state.displacement for state in solved.states])
         return self.load.sizes(Course(problem, displacements, solved.levels, probe, self.body.extent))
 
-    def factor(self, asked: float | None) -> tuple[float, float]:
-        """The share of the load at which the reference reaches a size on a coarse mesh, and that size."""
-        if asked is None:
+    def factor(self, target: float | None) -> tuple[float, float]:
+        """Return the factor of the load at which the reference reaches a size on a coarse mesh, and that size."""
+        if target is None:
             return 1.0, float(self.sizes(self.solve(1.0, 1))[-1])
         if self.load.moved:
-            return asked, asked
-        factor = 1.0 if self.load.own else asked
+            return target, target
+        factor = 1.0 if self.load.own else target
         for _ in range(_MOST_TRIALS):
             solved = self.solve(factor, 1)
             reached, levels = self.sizes(solved), solved.levels
-            if reached[-1] >= asked * (1 - _NEAR / 4):
-                level = float(np.interp(asked, [0.0, *reached], [0.0, *levels]))
-                return factor * level, asked
-            if solved.end:  # it goes no further
-                return factor * float(levels[-1]), asked
-            factor *= min(max(1.25, asked / float(reached[-1])), 3.0)
-        return factor, asked
+            if reached[-1] >= target * (1 - _NEAR / 4):
+                level = float(np.interp(target, [0.0, *reached], [0.0, *levels]))
+                return factor * level, target
+            if solved.end:  # it cannot be loaded further
+                return factor * float(levels[-1]), target
+            factor *= min(max(1.25, target / float(reached[-1])), 3.0)
+        return factor, target
 
 
 def _worked(solved: Solved, load: LoadType) -> float:
-    """What the load does work with at the last state: the displacement along it, or the force of what is moved."""
+    """Return the work conjugate of the load at the last state: displacement along it, or force of moved supports."""
     states, levels = solved.states, solved.levels
     loading = solved.path.problem.loading
     if loading.driven_by_motion:
@@ -213,27 +213,27 @@ def _settling(law: str, load: LoadType, meshes: list[Solved], values: list[float
 
 
 def _change(coarse: Solved, fine: Solved, load: LoadType) -> float:
-    """How far two meshes are apart: the largest relative rms distance of all load levels that both have."""
-    met = [compare(one, other) for one, other in ((coarse.small, fine.small), (coarse.path, fine.path))]
-    return max((float(error) for one in met for error in one.rms_errors), default=math.inf)
+    """Return the largest relative rms distance of two meshes over their common load levels."""
+    pairs = [compare(one, other) for one, other in ((coarse.small, fine.small), (coarse.path, fine.path))]
+    return max((float(error) for one in pairs for error in one.rms_errors), default=math.inf)
 
 
 def _steps(values: list[float]) -> list[float]:
-    """How far each value is from the one before, relative to the last."""
+    """Return the change of each value from the one before, relative to the last value."""
     size = abs(values[-1])
     return [abs(one - before) / size if size else 0.0 for before, one in pairwise(values)]
 
 
 def _estimate(*several: list[float]) -> tuple[float, float | None]:
-    """What the finest mesh is off by the changes of quantities from mesh to mesh, and the order of the first one."""
+    """Return the error of the finest mesh from changes of several quantities, and the order of the first one."""
     found = [_by_richardson(changes) for changes in several]
     return max(error for error, _ in found), found[0][1]
 
 
 def _by_richardson(changes: list[float]) -> tuple[float, float | None]:
-    """The error left after changes from mesh to mesh, each of half the size, and the order if they show one.
+    """Return the error after changes from mesh to mesh, each with half the element size, and the order, if any.
 
-    An order that meshes only seem to have before they are fine enough is too high: what is left is then more.
+    Before the asymptotic range orders are too high and would give too small an error, so the order is limited.
     """
     if not changes:
         return math.inf, None

@@ -1,4 +1,4 @@
-"""Adaptive refinement: a grid is solved where a line passes, and told from its neighbours elsewhere."""
+"""Adaptive refinement of a map: points are solved where a line passes, and interpolated elsewhere."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -10,21 +10,21 @@ from truespring.arrays import Floats, Ints
 
 Values = NDArray[np.float64] | NDArray[np.complex128]
 
-#: The errors along which the lines of a map run.
+#: Errors of the lines of a map.
 LINES = (0.01, 0.02, 0.05, 0.1)
 
-#: Places of a line that are nearer than this share of the range are one.
+#: Crossings of a line closer than this share of the range are equal.
 TOLERANCE = 0.01
 
 
 class Rows:
-    """A map whose rows come whole: errors at all sizes of the load for one value along y.
+    """The rows of a map over the load: errors at all sizes for one value along y.
 
-    Errors may be complex: their size is the error, and between rows the numbers themselves are interpolated. With what
-    changes sign where springs cross the reference as the real part, the valley there is found between two rows too.
+    Errors may be complex: their absolute value is the error, and rows are interpolated as complex numbers. With a real
+    part that changes sign where springs cross the reference, the minimum there is found between rows too.
 
-    Rows at `start` are solved first; between two in which a line passes at different places, or one ends, the middle
-    one is; unless the middle one of their parents was where the two had told. `rows` is the number of all.
+    Rows at `start` are solved first, of `rows` in all. Between two rows in which a line passes at different places, or
+    which end at different sizes, the middle row is solved, unless the interpolation predicted the last middle row.
     """
 
     def __init__(self, rows: int, start: Sequence[int], tolerance: float = TOLERANCE) -> None:
@@ -33,22 +33,22 @@ class Rows:
         self._start = tuple(start)
         self._straight: set[tuple[int, int]] = set()
 
-    def wanted(self) -> list[int]:
-        """The rows to be solved next; none where the map is done."""
+    def pending(self) -> list[int]:
+        """Return the rows to solve next; empty if the map is done."""
         if missing := [row for row in self._start if row not in self.known]:
             return missing
         return [(a + b) // 2 for a, b in pairwise(sorted(self.known)) if b - a > 1 and not self._settled(a, b)]
 
     def add(self, found: Mapping[int, Values]) -> None:
-        """Take the errors of rows, shape (n_sizes,) each, not a number where there are none."""
+        """Add the errors of rows, shape (n_sizes,) each, NaN where there are none."""
         known = sorted(self.known)
         for row, errors in found.items():
             around = [(a, b) for a, b in pairwise(known) if a < row < b]
             self.known[row] = errors
             for a, b in around:
                 share = (row - a) / (b - a)
-                told = (1 - share) * self.known[a] + share * self.known[b]
-                if _alike(_passes(told), _passes(errors), self.tolerance):
+                predicted = (1 - share) * self.known[a] + share * self.known[b]
+                if _alike(_passes(predicted), _passes(errors), self.tolerance):
                     self._straight |= {(a, row), (row, b)}
 
     def _settled(self, a: int, b: int) -> bool:
@@ -59,9 +59,9 @@ class Rows:
         return (a, b) in self._straight or _alike(places[0], places[1], self.tolerance)
 
     def filled(self, parts: int = 1) -> Floats:
-        """Errors of all rows, shape (n, n_sizes), those not solved told from the two beside them.
+        """Return the errors of all rows, shape (n, n_sizes), interpolated between solved ones.
 
-        With `parts` also those between two of the grid: that many a row.
+        `parts` is the number of rows returned per row of the grid.
         """
         solved = np.array(sorted(self.known))
         values = np.array([self.known[row] for row in solved])
@@ -79,7 +79,7 @@ def _between(solved: Ints, values: Values, row: float) -> Values:
 
 
 def crossings(errors: Floats, line: float) -> Floats:
-    """Return where errors pass a line, as shares of their range, ascending."""
+    """Return where errors, shape (n,), cross a line, as shares of their range, ascending."""
     place = np.arange(len(errors)) / max(len(errors) - 1, 1)
     apart = errors - line
     left, right = apart[:-1], apart[1:]
@@ -89,7 +89,7 @@ def crossings(errors: Floats, line: float) -> Floats:
 
 
 def _passes(values: Values) -> dict[float, Floats]:
-    """Where each line is passed, and under 0 where the errors end."""
+    """Return the crossings of each line, and with key 0 the end of the errors."""
     errors = np.abs(values)
     found = {line: crossings(errors, line) for line in LINES}
     finite = np.flatnonzero(np.isfinite(errors))
@@ -98,7 +98,7 @@ def _passes(values: Values) -> dict[float, Floats]:
 
 
 def _alike(one: dict[float, Floats], other: dict[float, Floats], hair: float) -> bool:
-    """Whether lines pass two rows at the same places."""
+    """Return whether lines cross two rows at the same places."""
     return all(
         len(places) == len(other[line]) and (not len(places) or np.abs(places - other[line]).max() <= hair)
         for line, places in one.items()
@@ -112,10 +112,10 @@ def _band(values: Values) -> int:
 
 
 class Cells:
-    """A map of single points over two grids, or over one where the second has a single value; as of Rows, complex too.
+    """A map of points over two grids, the second of which may have a single value; errors may be complex, see Rows.
 
-    Cells between the values of `start` are solved at their corners; one whose corners lie on both sides of a line is
-    divided, down to the grid itself.
+    Cells between the values of `start` are solved at their corners; a cell with corners on both sides of a line is
+    divided, down to the grid.
     """
 
     def __init__(self, shape: tuple[int, int], start: tuple[Sequence[int], Sequence[int]]) -> None:
@@ -124,8 +124,8 @@ class Cells:
         x, y = (list(pairwise(one)) or [(0, 0)] for one in start)
         self._cells = [(*i, *j) for i in x for j in y]
 
-    def wanted(self) -> list[tuple[int, int]]:
-        """The points to be solved next; none where the map is done."""
+    def pending(self) -> list[tuple[int, int]]:
+        """Return the points to solve next; empty if the map is done."""
         while True:
             missing = {one for cell in self._cells for one in _corners(cell) if one not in self.known}
             if missing:
@@ -136,7 +136,7 @@ class Cells:
             self._cells = divided
 
     def add(self, found: Mapping[tuple[int, int], complex]) -> None:
-        """Take the errors of points."""
+        """Add the errors of points."""
         self.known.update(found)
 
     def _divided(self, cell: tuple[int, int, int, int]) -> list[tuple[int, int, int, int]]:
@@ -152,7 +152,7 @@ class Cells:
         return int(np.searchsorted(LINES, error)) if np.isfinite(error) else -1
 
     def filled(self) -> Floats:
-        """Errors of all points, shape (n_y, n_x), those not solved told from the corners of their cell."""
+        """Return the errors of all points, shape (n_y, n_x), interpolated from the corners of their cells."""
         errors = np.full(self.shape[::-1], np.nan + 0j)
         for left, right, low, high in self._cells:
             x = np.linspace(0, 1, right - left + 1)[None] if right > left else np.zeros((1, 1))

@@ -1,4 +1,4 @@
-"""The result of `map_validity`: maps with their verdicts, table and figures, which can be written."""
+"""The result of `map_validity`: maps and their verdicts, as table, figures and files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +21,12 @@ class Validity(Maps):
 
     @property
     def verdicts(self) -> list[str]:
-        """For each map one or two sentences: up to which load its springs agree with the reference."""
+        """For each map, up to which load its springs agree with the reference, in sentences."""
         return [verdict(self, one) for one in self.maps]
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """For each load level of each path of springs a row, as in validity.csv."""
+        """One row per load level of each path of springs, as in validity.csv."""
         return list(rows(self))
 
     def table(self) -> "polars.DataFrame":
@@ -34,12 +34,12 @@ class Validity(Maps):
         return table_of(self.rows)
 
     def figures(self) -> Figures:
-        """Return the figures by the stem of their files; `png()` and `svg()` of each are the bytes of a file."""
+        """Return the figures by the stem of their files; `png()` and `svg()` return the bytes of a file."""
         return sheets(figures(self))
 
     def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
-        """Write validity.json, validity.csv, figures and report.html into out/STEM; return where each is.
+        """Write validity.json, validity.csv, figures and report.html into out/STEM; return the paths by file name.
 
-        `command` is the command line that repeats the run, named in the report.
+        `command` is the command line that repeats the run, for the report.
         """
         return write_validity(self, Path(out), command)

@@ -1,4 +1,4 @@
-"""The springs of a map: those of the study, or all rules that are made for its elements."""
+"""The springs of a map: those of the study, or all rules for its elements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,7 @@ from truespring.models import RULES, Springs, springs_by_rule
 from truespring.problem import Problem
 from truespring.study import Study
 
-# Poisson's ratio of a lattice of plain springs, in the plane and in space, and what differs from it by so much only
-# is it.
+# Poisson's ratio of a lattice of plain springs in 2D and 3D, and the tolerance of values that are equal to it.
 _CAUCHY, _SAME = {2: 1 / 3, 3: 1 / 4}, 0.005
 
 _WORDS = {
@@ -26,7 +25,7 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class MappedSprings:
-    """Springs to be mapped: their `name` in files, themselves, and the names of others that are the same here."""
+    """Springs of a map, with their `name` in files and the names of equal ones (`same`)."""
 
     name: str
     springs: Springs
@@ -34,10 +33,10 @@ class MappedSprings:
 
     @property
     def words(self) -> str:
-        """How a sentence calls them."""
+        """Their name in sentences."""
         one = self.springs
         words = (
-            f"springs of one's own stiffness ({self.name})"
+            f"springs of given stiffness ({self.name})"
             if one.rule is None
             else _WORDS.get(one.rule, f"{one.rule} springs")
         )
@@ -46,21 +45,21 @@ class MappedSprings:
         return words + (" with a volume term" if one.volume else "")
 
 
-def mapped_springs(study: Study, asked: Sequence[str] | None, varies_poisson: bool) -> list[MappedSprings]:
-    """Return the springs asked for: names of models of the study, rules, "RULE+volume", or "all"; else the study's.
+def mapped_springs(study: Study, names: Sequence[str] | None, varies_poisson: bool) -> list[MappedSprings]:
+    """Return springs by names of models of the study, rules, "RULE+volume" or "all"; None is those of the study.
 
-    "all" are the rules made for the mesh, each once, and with a volume term those that can have one where Poisson's
-    ratio is not that of plain springs. Raises StudyError for names that are none.
+    "all" are the distinct rules for the mesh; if Poisson's ratio is not that of plain springs, also with a volume term.
+    Raises StudyError for unknown names.
     """
     own = springs_by_rule(study.entries)
     problem = study.problem
-    if asked is None and own:
-        names = {name: _rule_name(springs) or name for name, springs in own.items()}
-        alone = {name: list(names.values()).count(called) == 1 for name, called in names.items()}
-        given = {names[name] if alone[name] else name: springs for name, springs in own.items()}
-        return _once(given, problem, study, varies_poisson)
+    if names is None and own:
+        called = {name: _rule_name(springs) or name for name, springs in own.items()}
+        unique = {name: list(called.values()).count(one) == 1 for name, one in called.items()}
+        named = {called[name] if unique[name] else name: springs for name, springs in own.items()}
+        return _once(named, problem, study, varies_poisson)
     found: dict[str, Springs] = {}
-    for name in asked or ["all"]:
+    for name in names or ["all"]:
         if name == "all":
             found |= _all(problem, varies_poisson)
         else:
@@ -69,7 +68,7 @@ def mapped_springs(study: Study, asked: Sequence[str] | None, varies_poisson: bo
 
 
 def _rule_name(springs: Springs) -> str:
-    """How a rule is asked for that gives just these springs, empty where none does."""
+    """Return RULE or RULE+volume if it gives exactly these springs, else an empty text."""
     plain = springs.rule is not None and springs == Springs(springs.rule, volume=springs.volume)
     return f"{springs.rule}{'+volume' if springs.volume else ''}" if plain else ""
 
@@ -84,8 +83,8 @@ def _named(name: str, own: dict[str, Springs], study: Study) -> Springs:
     if not RULES[rule].takes(study.problem.mesh):
         fit = [one for one in RULES if RULES[one].takes(study.problem.mesh)]
         raise StudyError(
-            f"rule '{rule}' is not for {study.problem.mesh.kinds} elements, of which this study's body is made; "
-            f"for them there are {', '.join(fit)}"
+            f"rule '{rule}' is not for {study.problem.mesh.kinds} elements, those of this study; "
+            f"allowed: {', '.join(fit)}"
         )
     return Springs(rule, volume=bool(volume))
 
@@ -111,7 +110,7 @@ def _goes(problem: Problem, springs: Springs) -> bool:
 
 
 def _once(found: dict[str, Springs], problem: Problem, study: Study, varies_poisson: bool) -> list[MappedSprings]:
-    """Each of the springs once: others that give the same stiffness here are named beside the first."""
+    """Return the distinct springs; names of others with the same stiffness are kept with the first."""
     several: list[tuple[list[str], Springs]] = []
     for name, springs in found.items():
         twin = None if varies_poisson else next((one for one in several if _same(problem, one[1], springs)), None)

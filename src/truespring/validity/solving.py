@@ -1,4 +1,4 @@
-"""What is solved for a map: a path to the whole load, and one to a small share of it, where theory is linear."""
+"""The solutions of a map: a path to full load, and one under a small load in the linear range."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -15,16 +15,15 @@ from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.solvers import Equilibrium, Geometry, Newton, Reporter
 
-#: The share of the load at which a body answers as linear theory has it, to this share itself.
+#: Share of the load in the linear range; the deviation from linear theory is about this share.
 SMALL = 0.01
 
-# Iterations for one level, and how often a step is halved where they are not enough: a map need not know to a hair
-# where a path ends.
+# Largest number of iterations of a level, and of halvings of a step; the end of a path need not be accurate.
 _ITERATIONS, _CUTBACKS = 20, 3
 
 
 class _UpToTheEnd(Newton):
-    """Newton's method that goes no further than a body goes by itself: not along a branch that it has to choose."""
+    """Newton's method that ends at the first bifurcation or instability."""
 
     __slots__ = ()
 
@@ -44,7 +43,7 @@ class _UpToTheEnd(Newton):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Task:
-    """A model of a problem, and in how many steps its path is taken: what travels to a worker."""
+    """A model of a problem, with the number of load steps; it is pickled to a worker."""
 
     problem: Problem
     model: Model
@@ -53,7 +52,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solved:
-    """The path of a task, and that to the share SMALL of its load; `seconds` are of both."""
+    """The path of a task, and that under SMALL times its load; `seconds` is the time of both."""
 
     path: Solution
     small: Solution
@@ -61,7 +60,7 @@ class Solved:
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The loaded states that may be trusted: the small one first, and no further than a body would go."""
+        """The loaded states that are stable and not inverted; the small one first."""
         first = self.small.at(1.0)
         found = [] if first is None else [first]
         for state in self.path.states:
@@ -79,18 +78,18 @@ class Solved:
 
     @property
     def end(self) -> str:
-        """Why the path ends before the whole load, empty where it does not."""
+        """Why the path ends before full load; empty if it does not."""
         states = self.states
         if states and states[-1].level == 1.0 and len(states) > 1:
             return ""
         if any(state.branched for state in self.path.states):
-            return "buckling"  # to which side is arbitrary: there is nothing to compare
+            return "buckling"  # the side of the branch is arbitrary and cannot be compared
         status = str(self.path.status)
         return "not converged" if status == "converged" else status.replace("-", " ")
 
 
 def run_task(task: Task) -> Solved:
-    """Solve a task."""
+    """Return the solution of a task."""
     started = time.perf_counter()
     small = solve(task.problem.scaled(SMALL), task.model, Newton(load_steps=1))
     path = solve(task.problem, task.model, _UpToTheEnd(task.steps, max_iterations=_ITERATIONS, max_cutbacks=_CUTBACKS))
@@ -98,15 +97,15 @@ def run_task(task: Task) -> Solved:
 
 
 def _alone(path: Solution) -> Solution:
-    """The path without what it was solved with, which is large."""
+    """Return the path without its potential, which is large."""
     grid = path.whole if isinstance(path.potential, Refined) else None
     return replace(path, potential=None, grid=grid, best=None)
 
 
 def conjugate_force(path: Solution, states: tuple[State, ...], levels: Floats) -> Floats:
-    """Return the force that supports do work with as the level rises, at each state [N m], shape (n_states,).
+    """Return the force that is work conjugate to the load level, at each state [N m], shape (n_states,).
 
-    The reactions times the derivative of the prescribed motion by the level: of a turn its moment times the angle.
+    It is the reactions times the derivative of the prescribed motion by the level; for a rotation, moment times angle.
     """
     motion: Callable[[float], Any] = path.problem.loading.motion
     found = []

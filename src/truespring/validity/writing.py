@@ -1,4 +1,4 @@
-"""What a map leaves behind: validity.json, validity.csv, pictures and a page."""
+"""The files of a map: validity.json, validity.csv, figures and a page."""
 
 import csv
 import json
@@ -22,10 +22,10 @@ from truespring.validity.reference import Reference
 from truespring.validity.refine import LINES
 from truespring.validity.sentences import verdict
 
-#: Version of the form of validity.json; told in it.
+#: Version of the format of validity.json, its key `form`.
 FORM = 1
 
-#: Columns of validity.csv: a row for each load level of each path of springs. Sizes are shares, errors relative.
+#: Columns of validity.csv, with one row per load level of each path of springs. Sizes are shares, errors relative.
 COLUMNS = (
     "load",
     "rule",
@@ -41,14 +41,14 @@ COLUMNS = (
     "end",
 )
 
-# Attributes of a Deviation that fill the columns from "size" on.
+# Attributes of a Deviation in the columns from "size" on.
 _OF_LEVELS = ("sizes", "rms_errors", "probe_errors", "force_errors", "stiffness")
 
 
 def write_validity(validity: Maps, out: Path, command: str | None = None) -> dict[str, Path]:
-    """Write validity.json, validity.csv, figures/ and report.html into out/STEM; return where each is.
+    """Write validity.json, validity.csv, figures and report.html into out/STEM; return the paths by file name.
 
-    `command` is what does it again, where it was a command line.
+    `command` is the command line that repeats the run, for the report.
     """
     with Output(out / validity.stem, "validity.json") as output:
         _write(validity, output.staging, command)
@@ -69,12 +69,12 @@ def _write(validity: Maps, folder: Path, command: str | None) -> None:
 
 
 def rows(validity: Maps) -> Iterator[dict[str, Any]]:
-    """Yield a row for each load level of each path of springs, its keys COLUMNS; None where nothing is known."""
+    """Yield one row per load level of each path of springs, with keys COLUMNS; unknown values are None."""
     for one in validity.maps:
         for spot, deviation in sorted(one.deviations.items(), key=lambda item: str(item[0])):
             numbers = np.column_stack([getattr(deviation, name) for name in _OF_LEVELS])
             for level in numbers.tolist():
-                told = [value if math.isfinite(value) else None for value in level]
+                finite = [value if math.isfinite(value) else None for value in level]
                 yield {
                     "load": one.load.name,
                     "rule": one.rule.name,
@@ -82,13 +82,13 @@ def rows(validity: Maps) -> Iterator[dict[str, Any]]:
                     "aspect": validity.body.aspect if spot.aspect is None else spot.aspect,
                     "poisson": validity.body.poisson if spot.poisson is None else spot.poisson,
                     "n_nodes": deviation.n_nodes,
-                    **dict(zip(COLUMNS[6:11], told, strict=True)),
+                    **dict(zip(COLUMNS[6:11], finite, strict=True)),
                     "end": deviation.end,
                 }
 
 
 def validity_values(validity: Maps) -> dict[str, Any]:
-    """Return all of a map as values that JSON can hold; docs/validity.md describes them."""
+    """Return a map as JSON values; docs/validity.md describes them."""
     found = {
         "form": FORM,
         "title": validity.title,
@@ -124,7 +124,7 @@ def _map_values(validity: Maps, one: Map) -> dict[str, Any]:
         "same_springs": list(one.rule.same),
         "springs": {"rule": springs.rule, "volume": springs.volume, "sharing": springs.sharing},
         "verdict": verdict(validity, one),
-        "refused": one.refused or None,
+        "refused": one.unavailable or None,
         "x": one.x,
         "y": one.y,
         "errors": one.errors,
@@ -160,7 +160,7 @@ def _reference_values(one: Reference) -> dict[str, Any]:
         "law": one.law,
         "poisson": one.poisson,
         "load_factor": one.factor,
-        "asked": one.asked,
+        "asked": one.target,
         "reached": one.reached,
         "end": one.end or None,
         "converged": one.converged,
@@ -175,7 +175,7 @@ def _reference_values(one: Reference) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Arrays as lists, and None for what is no number."""
+    """Return a value with arrays as lists, numbers of 7 digits, and None for NaN and infinity."""
     if isinstance(value, Mapping):
         return {str(name): _plain(one) for name, one in value.items()}
     if isinstance(value, np.ndarray):

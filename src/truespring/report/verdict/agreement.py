@@ -1,0 +1,104 @@
+"""Sentences on agreement: with which references, up to which load level, and the errors at full load."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from truespring.comparison import Comparison
+from truespring.report.quantity import percent, quantity, tolerance_percent
+from truespring.report.result import Result
+from truespring.report.standing import equally_wrong_sentence, own_error_sentence
+from truespring.report.verdict.naming import display_name, everyone, full_level, level_name, listed, subject
+from truespring.report.verdict.reach import NEVER, rank, reach, starts_within
+from truespring.support_errors import decisive
+
+
+def agreement_sentences(result: Result) -> Iterator[str]:
+    """Yield where the model agrees with its references, its errors at full load, and those of the references."""
+    measured = {name: one for name, one in result.comparisons.items() if one.load_factors.size}
+    if measured:
+        where, beyond = _where_it_agrees(result, measured)
+        errors = _errors(result, measured)
+        if beyond and errors:
+            yield f"{where}; beyond, {errors}."
+        else:
+            yield f"{where}."
+            if errors:
+                yield f"{errors}."
+        who, plural = subject(result)
+        names = {name: display_name(result, name) for name in result.comparisons}
+        yield from filter(None, (equally_wrong_sentence(result, who, plural, names), own_error_sentence(result, names)))
+    for name, one in result.comparisons.items():
+        if name not in measured or float(one.load_factors[-1]) != 1.0:
+            yield _short_of_full_load(result, name, one)
+
+
+def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[str, bool]:
+    """Return a clause on where the model agrees with which reference, and whether only up to some level below 1."""
+    who, plural = subject(result)
+    within = f"within {tolerance_percent(result.tolerance)} of"
+    groups: dict[str, list[str]] = {}
+    for name in sorted(measured, key=lambda name: rank(measured[name])):
+        groups.setdefault(reach(result, measured[name]), []).append(name)
+    starts = any(starts_within(one) for one in measured.values())
+    verb = ("stay" if starts else "come") + ("" if plural else "s")
+    if len(groups) > 1:
+        clauses = [
+            f"of {listed([display_name(result, name) for name in names])} {where}" for where, names in groups.items()
+        ]
+        return f"{who} {verb} within {tolerance_percent(result.tolerance)} {listed(clauses, ', and ')}", False
+    ((where, names),) = groups.items()
+    references = everyone(result, names)
+    if where == NEVER:
+        do = "do" if plural else "does"
+        some = references if len(names) == 1 else "any reference"
+        return f"at no load level {do} {who} come {within} {some}", False
+    if where.startswith("up to"):
+        comma = "," if "," in where else ""
+        return f"{where}{comma} {who} {verb} {within} {references}", not where.startswith(f"up to {full_level(result)}")
+    return f"{who} {verb} {within} {references} {where}", False
+
+
+def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
+    """Return the errors at full load, smallest first; None if no reference reaches it together with the model."""
+    known = {name: one.error for name, one in measured.items() if one.error is not None}
+    if not known:
+        return None
+    parts = [
+        f"{display_name(result, name)} {_off(measured[name])}" for name in sorted(known, key=lambda name: known[name])
+    ]
+    # The errors of one reference may be separated by commas.
+    between = "; " if any(np.isfinite(one.force_errors[-1]) for one in measured.values()) else ", "
+    return f"at {full_level(result)}: {between.join(parts)}"
+
+
+def _off(one: Comparison) -> str:
+    """Return the errors at the last level, the larger first, each with its quantity if forces are compared too."""
+    displacement = float(one.rms_errors[-1])
+    found = [(displacement, "in displacement")] if np.isfinite(displacement) else []
+    several = len({error.mine.support for error in one.support_errors[-1]}) > 1
+    largest = decisive(np.nan, one.support_errors[-1])
+    if not largest.quantity:
+        return percent(displacement)
+    found.append((largest.error, f"in the {largest.quantity}{f' of {largest.support}' if several else ''}"))
+    return ", ".join(f"{percent(error)} {what}" for error, what in sorted(found, reverse=True))
+
+
+def _short_of_full_load(result: Result, name: str, one: Comparison) -> str:
+    """Return how a comparison ends that does not reach full load, or has surfaces only."""
+    who = display_name(result, name)
+    if one.load_factors.size:
+        level = float(one.load_factors[-1])
+        if one.agrees_up_to_load_factor is None:
+            return f"{who} is known at load factor {level:.4g} only, there {_off(one)}."
+        return f"with {who} the comparison ends at load factor {level:.4g}, there {_off(one)}."
+    if one.surface is None and one.hausdorff is not None:
+        distances = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
+        return "the distance between the surfaces is {} (root mean square), {} at most.".format(*distances)
+    if one.surface is None:
+        return f"{who} and {subject(result)[0]} have no load level in common."
+    level = one.reference.surface.load_factor if one.reference.surface else 1.0
+    return (
+        f"the outline is {quantity(one.surface.outline_rms, 'm', 2)} (root mean square), at most "
+        f"{quantity(one.surface.outline_max, 'm', 2)}, off that of {who} at {level_name(result, level)}."
+    )

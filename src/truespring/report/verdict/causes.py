@@ -1,0 +1,37 @@
+"""The cause of the distance to nonlinear FEM: stiffness, or the response to large strain."""
+
+from truespring.report.quantity import percent
+from truespring.report.result import Result
+from truespring.report.verdict.naming import display_name
+
+# Below this rms error no cause is given.
+_NO_CAUSE = 0.005
+
+
+def cause_sentence(result: Result) -> str | None:
+    """Return whether the distance to the nearest nonlinear FEM grows with the load or exists from the first level.
+
+    A distance at the first level is one of stiffness: moduli, bending, elements. A distance that grows is one of the
+    response of springs and law to large strain. None without nonlinear FEM, without springs, and where the two agree.
+    """
+    nonlinear = {
+        name: one
+        for name, one in result.comparisons.items()
+        if one.reference.element is not None
+        and one.reference.finite
+        and one.load_factors.size > 1
+        and one.rms_errors[-1] > _NO_CAUSE
+    }
+    if not nonlinear or result.model is None or not result.paths[result.model].has_springs:
+        return None
+    name = min(nonlinear, key=lambda one: float(nonlinear[one].rms_errors[-1]))
+    levels, errors = nonlinear[name].load_factors, nonlinear[name].rms_errors
+    first, last = percent(float(errors[0])), percent(float(errors[-1]))
+    what = (
+        f"The distance to {display_name(result, name)} is {first} at load factor {levels[0]:.4g} and {last} at the last"
+    )
+    if errors[-1] > 2 * errors[0]:
+        return f"{what}: most of it arises at large strain, to which springs and law respond differently."
+    if errors[0] > 2 * errors[-1]:
+        return f"{what}: the springs' stiffness is off from the start, and large strain hides it."
+    return f"{what}: most of it is there from the start, in the springs' moduli and bending stiffness on this mesh."

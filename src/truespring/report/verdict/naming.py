@@ -1,0 +1,85 @@
+"""Names in the sentences of a verdict: models, references, load levels and elements."""
+
+from collections.abc import Sequence
+
+from truespring.equilibrium import Solution
+from truespring.report.result import Result
+
+#: First-order elements by the element of the mesh.
+ELEMENTS = {
+    "quadrilateral": "four-node elements",
+    "triangle": "linear triangles",
+    "hexahedron": "eight-node elements",
+    "tetrahedron": "linear tetrahedra",
+}
+
+_CORNERS = {
+    "quadrilateral": "four-node ",
+    "hexahedron": "eight-node ",
+    "wedge": "six-node ",
+    "pyramid": "five-node ",
+}
+
+
+def display_name(result: Result, name: str) -> str:
+    """Return the label of a path, followed by its name in the study if several paths have that label."""
+    label = result.paths[name].label
+    is_unique = sum(path.label == label for path in result.paths.values()) == 1
+    return label if is_unique else f"{label} ({name})"
+
+
+def subject(result: Result) -> tuple[str, bool]:
+    """Return the name of the compared model as the subject of a sentence, and whether it is plural."""
+    assert result.model is not None
+    path = result.paths[result.model]
+    if not path.has_springs:
+        return display_name(result, result.model), False
+    several = sum(other.has_springs for other in result.paths.values()) > 1
+    return display_name(result, result.model) if several else "springs", True
+
+
+def everyone(result: Result, names: Sequence[str]) -> str:
+    """Return the name of one reference, or the number of several."""
+    if len(names) == 1:
+        return display_name(result, names[0])
+    return "both references" if len(names) == 2 else f"all {len(names)} references"
+
+
+def level_name(result: Result, load_factor: float) -> str:
+    """Return a load level in words: full load (or full motion, full displacement), or its load factor."""
+    if load_factor == 1:
+        return full_level(result)
+    return f"{load_factor:.4g} of the displacement" if _by_displacement(result) else f"load factor {load_factor:.4g}"
+
+
+def full_level(result: Result) -> str:
+    """Return the name of load level 1: full load, without loads full motion, full displacement if controlled."""
+    if _by_displacement(result):
+        return "full displacement"
+    return "full motion" if driven_by_motion(result) else "full load"
+
+
+def driven_by_motion(result: Result) -> bool:
+    """Return whether supports move and no load acts."""
+    return result.problem.stated and result.problem.loading.driven_by_motion
+
+
+def _by_displacement(result: Result) -> bool:
+    """Return whether the displacement was controlled and the load factor is part of the solution."""
+    states = [state for path in result.paths.values() for state in path.states if not state.critical]
+    return any(state.level is not None and abs(state.level - state.load_factor) > 1e-9 for state in states)
+
+
+def linear_fem(path: Solution) -> str:
+    """Return the name of first-order finite elements on the mesh of a path."""
+    return f"linear {_CORNERS.get(path.problem.mesh.element, '')}FEM"
+
+
+def deep(depth: int) -> str:
+    """Return a number of elements over the depth in words."""
+    return f"{depth} element{'' if depth == 1 else 's'} deep"
+
+
+def listed(parts: Sequence[str], last: str = " and ") -> str:
+    """Return parts joined by commas, the last one by `last`."""
+    return last.join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]

@@ -1,0 +1,43 @@
+"""Sentences on paths that did not reach full load through stable equilibria."""
+
+from collections.abc import Callable, Iterator
+
+from truespring.equilibrium import Solution, State, Status
+from truespring.report.result import Result
+from truespring.report.verdict.naming import display_name, subject
+
+
+def trouble_sentences(result: Result) -> Iterator[str]:
+    """Yield what went wrong with the compared model, then with its references."""
+    names = [result.model] if result.model is not None else []
+    for name in names + [name for name in result.comparisons if name != result.model]:
+        trouble = path_trouble(result, name)
+        if trouble is not None:
+            yield trouble
+
+
+def path_trouble(result: Result, name: str) -> str | None:
+    """Return what went wrong with a path; None if it reached full load through stable equilibria."""
+    path = result.paths[name]
+    who, plural = subject(result) if name == result.model else (display_name(result, name), False)
+    match path.status:
+        case Status.NOT_CONVERGED if path.load_factor == 0:
+            return f"{who} found no equilibrium at any load level."
+        case Status.NOT_CONVERGED:
+            return f"{who} found no equilibrium beyond load factor {path.load_factor:.4g}."
+        case Status.INVERTED:
+            start = _first(path, lambda state: state.area_ratio <= 0)
+            have = "have" if plural else "has"
+            return f"{who} {have} an inverted element{start}; results beyond that level are not reliable."
+        case Status.UNSTABLE:
+            start = _first(path, lambda state: bool(state.negative_eigenvalues))
+            are = "are" if plural else "is"
+            return f"{who} {are} in an unstable equilibrium{start}; a real body would buckle out of it."
+        case _:
+            return None
+
+
+def _first(path: Solution, troubled: Callable[[State], bool]) -> str:
+    """Return the first load level in trouble, as the end of a clause."""
+    levels = [state.load_factor for state in path.states if troubled(state)]
+    return f", first at load factor {levels[0]:.4g}" if levels else ""
