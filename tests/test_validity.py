@@ -126,7 +126,7 @@ def test_errors_are_those_of_a_comparison(bent: Validity, study: Path) -> None:
 
 
 @pytest.mark.parametrize("n", [6, 7])
-def test_what_interpolation_misses_is_told_by_every_second_level(n: int) -> None:
+def test_every_second_level_measures_the_error_of_interpolation(n: int) -> None:
     """Nothing of a cubic, of which a spline through four levels misses nothing; a sixteenth of a half step's error."""
     size = np.linspace(0.0, 1.0, n) ** 1.5
     assert _left_out(size, np.stack([size**3, 1 - size**2], axis=1)) == pytest.approx(0.0, abs=1e-12)
