@@ -76,8 +76,8 @@ def test_the_first_format_and_names_without_a_dimension(tmp_path: Path) -> None:
     with_parameters = FORMAT_1.replace("2 1 0 0", "2 1 0 0 1 12 0.5").replace("1 0 0 0", "1 0 0 0 0 3")
     assert described(read(tmp_path, with_parameters)) == described(mesh)
     for old, new, why in (
-        ("4 1 1 4 1 2 3 4", "4 1 1 5 1 2 3 4", "line 11: an element has 5 nodes by its own count"),
-        ("$ENDNOD", "$ENDNOT", "line 7: .EndNOD is wanted here"),
+        ("4 1 1 4 1 2 3 4", "4 1 1 5 1 2 3 4", "line 11: an element has 5 nodes by"),
+        ("$ENDNOD", "$ENDNOT", "line 7: expected .EndNOD"),
         ("2 1 0 0\n", "2 1 0\n", "line 4: .NOD takes 4 numbers"),
     ):
         with pytest.raises(MeshError, match=why):

@@ -322,8 +322,8 @@ def test_what_is_included_is_bounded_and_never_shown(tmp_path: Path) -> None:
         "loop.inc": "line 1 of loop.inc: .INCLUDE: this file includes itself",
         "deck.inp": "this file includes itself",
         "wide.inc": "1000 times at most: write them into one",
-        "secret": "line 1 of secret: this is no .inp file: a keyword such as .NODE is wanted(;|$)",
-        "bad.inc": "line 2 of bad.inc: a coordinate: numbers are wanted here",
+        "secret": "line 1 of secret: this is no .inp file: expected a keyword such as .NODE(;|$)",
+        "bad.inc": "line 2 of bad.inc: a coordinate: expected numbers",
         "set.inc": "line 2 of set.inc: the entry is neither a number nor a set",
         "binary.inc": "this file is binary, not text",
     }.items():

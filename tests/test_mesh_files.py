@@ -542,12 +542,12 @@ def test_a_piece_that_is_there_twice_is_taken_once(tmp_path: Path) -> None:
         ("*NODE", "*NODE, SYSTEM=C", r"line 1: \*NODE: coordinates that are not rectangular"),
         ("*ELEMENT", "*NGEN, NSET=a\n1, 4, 1\n*ELEMENT", r"line 8: \*NGEN: this is not followed"),
         ("*NODE", "*NODE\n*NODE", r"line 1: \*NODE: there are no lines of data below"),
-        ("*NODE", "NODE", r"line 1: this is no \.inp file: a keyword such as \*NODE is wanted, not 'NODE'"),
+        ("*NODE", "NODE", r"line 1: this is no \.inp file: .*\*NODE.*'NODE'"),
         ("*NODE", "*NOD", r"line 9: element 1 \(quadrilateral\) names node 1, which is not in the file"),
         ("*ELEMENT", "*ELEMEN", r"there is no \*ELEMENT"),
         ("5, 6, 3\n", "5, 6, 3\n*ELSET, ELSET=a, GENERATE\n9, 7\n", "line 12: .ELSET: GENERATE takes"),
         ("5, 6, 3\n", "5, 6, 3\n*NSET, NSET=a\n1, b\n", "line 12: 'b' is neither a number nor a set"),
-        ("5, 6, 3\n", "5, 6, 3\n*NSET\n1\n", r"line 11: \*NSET: NSET=NAME is wanted"),
+        ("5, 6, 3\n", "5, 6, 3\n*NSET\n1\n", r"line 11: \*NSET: expected NSET=NAME"),
         ("5, 6, 3\n", "5, 6, 30000000000000000000000\n", "line 9 or later: an element: a number has more digits"),
         ("5, 6, 3\n", "5, 6, 3\0\n", r"this is no \.inp file: it is binary"),
     ],
@@ -561,7 +561,7 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [
-        ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n77", r"line 89: \$EndNodes is wanted here, not '78 .*counts"),
+        ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n77", r"line 89: expected \$EndNodes, .*'78 .*counts"),
         ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n79", r"line 90: \$Nodes ends here, 1 lines before its count"),
         ("plate_triangles_22.msh", "$Nodes\n78", "$Nodes\n-8", r"line 11: \$Nodes begins with a count, not with '-8'"),
         ("plate_triangles_22.msh", "\n2 0 0 0\n", "\n2 0 0\n", r"line 13: \$Nodes takes 4 numbers, found 3"),
@@ -589,9 +589,9 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
             "plate_triangles_22.msh",
             "$Nodes",
             "Nodes",
-            r"line 10: a section such as \$Nodes is wanted here, not 'Nodes'",
+            r"line 10: .*\$Nodes.*'Nodes'",
         ),
-        ("plate_triangles_22.msh", "$EndNodes", "$EndNode", r"line 90: \$EndNodes is wanted here"),
+        ("plate_triangles_22.msh", "$EndNodes", "$EndNode", r"line 90: expected \$EndNodes"),
         ("plate_triangles_22.msh", '1 1 "clamped"', "1 1 clamped", "line 6: a physical group is dimension, number"),
         ("plate_quads_41.msh", "$Entities", "$PartitionedEntities", "line 11: .PartitionedEntities takes 1 numbers"),
         ("plate_quads_41.msh", "$Elements", "$Other", r"line 311: \$EndOther is missing: the file is cut off"),
@@ -643,12 +643,12 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
         ),
         ("quads_51.vtk", "\n9\n9\n", "\n9\n99\n", "cell 1: VTK's cell type 99 is not supported"),
         ("quads_51.vtk", " vtkIdType", " string", "line 32: an array of type 'string' is not read"),
-        ("quads_51.vtk", "LOOKUP_TABLE", "LOOKUP", "line 23: SCALARS part: its LOOKUP_TABLE is wanted here"),
+        ("quads_51.vtk", "LOOKUP_TABLE", "LOOKUP", "line 23: SCALARS part: .*LOOKUP_TABLE"),
         (
             "quads_51.vtk",
             "CONNECTIVITY vtktypeint64",
             "CONNECTIVITY",
-            "line 15: CONNECTIVITY and a type of integers are",
+            "line 15: expected CONNECTIVITY and an integer type",
         ),
         ("quads_ascii.vtu", "0 1 4 3 1", "0 1 4 3 1 1", "the cells have 8 nodes by their offsets, 9 are listed"),
         ("quads_ascii.vtu", "0 1 4 3 1", "0 1 4 3 x", "array 'connectivity' of <Cells> is damaged: invalid literal"),
@@ -666,13 +666,13 @@ def test_a_damaged_deck_is_refused_by_line(tmp_path: Path, old: str, new: str, m
             "block.vtu",
             'NumberOfCells="326"',
             'NumberOfCells="327"',
-            "327 cells are announced, there are 326 offsets|array",
+            "327 cells .* 326 offsets|array",
         ),
         (
             "block.vtu",
             "UnstructuredGrid",
             "PolyData",
-            "array 'region' of <CellData> is damaged: its header announces 1304 bytes, 0 are wanted",
+            "array 'region' of <CellData> is damaged: its header announces 1304 bytes, expected 0",
         ),
     ],
 )
@@ -692,7 +692,9 @@ def test_an_appended_array_that_is_longer_than_the_file(tmp_path: Path) -> None:
     begin = data.index(b"_", data.index(b"<AppendedData")) + 1 + int(offset[1])
     assert data[begin : begin + 8] == (64).to_bytes(8, "little")
     (tmp_path / "quads.vtu").write_bytes(data[:begin] + (10**6).to_bytes(8, "little") + data[begin + 8 :])
-    with pytest.raises(MeshError, match=r"'connectivity' of <Cells> is damaged: 1000000 bytes are announced, \d+ are"):
+    with pytest.raises(
+        MeshError, match=r"'connectivity' of <Cells> is damaged: 1000000 bytes are announced, found \d+"
+    ):
         read_mesh(tmp_path / "quads.vtu")
 
 
@@ -700,7 +702,7 @@ def test_a_count_of_cells_that_does_not_match(tmp_path: Path) -> None:
     grid(tmp_path, CUBE, [("hexahedron", np.array([range(8)]))])
     file = tmp_path / "grid.vtu"
     file.write_bytes(file.read_bytes().replace(b'NumberOfCells="1"', b'NumberOfCells="2"'))
-    with pytest.raises(MeshError, match=r"array 'offsets' of <Cells> is damaged: .* 16 are wanted"):
+    with pytest.raises(MeshError, match=r"array 'offsets' of <Cells> is damaged: .* expected 16"):
         read_mesh(file)
 
 

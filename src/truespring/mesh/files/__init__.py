@@ -1,10 +1,9 @@
-"""Meshes that other programs wrote: gmsh .msh, Abaqus and CalculiX .inp, VTK .vtu and .vtk.
+"""Readers of mesh files: gmsh .msh, Abaqus and CalculiX .inp, VTK .vtu and .vtk.
 
-These formats are read by code of this package, without meshio, gmsh's own library or VTK. meshio is unmaintained
-and drops what problems are stated with: the surfaces, parts and instances of .inp, and all but the last group of an
-element. VTK and gmsh are large binary packages, which a plain installation does without; VTK logs damage and returns
-what it has read so far. The readers here name the line or byte of a fault, count what they leave out, and are tested
-on files that those programs wrote.
+The readers do not use meshio, gmsh's library or VTK. meshio is unmaintained and drops the surfaces, parts and
+instances of .inp, and all but the last group of an element. VTK and gmsh are large binary packages; VTK logs damage
+and returns what it has read so far. The readers here name the line or byte of an error, count what they leave out,
+and are tested on files written by those programs.
 """
 
 from collections.abc import Callable
@@ -28,7 +27,7 @@ Reader = Callable[[bytes, Path], Contents]
 
 
 def _alone(read: Callable[[bytes], Contents]) -> Reader:
-    """Return a reader of files that name no others."""
+    """Return a Reader that ignores the folder, for formats of a single file."""
     return lambda data, folder: read(data)
 
 
@@ -36,10 +35,10 @@ class Format(NamedTuple):
     """A format of mesh files.
 
     Attributes:
-        recognises: whether a file begins as those of the format do.
-        read: returns the contents of a file from its bytes and the folder that it lies in.
-        again: how a file that cannot be read may be mended, in a sentence; empty where nothing is known.
-        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
+        recognises: returns whether the first bytes of a file belong to the format.
+        read: returns the contents of a file, given its bytes and its folder.
+        again: how to convert a file that cannot be read, in a sentence; empty if unknown.
+        unnoticed: where a truncated file reads without an error, and why; empty if any truncation is an error.
     """
 
     recognises: Recognises
@@ -51,7 +50,7 @@ class Format(NamedTuple):
 _GMSH = "if gmsh reads it, save it again: gmsh FILE -0 -format msh41 -o NEW.msh"
 _PARAVIEW = "if ParaView reads it, save it again there as an unstructured grid, .vtu"
 
-#: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
+#: The formats by suffix in lower case; if several recognise a file, the one with its suffix is used, else the first.
 FORMATS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".msh": Format(is_msh, _alone(read_msh), _GMSH),
@@ -69,34 +68,34 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
 
 @renamed_argument("scale", "unit")
 def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = None) -> Mesh:
-    """Read a mesh file; its content tells the format, else its suffix.
+    """Read a mesh file; the format is recognised by the content, else by the suffix.
 
     .msh: gmsh 1, 2 to 2.2, 4.0 and 4.1, text and binary. Physical groups become groups; one without a name is
-    called by its number. .inp: Abaqus and CalculiX, with parts, instances and included files in the deck's
+    named by its number. .inp: Abaqus and CalculiX, with parts, instances and included files in the deck's
     folder or below. NSET, ELSET and SURFACE become groups, in their first spelling: those of the assembly by
-    their name, those of an instance as INSTANCE.NAME, and by their name where no other scope has it; an NSET
-    stands before an ELSET of one name where nodes are asked for. Elements that no body is made of are left
-    out. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces beside them):
-    grids, faces and lattices; pieces are joined where their points coincide. An integer array of the cells with at most
-    64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that have the value;
-    an integer array of the points that holds 0 and 1 becomes the group ARRAY, of the points with 1.
+    their name, those of an instance as INSTANCE.NAME, and also by NAME if no other scope uses it; if an NSET and
+    an ELSET have the same name, the NSET gives the nodes of the group. Elements that do not form a body are left
+    out. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces in the same folder):
+    unstructured grids, surfaces and structured grids; pieces are joined where their points coincide. An integer
+    cell array with at most 64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that
+    have the value; an integer point array of values 0 and 1 becomes the group ARRAY, of the points with 1.
 
-    The elements of the highest dimension are the body, in the file's order; cells of a lower one only
-    carry groups: those of one dimension less are facets of the elements that they bound. A group of
-    elements or facets is one of their nodes, too; where several have one name, the nodes are united.
-    Cells of second order become their corners, bricks with corners that are one node wedges, pyramids or
-    simplices, inverted elements are mirrored, nodes without an element are left out: the mesh's notes say
-    so. A plane body loses its z.
+    The elements of the highest dimension form the body, in the file's order; cells of a lower dimension only
+    define groups: those of one dimension less define facets of the body. Each group of elements or facets
+    also defines a group of their nodes; groups of the same name are united. Cells of second order are reduced
+    to their corners, bricks with coincident corners become wedges, pyramids or simplices, inverted elements
+    are mirrored, and nodes without an element are left out; each change adds a note to the mesh. The z of a
+    plane body is dropped.
 
     Args:
         file: the mesh file.
-        unit: the file's unit of length, such as "mm", or "0.2 mm" where one of its is so long; a number is in metres.
-        join: whether nodes that stand at one place become one; by default where no two elements share a node.
+        unit: the file's unit of length, such as "mm" or "0.2 mm"; a number is in metres.
+        join: whether to merge coincident nodes; by default only if no two elements share a node.
 
-    Returns the mesh, with its groups and notes. Raises MeshError, with the file and, of a text, the line,
-    where the file cannot be read, is damaged or cut off, or holds no body.
-    A .inp or .vtk file has no end mark: one that was cut off between two lines may pass, the former
-    mostly with a note on nodes that no element has.
+    Returns the mesh, with its groups and notes; node positions in metres. Raises MeshError, with the file and the
+    line of a text file, if the file cannot be read, is damaged or truncated, or holds no body.
+    .inp and .vtk files have no end mark: one truncated between two lines may be read without an error; a .inp
+    file then mostly has a note about unreferenced nodes.
     """
     file = Path(file)
     scale = unit_of(unit, "length", f"{file}: unit", MeshError)
@@ -123,7 +122,7 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
 
 
 def _bytes(file: Path) -> bytes:
-    data = read_file(file, MeshError).removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
+    data = read_file(file, MeshError).removeprefix(b"\xef\xbb\xbf")  # UTF-8 byte order mark, written by some editors
     if not data.strip():
         raise MeshError(f"{file} is empty")
     return data

@@ -1,4 +1,4 @@
-"""What a mesh file holds, whatever its format, and the mesh that follows from it."""
+"""Contents of a mesh file, independent of its format, and their conversion to a Mesh."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -47,12 +47,12 @@ _DIVIDE = "divide the others into these, as meshers do by an option and ParaView
 _AGAIN = "write the file again with the program that made it, or mend it there"
 _MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
 
-# A coordinate beyond this was damaged, whatever the unit; its square still is a number.
+# Coordinates above this are taken as damaged, in any unit; their squares are finite.
 _FAR = 1e30
 
 # Shares of the body's diameter.
-_SAME_PLACE = 1e-7  # nodes this near are at one place: as near as float32 tells
-_FLAT = 1e-6  # a body this thin lies in a plane: files carry six digits or more
+_SAME_PLACE = 1e-7  # nodes closer than this coincide: the resolution of float32
+_FLAT = 1e-6  # a body thinner than this is plane: files have six digits or more
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Cells:
         kind: a key of CELL_KINDS.
         nodes: the file's node numbers, corners first, then middles of edges in VTK's order, shape (n_cells, k).
         numbers: the file's cell numbers, shape (n_cells,).
-        lines: where they stand in a text file, shape (n_cells,).
+        lines: line numbers in a text file, shape (n_cells,).
     """
 
     kind: str
@@ -73,7 +73,7 @@ class Cells:
 
     @property
     def dim(self) -> int:
-        """The dimensions that the cells fill."""
+        """The topological dimension of the cells."""
         return CELL_KINDS[self.kind][0]
 
     @property
@@ -89,15 +89,15 @@ class Contents:
     Attributes:
         node_numbers, points: shapes (n,) and (n, 3) [the file's unit of length].
         cells: each block in the file's order.
-        node_groups, cell_groups: numbers of nodes and of cells by name; where both have one, the group of nodes is as
-            the file says, else that of the cells' nodes. Cells of one dimension less than the body
-            name the facets that have their corners.
-        facet_groups: facets by name as their elements' own: the number of a cell and that of its facet in the
-            `facets` of ELEMENT_KINDS, shape (n, 2).
-        node_lines: where the nodes stand in a text file, shape (n,).
-        is_apart: whether the file says that bodies touch without being one: their nodes are joined only if asked.
-        notes: what should be known of the file, in words.
-        hint: what its program may have left out where there is no body, and how it writes that.
+        node_groups, cell_groups: numbers of nodes and of cells by name. If a name is in both, its nodes are those of
+            node_groups, else the nodes of the cells. Cells of one dimension less than the body select the facets
+            with the same corners.
+        facet_groups: facets by name: the number of a cell and the index of its facet in the `facets` of
+            ELEMENT_KINDS, shape (n, 2).
+        node_lines: line numbers of the nodes in a text file, shape (n,).
+        is_apart: whether the file defines contact between bodies: coincident nodes are joined only if `join` is true.
+        notes: remarks about the file for the user.
+        hint: if there is no body, how to make the program write one.
     """
 
     node_numbers: Ints
@@ -112,12 +112,12 @@ class Contents:
     hint: str = ""
 
     def mesh(self, scale: float, join: bool | None = None) -> Mesh:
-        """Return the body with `scale` metres to the file's unit of length; raise MeshError where there is none.
+        """Return the mesh of the body; `scale` is the file's unit of length in metres.
 
-        `join` makes nodes at one place one; by default where no two elements share a node, unless the file says that
-        bodies touch there.
+        `join` merges coincident nodes; by default only if no two elements share a node and the file defines no
+        contact between bodies. Raises MeshError if there is no body.
         """
-        with np.errstate(all="ignore"):  # a damaged coordinate may be too small to divide by: its element is degenerate
+        with np.errstate(all="ignore"):  # damaged coordinates may underflow: the element is then degenerate
             return self._mesh(scale, join)
 
     def _mesh(self, scale: float, join: bool | None) -> Mesh:
@@ -187,12 +187,12 @@ class Contents:
     def _facet_groups(
         self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints, elements: Ints, kind: str
     ) -> tuple[dict[str, Ints], list[str]]:
-        """Return facets by name, each as element and local facet of `elements`; and notes on those that are none."""
+        """Return facets by name, as (element, local facet), and notes about those that bound no element."""
         numbers = np.concatenate([block.numbers for block in body])
         found: dict[str, list[Ints]] = {}
         for name, given in self.facet_groups.items():
             found[name] = [np.stack([places(numbers, given[:, 0]), given[:, 1]], axis=1)]
-            for block in body:  # of bricks that are something else facets are found by their corners
+            for block in body:  # facets of collapsed bricks are found by their corners
                 at = places(block.numbers, given[:, 0])
                 other = np.flatnonzero((at >= 0) & _collapsed(block)[at])
                 if other.size:
@@ -215,7 +215,7 @@ class Contents:
         return groups, notes
 
     def _joined(self, body: Sequence[Cells], always: bool) -> "Contents":
-        """Return the contents with nodes at one place as one, if always or where no two elements share a node."""
+        """Return the contents with coincident nodes merged, if `always` or no two elements share a node."""
         used = self._rows(np.concatenate([block.nodes.ravel() for block in body]))
         if not always and len(np.unique(used)) < len(used):
             return self
@@ -224,7 +224,7 @@ class Contents:
         n_before, n_after = len(np.unique(used)), len(np.unique(place[used]))
         if n_after == n_before:
             return self
-        number = self.node_numbers[first][place]  # of each node, the one that it becomes
+        number = self.node_numbers[first][place]  # of each node, the number of the node that replaces it
         why = "were joined" if always else "were joined, because no two elements share a node"
         return replace(
             self,
@@ -266,7 +266,7 @@ class Contents:
     def _groups(
         self, cells: Sequence[Cells], body: Sequence[Cells], nodes: Ints
     ) -> tuple[dict[str, Ints], dict[str, Ints]]:
-        """Return groups of elements and of nodes by the body's own numbers; some may be empty."""
+        """Return groups of elements and of nodes as indices into the body; some may be empty."""
         elements = np.concatenate([block.numbers for block in body])
         element_groups: dict[str, Ints] = {}
         members = {name: [group] for name, group in self.node_groups.items()}
@@ -280,7 +280,7 @@ class Contents:
         }
 
     def _none_of(self, name: str, body: Sequence[Cells]) -> str:
-        """Say what a group without a node at a corner of the body has."""
+        """Return a phrase for a note about a group that has no corner node of the body."""
         between = np.isin(self.node_groups.get(name, np.zeros(0)), np.concatenate([one.nodes.ravel() for one in body]))
         return "only nodes between the corners of the body" if between.any() else "no node of the body"
 
@@ -328,30 +328,30 @@ class Contents:
         ]
 
 
-def places(numbers: Ints, wanted: Ints) -> Ints:
-    """Return where each of `wanted` stands among `numbers`, -1 where it does not; shape of `wanted`."""
+def places(numbers: Ints, expected: Ints) -> Ints:
+    """Return the index in `numbers` of each of `expected`, -1 if it is not there; shape of `expected`."""
     if not len(numbers):
-        return np.full(wanted.shape, -1, dtype=np.int64)
+        return np.full(expected.shape, -1, dtype=np.int64)
     order = np.argsort(numbers, kind="stable")
-    found = order[np.searchsorted(numbers, wanted, sorter=order).clip(max=len(numbers) - 1)]
-    return np.where(numbers[found] == wanted, found, -1)
+    found = order[np.searchsorted(numbers, expected, sorter=order).clip(max=len(numbers) - 1)]
+    return np.where(numbers[found] == expected, found, -1)
 
 
-def _found(numbers: Ints, wanted: Ints) -> Ints:
-    """Return where those of `wanted` stand that are among `numbers`."""
-    where = places(numbers, wanted)
+def _found(numbers: Ints, expected: Ints) -> Ints:
+    """Return the indices in `numbers` of those of `expected` that are there."""
+    where = places(numbers, expected)
     return np.asarray(where[where >= 0])
 
 
 def _repeated(numbers: Ints) -> int | None:
-    """Return where the first number stands that was there before, None where there is none."""
+    """Return the index of the first duplicate number, None if all are distinct."""
     first = np.zeros(len(numbers), dtype=bool)
     first[np.unique(numbers, return_index=True)[1]] = True
     return None if first.all() else int(first.argmin())
 
 
 def _at(lines: Ints | None, row: int) -> str:
-    """Say in which line a row stands, if that is known."""
+    """Return "line 5: " for the line of a row, empty if unknown."""
     return "" if lines is None else f"line {lines[row]}: "
 
 
@@ -360,7 +360,7 @@ def _not_empty(groups: Mapping[str, Ints]) -> dict[str, Ints]:
 
 
 def _by_kind(cells: Sequence[Cells]) -> list[Cells]:
-    """Join the blocks of one kind and number of nodes; raise MeshError where a cell's number is there twice."""
+    """Join the blocks of the same kind and number of nodes; raise MeshError if a cell number is duplicate."""
     blocks: dict[tuple[str, int], list[Cells]] = {}
     for block in cells:
         if len(block.nodes):
@@ -387,7 +387,7 @@ def _lines(cells: Sequence[Cells]) -> Ints | None:
 
 
 def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
-    """Return the blocks of the highest dimension; raise MeshError where they are no body."""
+    """Return the blocks of the highest dimension; raise MeshError if they form no body."""
     counts = Counter[str]()
     for block in cells:
         counts[block.kind] += len(block.nodes)
@@ -403,9 +403,9 @@ def _body(cells: Sequence[Cells], hint: str) -> list[Cells]:
 
 
 def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
-    """The kind of the body, and its corners by the file's numbers, in the table that a mesh of that kind has.
+    """Return the element kind of the body and the element table, with the file's node numbers.
 
-    Bricks and quadrilaterals with corners that are one are what these make of them: wedges, pyramids, simplices.
+    Bricks and quadrilaterals with coincident corners become wedges, pyramids or simplices.
     """
     kind = body[0].kind
     alone = len({block.kind for block in body}) == 1
@@ -418,7 +418,7 @@ def _table(body: Sequence[Cells]) -> tuple[str, Ints]:
 
 def _with_middles(body: Sequence[Cells]) -> list[Cells]:
     """Return the blocks of triangles and tetrahedra that have a node in the middle of each edge and no other."""
-    if len({block.kind for block in body}) > 1:  # beside other kinds they are of first order
+    if len({block.kind for block in body}) > 1:  # in a mesh of several kinds all elements are of first order
         return []
     simplices = [block for block in body if block.kind in ("triangle", "tetrahedron")]
     kinds = [ELEMENT_KINDS[block.kind] for block in simplices]
@@ -457,7 +457,7 @@ def _in_their_dimensions(positions: Floats, cells: Cells, hint: str) -> Floats:
 
 
 def _is_inverted(positions: Floats, elements: Ints, kind: str) -> Bools:
-    """Tell which elements have no positive corner; those that have some of either sign, the mesh refuses."""
+    """Return which elements have no positive corner, shape (n_elements,); Mesh rejects those of mixed signs."""
     found = np.zeros(len(elements), dtype=bool)
     for name, numbers, own in kinds_in(elements, kind):
         corners = np.array(ELEMENT_KINDS[name].corners)
@@ -468,7 +468,7 @@ def _is_inverted(positions: Floats, elements: Ints, kind: str) -> Bools:
 
 
 def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> list[str]:
-    """Say how many elements were turned; raise MeshError where that folds them over their neighbours."""
+    """Return a note about the mirrored elements; raise MeshError if mirrored elements overlap their neighbours."""
     if not is_turned.any():
         return []
     if is_turned.all():
@@ -485,7 +485,7 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
 
 
 def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
-    """Say how many elements have corners that are one."""
+    """Return notes about the elements with coincident corners."""
     count = sum(int(_collapsed(block).sum()) for block in body)
     if not count:
         return []
@@ -494,14 +494,14 @@ def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
 
 
 def _collapsed(block: Cells) -> Bools:
-    """Tell which cells are quadrilaterals or hexahedra with corners that are one."""
+    """Return which cells are quadrilaterals or hexahedra with coincident corners, shape (n_cells,)."""
     if block.kind not in ("quadrilateral", "hexahedron"):
         return np.zeros(len(block.nodes), dtype=bool)
     return repeats(block.corners)
 
 
 def _halved(elements: Ints, kind: str) -> list[str]:
-    """Say where elements are joined at their corners alone."""
+    """Return a note about quadrilateral faces that adjoin two triangles: the joint has gaps."""
     if kind != MIXED:
         return []
     facets = facet_columns(elements, kind)
@@ -533,7 +533,7 @@ def _coincident(positions: Floats, numbers: Ints) -> list[str]:
 
 
 def listed(counts: Mapping[str, int]) -> str:
-    """List kinds of cells with their counts."""
+    """Return a text such as "1 vertex and 2 lines": the kinds of cells with their counts."""
     words = [counted(count, kind) for kind, count in counts.items()]
     return " and ".join([*([", ".join(words[:-1])] if words[1:] else []), *words[-1:]])
 

@@ -39,7 +39,7 @@ _TYPES: dict[int, tuple[str, int]] = {
     14: ("pyramid", 14),
 }
 
-# Where the last two of ten nodes change places with VTK's.
+# The last two of ten nodes are swapped in VTK's order.
 _TEN = (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)
 
 # Dimension and number of a physical group or of an entity.
@@ -57,7 +57,7 @@ _Table = tuple[int, int, Ints, Ints | None]
 
 
 def read_msh(data: bytes) -> Contents:
-    """Read a .msh file; raise MeshError where it is damaged or of another version."""
+    """Read the bytes of a .msh file; raise MeshError if it is damaged or of an unknown version."""
     version, source = _open(data)
     names: dict[_Tag, str] = {}
     physicals: dict[_Tag, list[int]] = {}
@@ -76,7 +76,7 @@ def read_msh(data: bytes) -> Contents:
             case "Elements" | "ELM" if elements is None:
                 elements = _elements_4(source, version, physicals) if version >= (4, 0) else _elements_2(source)
             case "Nodes" | "NOD" | "ParametricNodes" | "Elements" | "ELM":
-                source.refuse(f"${source.section} is there twice: the nodes and elements of one mesh are wanted")
+                source.refuse(f"${source.section} is there twice: expected the nodes and elements of one mesh")
             case _:
                 source.skip_section()
                 continue
@@ -104,11 +104,11 @@ def read_msh(data: bytes) -> Contents:
     )
 
 
-# --- the two ways that a file is written ----------------------------------------------------------
+# --- text and binary files -------------- ----------------------------------------------------------
 
 
 class _Sections(ABC):
-    """What text and binary files share: lines that begin and end a section, and lines between."""
+    """Base of text and binary files: the lines that begin and end a section, and the lines in it."""
 
     section = "MeshFormat"
 
@@ -119,45 +119,45 @@ class _Sections(ABC):
     @property
     @abstractmethod
     def where(self) -> str:
-        """Where that line stands."""
+        """Return the place of the last line or value read, to begin a message with."""
 
     def refuse(self, why: str) -> NoReturn:
-        """Raise MeshError."""
+        """Raise MeshError with the place and the reason."""
         raise MeshError(f"{self.where}{why}")
 
     def next_section(self) -> bool:
-        """Enter the next section; tell whether there is one."""
+        """Enter the next section; return whether there is one."""
         line = self.line()
         if line and (not line.startswith(b"$") or line.lower().startswith(b"$end")):
-            self.refuse(f"a section such as $Nodes is wanted here, not '{word(line)}'")
+            self.refuse(f"expected a section such as $Nodes, found '{word(line)}'")
         self.section = word(line[1:])
         return bool(line)
 
     def end_section(self) -> None:
-        """Leave the section; raise MeshError where it goes on."""
+        """Leave the section; raise MeshError if its end mark does not follow."""
         line = self.line()
         if line.lower() != b"$end" + self.section.lower().encode():
             self.refuse(
-                f"$End{self.section} is wanted here, not '{word(line)}': the counts do not match"
+                f"expected $End{self.section}, found '{word(line)}': the counts do not match"
                 if line
                 else f"$End{self.section} is missing: the file is cut off"
             )
 
     def count(self) -> int:
-        """Return the count that stands alone on the next line."""
+        """Return the count on the next line; raise MeshError if the line has anything else."""
         line = self.line()
         if not re.fullmatch(rb"\d{1,18}", line):
             self.refuse(f"${self.section} begins with a count, not with '{word(line)}'")
         return int(line)
 
     def known(self, type_: int) -> tuple[str, int]:
-        """Return kind and number of nodes of an element type."""
+        """Return kind and number of nodes of an element type; raise MeshError if it is not supported."""
         if type_ not in _TYPES:
             self.refuse(_unsupported(type_))
         return _TYPES[type_]
 
     def check_total(self, there: int, announced: int) -> None:
-        """Raise MeshError where the blocks of a section do not add up to its count."""
+        """Raise MeshError if the blocks of a section do not add up to its count."""
         if there != announced:
             self.refuse(f"${self.section} announces {announced} entries and has {there}")
 
@@ -170,7 +170,7 @@ def _unsupported(type_: int) -> str:
 
 
 class _Text(_Sections):
-    """A .msh file of text."""
+    """A .msh file in text form."""
 
     def __init__(self, data: bytes, n_before: int) -> None:
         numbered = [(line, number) for number, line in enumerate(data.splitlines(), n_before + 1) if line.strip()]
@@ -187,7 +187,7 @@ class _Text(_Sections):
         return f"line {self._numbers[min(self._next, len(self._lines)) - 1]}: " if self._lines else ""
 
     def skip_section(self) -> None:
-        """Go behind the section, which is not read."""
+        """Skip the section."""
         end = b"$end" + self.section.lower().encode()
         while (line := self.line()).lower() != end:
             if not line:
@@ -205,19 +205,19 @@ class _Text(_Sections):
         return [line.split() for line in lines], numbers
 
     def counts(self, n_ints: int, n_sizes: int) -> list[int]:
-        """Return what heads a table of version 4: plain integers, then counts and numbers of nodes or elements."""
+        """Return the header of a table of version 4: `n_ints` integers, then `n_sizes` counts of nodes or elements."""
         counts: list[int] = self.integers(1, n_ints + n_sizes)[0][0].tolist()
         if min(counts[n_ints:], default=0) < 0:
             self.refuse(f"${self.section}: a count is negative")
         return counts
 
     def integers(self, n_rows: int, n_columns: int) -> tuple[Ints, Ints | None]:
-        """Return a table of numbers of nodes and elements, and its lines."""
+        """Return a table of node and element numbers, shape (n_rows, n_columns), and its lines."""
         rows, lines = self._table(n_rows, n_columns)
         return integers(rows, lines, f"${self.section}").reshape(n_rows, n_columns), np.array(lines, dtype=np.int64)
 
     def reals(self, n_rows: int, n_columns: int) -> tuple[Floats, Ints | None]:
-        """Return a table of coordinates, and its lines."""
+        """Return a table of coordinates, shape (n_rows, n_columns), and its lines."""
         rows, lines = self._table(n_rows, n_columns)
         return reals(rows, lines, f"${self.section}").reshape(n_rows, n_columns), np.array(lines, dtype=np.int64)
 
@@ -227,9 +227,9 @@ class _Text(_Sections):
         return rows, lines
 
     def entity(self, dim: int, version: _Version, is_part: bool) -> _Entity:
-        """Return an entity of version 4, whose numbers are one line."""
+        """Return an entity of version 4 from the next line."""
         (row,), lines = self.rows(1)
-        n_reals = 3 if dim == 0 and version > (4, 0) else 6  # its place, or two corners of the box around it
+        n_reals = 3 if dim == 0 and version > (4, 0) else 6  # its position, or two corners of its bounding box
         before = 1  # its number; of a part then its parent's dimension and number, and its partitions
         if is_part:
             before += 3 + int(integers([row[3:4]], lines, "$PartitionedEntities").sum())
@@ -240,7 +240,7 @@ class _Text(_Sections):
         return values[0], (values[1], values[2]) if is_part else None, groups[: values[before]]
 
     def nodes_2(self) -> _Nodes:
-        """Return the nodes of version 1 or 2; behind the coordinates may stand an entity and parameters on it."""
+        """Return the nodes of version 1 or 2; an entity and parameters on it may follow the coordinates."""
         n_nodes = self.count()
         rows, lines = self.rows(n_nodes)
         if self.section != "Nodes":  # entity and parameters follow, in $NOD too
@@ -265,25 +265,27 @@ class _Text(_Sections):
         for head in np.sort(np.unique(heads, axis=0, return_index=True)[1]):
             type_, n_tags = heads[head].tolist()
             same = np.flatnonzero((heads == heads[head]).all(axis=1))
-            wanted = 3 + n_tags + _TYPES[type_][1] if type_ in _TYPES and n_tags >= 0 else -1
-            wrong = same[width[same] != wanted]
-            if wanted < 0 or wrong.size:
+            expected = 3 + n_tags + _TYPES[type_][1] if type_ in _TYPES and n_tags >= 0 else -1
+            wrong = same[width[same] != expected]
+            if expected < 0 or wrong.size:
                 raise MeshError(
                     f"line {at[wrong[0]]}: "
                     + (
-                        f"an element of gmsh's type {type_} with {n_tags} tags takes {wanted} numbers, found "
+                        f"an element of gmsh's type {type_} with {n_tags} tags takes {expected} numbers, found "
                         f"{width[wrong[0]]}"
-                        if wanted >= 0
+                        if expected >= 0
                         else _unsupported(type_)
                     )
                 )
-            yield type_, n_tags, values[start[same, None] + np.array([0, *range(3, wanted)])], at[same]
+            yield type_, n_tags, values[start[same, None] + np.array([0, *range(3, expected)])], at[same]
 
 
 def _of_version_2(row: Sequence[bytes], line: int) -> Sequence[bytes]:
-    """Return the row of an element of version 1 as of version 2: with the number of tags, without that of nodes."""
+    """Convert the row of an element from version 1 to 2: add the number of tags, drop the number of nodes."""
     if len(row) < 5 or not row[4].isdigit() or int(row[4]) != len(row) - 5:
-        raise MeshError(f"line {line}: an element has {word(b' '.join(row[4:5])) or 'no'} nodes by its own count")
+        raise MeshError(
+            f"line {line}: an element has {word(b' '.join(row[4:5])) or 'no'} nodes by the count in its line"
+        )
     return [*row[:2], b"2", *row[2:4], *row[5:]]
 
 
@@ -308,11 +310,11 @@ class _Binary(_Sections):
         return f"byte {self._next}: "
 
     def skip_section(self) -> None:
-        """Go behind the section, which is not read: by its length where that is known, else to its end mark."""
+        """Skip the section: by its length if known, else to its end mark."""
         begin = self._next
         try:
             self._pass_over()
-        except MeshError:  # it is not what it is called
+        except MeshError:  # the content does not fit the section's name
             self._next = begin
         end = rb"\$End" + re.escape(self.section.encode()) + rb"[ \t\r]*(?:\n|\Z)"  # no line need end before it
         found = re.compile(end, re.IGNORECASE).search(self._data, self._next)
@@ -321,7 +323,7 @@ class _Binary(_Sections):
         self._next = found.end()
 
     def _pass_over(self) -> None:
-        """Go behind the binary data of a section."""
+        """Skip the binary data of a section of known length."""
         match self.section:
             case "NodeData" | "ElementData" | "ElementNodeData":
                 tags = [[self.line() for _ in range(self.count())] for _ in range(3)]  # texts, reals, integers
@@ -340,29 +342,29 @@ class _Binary(_Sections):
                     self.sizes(2 * self.sizes(1)[0])
 
     def take(self, dtype: DTypeLike, count: int) -> NDArray[Any]:
-        """Return the next `count` values."""
+        """Return the next `count` values; raise MeshError at the end of the file."""
         size, left = count * np.dtype(dtype).itemsize, len(self._data) - self._next
         if not 0 <= size <= left:
-            self.refuse(f"${self.section} wants {size} bytes, the file has {left} more")
+            self.refuse(f"${self.section} needs {size} more bytes, the file has {left}")
         values = np.frombuffer(self._data, dtype, count, self._next)
         self._next += size
         return values
 
     def counts(self, n_ints: int, n_sizes: int) -> list[int]:
-        """Return what heads a table of version 4: plain integers, then counts and numbers of nodes or elements."""
+        """Return the header of a table of version 4: `n_ints` integers, then `n_sizes` counts of nodes or elements."""
         return [*self.take(self._int, n_ints).tolist(), *self.sizes(n_sizes)]
 
     def sizes(self, count: int) -> list[int]:
-        """Return the next `count` numbers of nodes, elements or what there is of them."""
+        """Return the next `count` numbers or counts of nodes or elements."""
         sizes: list[int] = self.take(self._size, count).tolist()
         return sizes
 
     def integers(self, n_rows: int, n_columns: int) -> tuple[Ints, Ints | None]:
-        """Return a table of numbers of nodes and elements."""
+        """Return a table of node and element numbers, shape (n_rows, n_columns), and None."""
         return self.take(self._size, n_rows * n_columns).reshape(n_rows, n_columns).astype(np.int64), None
 
     def reals(self, n_rows: int, n_columns: int) -> tuple[Floats, Ints | None]:
-        """Return a table of coordinates."""
+        """Return a table of coordinates, shape (n_rows, n_columns), and None."""
         return self.take(self._real, n_rows * n_columns).reshape(n_rows, n_columns).astype(np.float64), None
 
     def entity(self, dim: int, version: _Version, is_part: bool) -> _Entity:
@@ -377,7 +379,7 @@ class _Binary(_Sections):
         return number, (parent[0], parent[1]) if is_part else None, physicals
 
     def nodes_2(self) -> _Nodes:
-        """Return the nodes of version 2; behind the coordinates may stand an entity and parameters on it."""
+        """Return the nodes of version 2; an entity and parameters on it may follow the coordinates."""
         row = np.dtype([("number", self._int), ("point", self._real, 3)])
         if self.section != "ParametricNodes":
             nodes = self.take(row, self.count())
@@ -409,7 +411,7 @@ _Source = _Text | _Binary
 
 
 def _open(data: bytes) -> tuple[_Version, _Source]:
-    """Return the version and the source of the sections behind the header."""
+    """Return the version, and the source positioned after the header."""
     comments, field = rb"(?:\s*\$Comments.*?\$EndComments)?\s*", rb"[ \t]+(\S+)"
     header = re.match(comments + rb"\$MeshFormat\s+(\S+)" + 2 * field + rb"[ \t\r]*\n", data, re.DOTALL)
     if header is None:
@@ -436,7 +438,7 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
         one = data[header.end() : header.end() + 4]
         if one not in (b"\1\0\0\0", b"\0\0\0\1"):
             raise MeshError(
-                "$MeshFormat: the binary 1 that tells the order of bytes is missing: was the file sent as text? Send "
+                "$MeshFormat: the binary 1 that gives the byte order is missing: was the file sent as text? Send "
                 "it as binary, or save it as text (Mesh.Binary = 0)"
             )
         source = _Binary(data, header.end() + 4, "<" if one[0] else ">", int(size))
@@ -446,7 +448,7 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
 
 # --- the sections ---------------------------------------------------------------------------------
 
-# The dimension of a physical group whose file does not tell it.
+# The dimension of a physical group if the file gives none.
 _ANY = -1
 
 
@@ -454,7 +456,7 @@ def _physical_names(source: _Source) -> dict[_Tag, str]:
     names = {}
     for _ in range(source.count()):
         line = source.line()
-        found = re.fullmatch(rb'(?:(\d)\s+)?(\d{1,18})\s+"(.*)"', line)  # version 2.0 tells no dimension
+        found = re.fullmatch(rb'(?:(\d)\s+)?(\d{1,18})\s+"(.*)"', line)  # version 2.0 gives no dimension
         if found is None:
             source.refuse(f"a physical group is dimension, number and \"name\", not '{word(line)}'")
         dim = _ANY if found[1] is None else int(found[1])
@@ -463,7 +465,7 @@ def _physical_names(source: _Source) -> dict[_Tag, str]:
 
 
 def _entities(source: _Source, version: _Version) -> dict[_Tag, list[int]]:
-    """Return the physical groups of each entity; the sign of their numbers is but an orientation."""
+    """Return the physical groups of each entity; the sign of a number is an orientation and is dropped."""
     physicals = {}
     for dim, count in enumerate(source.counts(0, 4)):
         for _ in range(count):
@@ -473,7 +475,7 @@ def _entities(source: _Source, version: _Version) -> dict[_Tag, list[int]]:
 
 
 def _partitioned(source: _Source, version: _Version, whole: dict[_Tag, list[int]]) -> dict[_Tag, list[int]]:
-    """Return the physical groups of each part of an entity: its own, else those of the entity that it is a part of."""
+    """Return the physical groups of each partition of an entity; those of the parent entity if it has none."""
     source.counts(0, 1)  # of partitions
     for _ in range(source.counts(0, 1)[0]):
         source.counts(2, 0)  # of ghosts: number and partition
@@ -481,7 +483,7 @@ def _partitioned(source: _Source, version: _Version, whole: dict[_Tag, list[int]
     for dim, count in enumerate(source.counts(0, 4)):
         for _ in range(count):
             number, parent, groups = source.entity(dim, version, is_part=True)
-            if parent and parent[0] == dim:  # else it is a border between parts, called as what it divides
+            if parent and parent[0] == dim:  # else an interface between partitions, which has the names of its parent
                 physicals[dim, number] = [abs(group) for group in groups] or whole.get(parent, [])
     return physicals
 
@@ -494,8 +496,8 @@ def _nodes_4(source: _Source, version: _Version) -> _Nodes:
         dim = other if version == (4, 0) else one
         if dim not in range(4):
             source.refuse(f"$Nodes: an entity of dimension {dim}")
-        n_parameters = dim if parametric else 0  # on the entity, behind the place
-        if version == (4, 0):  # each node with its number before it
+        n_parameters = dim if parametric else 0  # on the entity, after the coordinates
+        if version == (4, 0):  # each node is preceded by its number
             table, lines = source.reals(count, 4 + n_parameters)
             numbers, table = table[:, 0].astype(np.int64), table[:, 1:]
         else:
@@ -525,7 +527,7 @@ def _elements_4(source: _Source, version: _Version, physicals: dict[_Tag, list[i
 
 
 def _elements_2(source: _Source) -> _Elements:
-    """Return each cell once: version 2 lists it again, with another number, for each of its physical groups."""
+    """Return each cell once: version 2 repeats it, with a new number, for each of its physical groups."""
     cells: list[Cells] = []
     groups: dict[_Tag, list[Ints]] = {}
     for type_, n_tags, table, lines in source.elements_2():
@@ -536,7 +538,7 @@ def _elements_2(source: _Source) -> _Elements:
         cell = cell.ravel()
         if len(np.unique(np.stack([cell, group], axis=1), axis=0)) == len(table):
             numbers, once = numbers[first[cell]], np.sort(first)
-        else:  # a cell is twice in one group: the mesh refuses it
+        else:  # a cell is twice in one group: Mesh raises an error
             once = np.arange(len(table))
         cells.append(
             Cells(kind, _in_vtk_order(nodes[once], kind), numbers[once], None if lines is None else lines[once])

@@ -1,21 +1,21 @@
-"""The format of a file, by what it begins with and, where that does not tell, by its suffix."""
+"""Recognise the format of a file by its first bytes, else by its suffix."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
 
-#: Tells whether a file that begins with some bytes has a format.
+#: Returns whether a file that begins with the given bytes has a certain format.
 Recognises = Callable[[bytes], bool]
 
-#: As many bytes tell every format but that of a deck behind a long comment.
+#: The number of bytes to look at: enough for every format, except a deck that begins with a long comment.
 HEAD = 1 << 16
 
 
 def format_by_head(suffix: str, head: bytes, formats: Mapping[str, Recognises]) -> str | None:
-    """Return the key of the format of a file that begins with `head`, None where neither content nor suffix tells.
+    """Return the key of the format of a file that begins with `head`, None if neither content nor suffix is known.
 
-    `formats` are by suffix in small letters. Of several that fit the one with the suffix counts, else the first.
+    `formats` are by suffix in lower case. If several fit, the one with the file's suffix is used, else the first.
     """
-    head = head.removeprefix(b"\xef\xbb\xbf")  # some editors mark UTF-8 by that
+    head = head.removeprefix(b"\xef\xbb\xbf")  # UTF-8 byte order mark, written by some editors
     fitting = [key for key, recognises in formats.items() if recognises(head)]
     if suffix.lower() in fitting or (not fitting and suffix.lower() in formats):
         return suffix.lower()
@@ -23,34 +23,34 @@ def format_by_head(suffix: str, head: bytes, formats: Mapping[str, Recognises]) 
 
 
 def read_as(key: str, suffix: str) -> tuple[str, ...]:
-    """Say as what a file was read whose suffix tells something else."""
+    """Return a note if the format `key` of a file differs from its suffix, else nothing."""
     ending = f"although its name ends in '{suffix}'" if suffix else "although its name has no ending"
     return (f"read as a {key} file by its content, {ending}",) if key != suffix.lower() else ()
 
 
 def listed_keys(formats: Iterable[str], without: str) -> str:
-    """List the files of other formats than one."""
+    """Return a text that lists the formats except `without`."""
     others = [key for key in formats if key != without]
     return f"{', '.join(others[:-1])} or {others[-1]} files"
 
 
 def is_msh(head: bytes) -> bool:
-    """Whether a file begins as gmsh's meshes do, behind comments."""
+    """Return whether a file begins as a gmsh mesh, after comments."""
     return bool(re.match(rb"(?:\s*\$Comments.*?\$EndComments)?\s*\$(?:MeshFormat|NOD)\s", head, re.DOTALL))
 
 
 def is_inp(head: bytes) -> bool:
-    """Whether a file begins as decks of Abaqus and CalculiX do: with a keyword, behind comments."""
+    """Return whether a file begins as a deck of Abaqus or CalculiX: with a keyword, after comments."""
     return b"\0" not in head and bool(re.match(rb"(?:\s*\*\*[^\n]*\n)*\s*\*[ \t]*[A-Za-z]", head))
 
 
 def is_vtk(head: bytes) -> bool:
-    """Whether a file begins as legacy VTK files do."""
+    """Return whether a file begins as a legacy VTK file."""
     return bool(re.match(rb"# vtk DataFile", head, re.IGNORECASE))
 
 
 def is_vtk_xml(*kinds: str) -> Recognises:
-    """Return what tells whether a file begins as VTK's XML files of some types do, as "UnstructuredGrid"."""
+    """Return a function that recognises VTK XML files of the given types, such as "UnstructuredGrid"."""
     before = rb"\s*(?:<\?xml[^>]*>\s*)?(?:<!--(?:(?!-->).)*-->\s*)*<VTKFile\b[^>]*?"
     names = "|".join(kinds).encode()
     form = re.compile(before + rb"\btype\s*=\s*[\"'](?:" + names + rb")[\"']", re.DOTALL)
@@ -58,7 +58,7 @@ def is_vtk_xml(*kinds: str) -> Recognises:
 
 
 def foreign(data: bytes) -> str:
-    """Say what a file of no known format is, and the way from there to a mesh, where what it holds tells; else ""."""
+    """Return what a file of an unsupported format is and how to convert it to a mesh; empty if unknown."""
     if data.startswith((b"\x1f\x8b", b"PK\x03\x04")):
         return "it is packed: unpack it (gunzip, unzip), and name what comes out"
     is_stl = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")

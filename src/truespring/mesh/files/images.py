@@ -1,4 +1,4 @@
-"""Label images, segmented organs, by their suffix: .nii, .nii.gz, .nrrd, .mha, .mhd, .vti and .npy."""
+"""Read label images (segmentations) by their suffix: .nii, .nii.gz, .nrrd, .mha, .mhd, .vti and .npy."""
 
 import io
 import math
@@ -21,7 +21,7 @@ from truespring.mesh.files.raw_image import SAVE_ANEW, n_voxels
 from truespring.mesh.files.vtu import dims_of, open_vtk
 from truespring.opening import read_file
 
-# Before the name of an image that comes with PyVista: "pyvista:frog_tissues".
+# Prefix of the name of an image of the PyVista package: "pyvista:frog_tissues".
 _PYVISTA = "pyvista:"
 
 
@@ -29,8 +29,8 @@ class ImageFormat(NamedTuple):
     """A format of label images.
 
     Attributes:
-        read: returns the labels in a file.
-        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
+        read: returns the labels of a file.
+        unnoticed: where a truncated file reads without an error, and why; empty if any truncation is an error.
     """
 
     read: Callable[[Path], Labels]
@@ -38,7 +38,7 @@ class ImageFormat(NamedTuple):
 
 
 def read_labels(file: str | Path) -> Labels:
-    """Read a label image; raise MeshError, with the file, where it is damaged or holds no labels."""
+    """Read a label image; raise MeshError, with the file, if it is damaged or holds no labels."""
     if str(file).startswith(_PYVISTA):
         return checked(_of_pyvista(str(file).removeprefix(_PYVISTA)))
     file = Path(file)
@@ -48,8 +48,8 @@ def read_labels(file: str | Path) -> Labels:
     try:
         return checked(form.read(file))
     except MeshError as error:
-        told = str(error)
-        raise MeshError(told if told.startswith(str(file)) else f"{file}: {told}") from None
+        message = str(error)
+        raise MeshError(message if message.startswith(str(file)) else f"{file}: {message}") from None
 
 
 def _npy(file: Path) -> Labels:
@@ -65,22 +65,22 @@ def _npy(file: Path) -> Labels:
     except (ValueError, TypeError, SyntaxError, tokenize.TokenError, EOFError, OverflowError, RecursionError) as error:
         raise MeshError(f"{wrong} ({str(error).splitlines()[0][:80] if str(error) else 'no header'})") from None
     if dtype.hasobject or dtype.kind not in "iubf":
-        raise MeshError(f"the array holds {dtype}: integers are wanted, one label a voxel")
-    wanted, there = n_voxels(shape) * dtype.itemsize, len(data) - stream.tell()
-    if wanted != there:
-        raise MeshError(f"its header announces {wanted} bytes of voxels, {there} are there: is it cut off? {SAVE_ANEW}")
+        raise MeshError(f"the array holds {dtype}: expected integers, one label per voxel")
+    expected, there = n_voxels(shape) * dtype.itemsize, len(data) - stream.tell()
+    if expected != there:
+        raise MeshError(f"its header announces {expected} bytes of voxels, found {there}: is it cut off? {SAVE_ANEW}")
     values = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if is_fortran else "C")
     return Labels(values, np.ones(3), np.zeros(3), np.eye(3))
 
 
 def _vti(file: Path) -> Labels:
-    """VTK's image: labels of the points, or of the cells between them."""
+    """Read a VTK image: labels of the points, or of the cells."""
     root, reader = open_vtk(read_file(file, MeshError), "ImageData")
     image = root.find("ImageData")
-    assert image is not None  # open_vtk has looked
+    assert image is not None  # checked by open_vtk
     pieces = image.findall("Piece")
     if len(pieces) != 1:
-        raise MeshError(f"there are {len(pieces)} pieces: one is wanted")
+        raise MeshError(f"expected one piece, found {len(pieces)}")
     n_points = np.array(dims_of(image, "WholeExtent"))
     if dims_of(pieces[0]) != n_points.tolist():
         raise MeshError("its piece is not the whole image: save it in one piece")
@@ -100,7 +100,7 @@ def _vti(file: Path) -> Labels:
 
 
 def _of_pyvista(name: str) -> Labels:
-    """An image that comes with PyVista's own package; others, which it would download, are not asked for."""
+    """Read an example image of the PyVista package; those that PyVista would download raise MeshError."""
     try:
         from pyvista import examples
     except ImportError:
@@ -120,11 +120,11 @@ def _numbers(element: ElementTree.Element, name: str, count: int, default: str =
     except ValueError:
         found = np.zeros(0)
     if len(found) != count:
-        raise MeshError(f'ImageData has {name}="{text[:40]}": {count} numbers are wanted')
+        raise MeshError(f'ImageData has {name}="{text[:40]}": expected {count} numbers')
     return found
 
 
-#: By the end of the name, in small letters.
+#: The formats by the end of the file name, in lower case.
 IMAGES: MappingProxyType[str, ImageFormat] = MappingProxyType(
     {
         **dict.fromkeys((".nii", ".nii.gz"), ImageFormat(read_nifti)),

@@ -1,4 +1,4 @@
-"""Abaqus and CalculiX .inp files: the mesh, its sets and its surfaces; materials, steps and the rest are passed over.
+"""Read the mesh, sets and surfaces of Abaqus and CalculiX .inp files; materials, steps and the rest are skipped.
 
 Source: the keywords *NODE, *ELEMENT, *NSET, *ELSET and *SURFACE in the manual of CalculiX CrunchiX,
 https://www.dhondt.de, and *PART, *INSTANCE and *ASSEMBLY in that of Abaqus.
@@ -20,19 +20,19 @@ from truespring.mesh.files.inp_move import Move, read_move
 from truespring.mesh.files.inp_scopes import Scope, counted, found, key_of, totals
 from truespring.mesh.files.inp_surfaces import Surfaces
 
-# What makes or moves nodes and elements in a way that is not followed here.
+# Keywords that generate or transform nodes and elements, which are not supported.
 _UNREAD = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
-# What acts between bodies that touch.
+# Keywords of contact between bodies.
 _BETWEEN = {"CONTACT", "CONTACTPAIR", "TIE", "GAP"}
 _FLAT = "write nodes and elements out, as *NODE and *ELEMENT (Abaqus/CAE does: import the model, write a job's input)"
 
 
 def read_inp(data: bytes, folder: Path | None = None) -> Contents:
-    """Read a .inp file; raise MeshError where it is damaged or makes its mesh in a way that is not read.
+    """Read a .inp file; raise MeshError if it is damaged or generates its mesh by an unsupported keyword.
 
     Args:
-        data: what the file holds.
-        folder: where it lies: files that it includes are read there or below, and nowhere else.
+        data: the bytes of the file.
+        folder: the folder of the file; included files must lie in it or below.
     """
     if b"\0" in data:
         raise MeshError("this is no .inp file: it is binary, not text")
@@ -44,18 +44,18 @@ def read_inp(data: bytes, folder: Path | None = None) -> Contents:
 
 
 class _Deck:
-    """Gives each card to the scope that it stands in."""
+    """Collects the cards of a deck in their scopes: parts, instances, the assembly."""
 
     def __init__(self) -> None:
         self._root = Scope("")
         self._parts: dict[str, Scope] = {}
         self._instances: dict[str, tuple[Scope, Move | None]] = {}
-        self._used: set[str] = set()  # keys of parts that instances are made of
+        self._used: set[str] = set()  # keys of parts with an instance
         self._here = self._root
         self._is_apart = False
 
     def add(self, card: Card) -> None:
-        """Take what a card says of the mesh."""
+        """Add the mesh data of a card to its scope; raise MeshError if the keyword is not supported."""
         if card.keyword in _UNREAD:
             raise card.error(f"this is not followed: {_FLAT}")
         self._is_apart = self._is_apart or card.keyword in _BETWEEN
@@ -72,7 +72,7 @@ class _Deck:
     def _begin(self, card: Card, known: dict[str, Scope], make: Callable[[str], Scope]) -> Scope:
         name = card.parameters.get("NAME", "")
         if not bare(name) or key_of(name) in known:
-            raise card.error(f"NAME={bare(name)[:40]}: a name of its own is wanted")
+            raise card.error(f"NAME={bare(name)[:40]}: expected a unique name")
         known[key_of(name)] = make(bare(name))
         return known[key_of(name)]
 
@@ -87,7 +87,7 @@ class _Deck:
     def _part(self, card: Card) -> Scope:
         name = card.parameters.get("PART", "")
         if not bare(name):
-            return Scope("")  # what the instance holds stands in itself
+            return Scope("")  # the instance itself holds the mesh
         key = found(self._parts, name)
         if key is None:
             known = [scope.name for scope in self._parts.values()]
@@ -97,7 +97,7 @@ class _Deck:
         return self._parts[key]
 
     def contents(self, lines: Lines) -> Contents:
-        """Return what the deck holds; raise MeshError where a set names what does not exist."""
+        """Return the contents of the deck; raise MeshError if a set names an unknown instance or set."""
         explicit = bool(self._instances)
         instances = list(self._instances.values()) or [(part, None) for part in self._parts.values()]
         assembly = Assembly(lines, self._root, instances, explicit)
@@ -145,8 +145,8 @@ def _lower(assembly: Assembly) -> Iterator[str]:
 class _Groups:
     """The sets and surfaces of a deck by the names of groups.
 
-    Those of the assembly, or of a flat deck, have their own name. Those of an instance are called INSTANCE.NAME, and by
-    their own name too where no other scope has one of that name.
+    Those of the assembly, or of a flat deck, keep their name. Those of an instance become INSTANCE.NAME, and also NAME
+    if no other scope uses that name.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -172,7 +172,7 @@ class _Groups:
             self.notes.append(f"names used in several scopes are qualified by their instance: {', '.join(hidden)}")
 
     def _take(self, owner: Placed, key: str, names: list[str]) -> None:
-        """Take the sets and the surface of a key under some names."""
+        """Add the sets and the surface of a key as groups, under each of `names`."""
         scope = owner.scope
         surface = scope.surfaces.get(key)
         if surface and surface.of_nodes:
@@ -197,7 +197,7 @@ class _Groups:
             self.notes.append(f"surface '{names[0]}' is left out: {error}")
 
     def _put_side(self, owner: Placed, key: str, names: list[str]) -> bool:
-        """Take an internal set that a surface gives one label as facets: a program made it to name them."""
+        """Add an internal element set as facets if a surface uses it with one face label; return whether it does."""
         rows = [
             row
             for surface in owner.scope.surfaces.values()

@@ -1,4 +1,4 @@
-"""A deck put together: instances in their places, numbers that are distinct, and what sets and surfaces name.
+"""Assemble a deck: place the instances, make the numbers unique, resolve sets and surfaces.
 
 Source: "Assembly definition" in the manual of Abaqus.
 """
@@ -28,18 +28,18 @@ from truespring.mesh.files.inp_scopes import (
     key_of,
 )
 
-#: A coordinate beyond this was damaged, whatever the unit; its square still is a number.
+#: Coordinates above this are taken as damaged, in any unit; their squares are finite.
 _FAR = 1e30
 
 
 class Placed(NamedTuple):
-    """A scope in its place.
+    """A scope with its nodes placed in the assembly.
 
     Attributes:
-        scope: what it holds.
-        nodes, elements: by its own numbers, without those that are left out.
-        numbers, left_out: of nodes (NSET) and elements (ELSET): what there is, and what is left out.
-        add: what its numbers of nodes and elements are raised by in the whole.
+        scope: the scope.
+        nodes, elements: with the numbers of the scope, without those that are left out.
+        numbers, left_out: numbers of nodes (NSET) and elements (ELSET) that are kept, and that are left out.
+        add: the offsets of node and element numbers in the assembly.
     """
 
     scope: Scope
@@ -51,16 +51,16 @@ class Placed(NamedTuple):
 
 
 class Assembly:
-    """Instances and what stands around them, as one body.
+    """The instances of a deck, and the nodes and elements outside of them, as one body.
 
     Attributes:
-        placed: by key of the instance; "" what stands around them, or a flat deck.
-        notes: what should be known of it.
+        placed: by key of the instance; "" for the assembly itself, or a flat deck.
+        notes: remarks for the user.
     """
 
     def __init__(self, lines: Lines, root: Scope, instances: Sequence[tuple[Scope, Move | None]], explicit: bool):
         self._lines = lines
-        self._explicit = explicit  # instances were named: plain numbers outside are none of theirs
+        self._explicit = explicit  # instances were named: plain numbers outside belong to the assembly
         self.notes: list[str] = []
         self.placed: dict[str, Placed] = {}
         for scope, move in instances:
@@ -95,7 +95,7 @@ class Assembly:
         return _joined(one.numbers[kind] + one.add[kind] for one in self.placed.values())
 
     def _nodes(self, scope: Scope) -> Nodes:
-        """Return the nodes of all cards; raise MeshError where one is there twice at two places, or is none."""
+        """Return the nodes of all cards; raise MeshError if a node has two positions or a damaged coordinate."""
         if not scope.nodes:
             return joined_nodes([])
         nodes = joined_nodes(scope.nodes)
@@ -119,7 +119,7 @@ class Assembly:
         return nodes
 
     def _without_reference_points(self, nodes: Nodes, scope: Scope) -> Bools:
-        """Return which nodes of an assembly some element has; say how many none has."""
+        """Return which nodes of an assembly belong to an element, shape (n,); add a note about the others."""
         is_kept = np.isin(nodes.numbers, _joined(block.nodes.ravel() for block in scope.elements))
         count = int((~is_kept).sum())
         if count:
@@ -132,7 +132,7 @@ class Assembly:
         return np.asarray(is_kept)
 
     def _elements(self, scope: Scope, nodes: Nodes) -> Iterator[Elements]:
-        """Yield the elements of a scope; raise MeshError where one is there twice or names a node that is not."""
+        """Yield the elements of a scope; raise MeshError if a number is duplicate or a node is unknown."""
         numbers = _joined(block.numbers for block in scope.elements)
         lines = _joined(block.places for block in scope.elements)
         is_first = np.zeros(len(numbers), dtype=bool)
@@ -155,10 +155,10 @@ class Assembly:
                 self.notes.append(f"{lost.sum()} of {lost.size} {block.type} name nodes that are not there: left out")
             yield Elements(block.type, block.kind, *(column[~lost] for column in block[2:]))
 
-    # --- what is named ----------------------------------------------------------------------------
+    # --- sets and names ---------------------------------------------------------------------------
 
     def owner(self, name: str, place: int) -> Placed:
-        """Return the instance of a name."""
+        """Return the instance of a name; raise MeshError if there is no such instance."""
         key = found(self.placed, name) if bare(name) else None
         if key is None:
             known = [one.scope.name for one in self.placed.values() if one.scope.name]
@@ -169,9 +169,9 @@ class Assembly:
         return self.placed[key]
 
     def set_members(self, owner: Placed, kind: str, key: str, within: tuple[int, ...] = ()) -> Ints:
-        """Return the numbers of a set in the whole; `within` are the sets that it is looked up for."""
+        """Return the members of a set as numbers of the assembly; `within` are the ids of the sets being resolved."""
         parts = owner.scope.sets[kind][key]
-        if id(parts) in within:  # it names itself
+        if id(parts) in within:  # the set contains itself
             return _joined([])
         within = (*within, id(parts))
         return _joined(one for part in parts for one in self._members(owner, kind, key, part, within))
@@ -185,7 +185,7 @@ class Assembly:
                 yield self._numbers(scope, kind, member, owner.scope.names[key])
 
     def _plain(self, owner: Placed) -> Placed:
-        """Return the scope of plain numbers: where parts stand without an assembly, those of the only one."""
+        """Return the scope of plain numbers; without *ASSEMBLY and with a single instance, that instance."""
         alone = [one for key, one in self.placed.items() if key]
         return alone[0] if not (owner.scope.name or self._explicit) and len(alone) == 1 else owner
 
@@ -208,7 +208,7 @@ class Assembly:
         self._lost[name] = first, where, so_far + count
 
     def lost(self) -> list[str]:
-        """Say what sets name that is not there."""
+        """Return notes about set members that are not in the file."""
         return [
             f"set '{name}' names {count} that {'are' if count > 1 else 'is'} not in the file and left out, the first "
             f"is number {number} in {self._lines.at(place)}"
@@ -216,9 +216,9 @@ class Assembly:
         ]
 
     def named(self, owner: Placed, member: Named, kind: str, within: tuple[int, ...] = ()) -> Ints:
-        """Return the numbers that a name stands for: a number or a set, of a scope or of an instance before a dot.
+        """Resolve a name to numbers: a number or a set, of the scope or of an instance (INSTANCE.NAME).
 
-        `kind` is wanted; elements stand for their nodes. Raises MeshError where the name is none.
+        Returns numbers of `kind` (NSET or ELSET); for NSET, elements give their nodes. Raises MeshError if unknown.
         """
         for scope, name in self._readings(owner, member.name):
             key = found(scope.scope.sets[member.kind], name)
@@ -234,7 +234,7 @@ class Assembly:
         raise MeshError(f"{self._lines.at(member.place)}: {shown} is neither a number nor a set that is in the file")
 
     def _readings(self, owner: Placed, name: str) -> Iterator[tuple[Placed, str]]:
-        """Yield what a name may mean: one of the scope's own, or one of the instance before a dot."""
+        """Yield the possible meanings of a name: a name of the scope, or of the instance before a dot."""
         plain = self._plain(owner)
         yield owner, name
         if plain is not owner:
@@ -243,7 +243,7 @@ class Assembly:
             key = found(self.placed, name[:at]) if letter == "." and bare(name[:at]) else None
             if key is not None:
                 yield self.placed[key], name[at + 1 :]
-            elif letter == "." and not owner.scope.name:  # the name of the assembly may stand before
+            elif letter == "." and not owner.scope.name:  # the name of the assembly may precede
                 yield from self._readings(owner, name[at + 1 :])
 
     def _nodes_of(self, elements: Ints) -> Ints:
@@ -251,7 +251,7 @@ class Assembly:
 
     @cached_property
     def cells(self) -> list[Elements]:
-        """The elements of all scopes by the numbers of the whole."""
+        """Return the elements of all scopes, with the numbers of the assembly."""
         return [
             block._replace(numbers=block.numbers + one.add["ELSET"], nodes=block.nodes + one.add["NSET"])
             for one in self.placed.values()
@@ -260,13 +260,13 @@ class Assembly:
 
     @cached_property
     def nodes(self) -> Nodes:
-        """The nodes of all scopes by the numbers of the whole."""
+        """Return the nodes of all scopes, with the numbers of the assembly."""
         return joined_nodes(
             [one.nodes._replace(numbers=one.nodes.numbers + one.add["NSET"]) for one in self.placed.values()]
         )
 
     def all_elements(self, owner: Placed) -> Ints:
-        """Return all elements of a scope by the numbers of the whole; around instances those of all."""
+        """Return the numbers in the assembly of all elements of a scope; for the assembly, those of all scopes."""
         scopes = [owner] if owner.scope.name else list(self.placed.values())
         return _joined(one.numbers["ELSET"] + one.add["ELSET"] for one in scopes)
 
@@ -276,7 +276,7 @@ def _joined(arrays: Iterable[Ints]) -> Ints:
 
 
 def _above(used: Ints, numbers: Ints) -> int:
-    """Return what raises numbers above all that are used: 0 where none are."""
+    """Return the offset that makes numbers larger than all used ones; 0 without any."""
     if not used.size or not numbers.size:
         return 0
     return max(0, int(used.max()) - int(numbers.min()) + 1)

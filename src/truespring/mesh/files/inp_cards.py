@@ -1,4 +1,4 @@
-"""Decks of Abaqus and CalculiX as they are written: lines, comments, keywords, parameters, and files that they include.
+"""Parse decks of Abaqus and CalculiX: lines, comments, keywords, parameters and included files.
 
 Source: "Input syntax rules" in the manual of Abaqus, and that of CalculiX CrunchiX, https://www.dhondt.de
 """
@@ -14,21 +14,21 @@ from truespring.errors import MeshError
 from truespring.mesh.files.text import Rows, integers, reals, word
 from truespring.opening import file_beside, read_file
 
-# How deep files include files, and how many there are at most.
+# Limits of nested and of all included files.
 _DEEPEST, _MOST = 16, 1000
 
-# Lines are counted from 1; a place is the number of its file times this, and the line. A deck itself is file 0.
+# A place is the number of the file times this, plus the line counted from 1. The deck is file 0.
 _A_FILE = 1 << 40
 
-# Parameters without a value: by them the line behind a comma is known to be of the keyword.
+# Parameters without a value: a line that begins with one continues the keyword line.
 _FLAGS = {b"GENERATE", b"INTERNAL", b"UNSORTED"}
 
 
 class Lines:
-    """The lines of a deck, with those of the files that it includes in their place.
+    """The lines of a deck, with included files inserted.
 
     Attributes:
-        notes: what was passed over.
+        notes: remarks for the user.
         open_ends: places of last lines that have no line end.
     """
 
@@ -63,13 +63,13 @@ class Lines:
         return f"line {line} of {self._names[file]}" if file else f"line {line}"
 
     def is_included(self, place: int) -> bool:
-        """Tell whether a line is of another file than the deck: nothing that stands there is shown."""
+        """Return whether a line is from an included file: its text is not shown in messages."""
         return place >= _A_FILE
 
     def include(self, name: str) -> None:
-        """Go on with the lines of a file; raise MeshError where it cannot be, or is not in the deck's folder or below.
+        """Continue with the lines of a file; raise MeshError if it cannot be read or lies outside of the deck's folder.
 
-        Names are relative to that folder, in files that are included, too: as both programs have it.
+        Names are relative to the deck's folder, also in included files, as in both programs.
         """
         if self._folder is None:
             raise MeshError("files are included by a deck that is read from a file")
@@ -90,10 +90,10 @@ class Card:
     """A keyword with its parameters, and the lines of data below it.
 
     Attributes:
-        deck: names places.
-        place: that of the keyword.
-        head: the keyword line with those that continue it.
-        rows, places: the lines of data, and where they stand.
+        deck: the lines of the deck, which convert places to text.
+        place: the place of the keyword.
+        head: the keyword line with its continuation lines.
+        rows, places: the data lines and their places.
     """
 
     deck: Lines
@@ -110,28 +110,33 @@ class Card:
 
     @property
     def parameters(self) -> dict[str, str]:
-        """The parameters by name in capitals; values as they are written, with their quotation marks."""
+        """The parameters by name in upper case; values as in the file, with quotation marks."""
         pairs = [decoded(one).partition("=") for one in fields(self.head)[1:]]
         return {name.strip().upper(): value.strip() for name, _, value in pairs if name.strip()}
 
     def error(self, why: str, place: int | None = None) -> MeshError:
-        """Return an error with the place, the keyword's unless another is given."""
+        """Return an error with the keyword and a place, by default that of the keyword."""
         return MeshError(f"{self.deck.at(place or self.place)}: *{self.keyword}: {why}")
 
     def shown(self, text: bytes, place: int) -> str:
-        """Return a field for a message, but nothing of another file than the deck."""
+        """Return a field for a message; empty if it is from an included file."""
         return "the entry" if self.deck.is_included(place) else f"'{word(text)}'"
 
     def integers(self, rows: Rows, places: Sequence[int], what: str) -> Any:
-        """Return all fields as whole numbers, shape (n,); raise MeshError with the place of one that is none."""
+        """Return all fields as integers, shape (n,); raise MeshError with the place of one that is not."""
         return self._numbers(integers, rows, places, what, "whole numbers")
 
     def reals(self, rows: Rows, places: Sequence[int], what: str) -> Any:
-        """Return all fields as numbers, shape (n,); raise MeshError with the place of one that is none."""
+        """Return all fields as numbers, shape (n,); raise MeshError with the place of one that is not."""
         return self._numbers(reals, rows, places, what, "numbers")
 
     def _numbers(
-        self, read: Callable[[Rows, Sequence[int], str], Any], rows: Rows, places: Sequence[int], what: str, wanted: str
+        self,
+        read: Callable[[Rows, Sequence[int], str], Any],
+        rows: Rows,
+        places: Sequence[int],
+        what: str,
+        expected: str,
     ) -> Any:
         try:
             return read(rows, places, what)
@@ -142,18 +147,18 @@ class Card:
             try:
                 read([row], [place], what)
             except MeshError as error:
-                why = f"{self.deck.at(place)}: {what}: {wanted} are wanted here"
+                why = f"{self.deck.at(place)}: {what}: expected {expected}"
                 raise (MeshError(why) if self.deck.is_included(place) else error) from None
         raise AssertionError("a row that is no number was not found again")  # pragma: no cover
 
 
 def cards(lines: Lines) -> Iterator[Card]:
-    """Yield the cards of a deck; raise MeshError where it is none. Where it may be cut off, a note says so.
+    """Yield the cards of a deck; raise MeshError if it is not a deck, add a note if it may be truncated.
 
     A line that begins with * is a keyword, whatever the one before it ended with.
     """
     card: Card | None = None  # whose data follow
-    head: Card | None = None  # whose keyword line may go on
+    head: Card | None = None  # whose keyword line may continue
     in_step = False
     for place, text in lines:
         if text.startswith(b"*"):
@@ -168,8 +173,8 @@ def cards(lines: Lines) -> Iterator[Card]:
         else:
             head = None
             if card is None:
-                what = "" if lines.is_included(place) else f", not '{word(text)}'"
-                raise MeshError(f"{lines.at(place)}: this is no .inp file: a keyword such as *NODE is wanted{what}")
+                what = "" if lines.is_included(place) else f", found '{word(text)}'"
+                raise MeshError(f"{lines.at(place)}: this is no .inp file: expected a keyword such as *NODE{what}")
             card.rows.append(text)
             card.places.append(place)
             continue
@@ -185,7 +190,7 @@ def cards(lines: Lines) -> Iterator[Card]:
 
 
 def _follow(card: Card, in_step: bool) -> None:
-    """Go on with the file that a keyword line includes; within a step, what is missing is not needed for a mesh."""
+    """Continue with the file that a keyword includes; in a step, a missing file only adds a note."""
     name = bare(card.parameters.get("INPUT", ""))
     goes_on = card.head.endswith(b",") and card.keyword != "INCLUDE"
     if not name or goes_on or card.keyword not in ("INCLUDE", "NODE", "ELEMENT"):
@@ -200,12 +205,12 @@ def _follow(card: Card, in_step: bool) -> None:
 
 
 def _are_parameters(text: bytes) -> bool:
-    """Tell whether a line goes on with the parameters of a keyword, and is none of its data."""
+    """Return whether a line continues the parameters of a keyword, rather than being a data line."""
     return b"=" in text or all(one.strip().upper() in _FLAGS for one in fields(text))
 
 
 def fields(row: bytes) -> list[bytes]:
-    """Split a line at its commas, but for those in quotation marks; blank fields at its end are none."""
+    """Split a line at the commas outside of quotation marks; drop blank fields at the end."""
     if b'"' in row:
         found = [one or other for one, other in re.findall(rb'((?:[^,"]|"[^"]*")+)|(?:^|(?<=,))()(?=,)', row)]
     else:
@@ -216,7 +221,7 @@ def fields(row: bytes) -> list[bytes]:
 
 
 def decoded(data: bytes) -> str:
-    """Return text as UTF-8, else as Latin 1, as older programs write it."""
+    """Decode text as UTF-8, else as Latin-1, which older programs write."""
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""Types of elements of Abaqus and CalculiX: what they are made of, and how their faces are numbered."""
+"""Element types of Abaqus and CalculiX: cell kinds, node counts and face numbering."""
 
 import re
 from types import MappingProxyType
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from truespring.mesh.files.contents import CELL_KINDS
 from truespring.mesh.kinds import ELEMENT_KINDS, Groups
 
-# By family and number of nodes. The letters behind (reduced integration, hybrid, ...) do not change the geometry.
+# By family and number of nodes. Trailing letters (reduced integration, hybrid, ...) do not change the geometry.
 _PLANE = {3: "triangle", 6: "triangle", 4: "quadrilateral", 8: "quadrilateral", 9: "quadrilateral"}
 _SOLID = {
     **{4: "tetrahedron", 10: "tetrahedron", 8: "hexahedron", 20: "hexahedron", 27: "hexahedron"},
@@ -19,14 +19,14 @@ _FAMILIES = {
     **{"M3D": _PLANE, "SFM3D": _PLANE, "T2D": _LINE, "T3D": _LINE},
 }
 
-# Those whose names do not tell how many nodes they have.
+# Types whose names do not contain the number of nodes.
 _NAMED = {
     **{"SPRINGA": 2, "STRI65": 6, "C3D15V": 18},
     **{f"B{dim}{order}": 3 if order == 2 else 2 for dim in (2, 3) for order in (1, 2, 3)},
 }
 _NAMED_KINDS = {"STRI65": "triangle", "C3D15V": "wedge"}
 
-#: What to write instead of a type that no body is made of.
+#: The supported types, for messages.
 READ = "C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20, CPS3, CPS4, CPE3, CPE4, S3, S4 and their variants"
 
 #: Corners of the faces of each kind in the order of both programs, S1 or P1 the first; of plane kinds the edges.
@@ -44,16 +44,16 @@ FACES: MappingProxyType[str, Groups] = MappingProxyType(
 
 
 class ElementType(NamedTuple):
-    """A type of elements: its kind of cell, a key of CELL_KINDS, and how many nodes its rows have."""
+    """An element type: its kind of cell (a key of CELL_KINDS) and its number of nodes."""
 
     kind: str
     n_nodes: int
 
 
 def element_type(name: str) -> ElementType | None:
-    """Return the type of a name in capitals; None where no body is made of it and no set of the body carried.
+    """Return the type of a name in upper case; None for types that define neither the body nor its groups.
 
-    Those are left out: masses, connectors, gaps, dashpots, rigid, fluid and user elements.
+    These are left out: masses, connectors, gaps, dashpots, rigid, fluid and user elements.
     """
     found = re.fullmatch(rf"({'|'.join(_NAMED)})(?:[A-Z].*)?", name)
     if found:
@@ -64,27 +64,27 @@ def element_type(name: str) -> ElementType | None:
 
 
 def is_of_a_body(name: str) -> bool:
-    """Tell whether a type fills a body, be its number of nodes known or not: such an element cannot be left out."""
+    """Return whether a type is a continuum element, with a known number of nodes or not: it cannot be left out."""
     return re.match(r"(C3D|CPS|CPE|CPEG|CAX|CGAX)\d", name) is not None
 
 
 def local_facet(kind: str, face: int) -> int | None:
-    """Return our number of the face that both programs call 1, 2, ...; None where there is none."""
+    """Return the index in `facets` of ELEMENT_KINDS of a face, which both programs count from 1; None if unknown."""
     if kind not in ELEMENT_KINDS or not 1 <= face <= len(FACES.get(kind, ())):
         return None
     return [set(facet) for facet in ELEMENT_KINDS[kind].facets].index(set(FACES[kind][face - 1]))
 
 
 def facets_of_kind(kind: str) -> Groups:
-    """Return the corners of our facets of a kind, none of one that no body is made of."""
+    """Return the corners of the facets of a kind, as in ELEMENT_KINDS; empty for kinds that form no body."""
     return ELEMENT_KINDS[kind].facets if kind in ELEMENT_KINDS else ()
 
 
 def is_shell(name: str) -> bool:
-    """Tell whether a type is a shell or a membrane, whose first faces are its sides."""
+    """Return whether a type is a shell or a membrane, whose first two faces are its sides."""
     return re.match(r"S\d|STRI|M3D|SFM3D", name) is not None
 
 
 def dimension(kind: str) -> int:
-    """Return how many dimensions a kind of cell fills."""
+    """Return the topological dimension of a kind of cell."""
     return CELL_KINDS[kind][0]

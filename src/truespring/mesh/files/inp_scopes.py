@@ -1,7 +1,7 @@
-"""What a part, an instance, the assembly or a flat deck holds: nodes, elements, sets and surfaces of its own.
+"""Scopes of a deck (a part, an instance, the assembly or a flat deck): nodes, elements, sets and surfaces.
 
-Numbers and names are those of the scope: node 1 of a part and node 1 of the assembly are two, and so are two sets of
-one name. What a set names is looked up when the whole deck is read (`inp_assembly`).
+Numbers and names are local to a scope: node 1 of a part and node 1 of the assembly differ, and so do two sets of the
+same name. Members of sets are resolved after the whole deck is read (`inp_assembly`).
 """
 
 import re
@@ -28,7 +28,7 @@ class Nodes(NamedTuple):
     places: Ints
 
     def of(self, which: Bools) -> "Nodes":
-        """Return some of them."""
+        """Return the nodes selected by a mask of shape (n,)."""
         return Nodes(self.numbers[which], self.points[which], self.places[which])
 
 
@@ -54,14 +54,14 @@ class Elements(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Numbers that a set lists, and where."""
+    """Numbers listed in a set, and their place."""
 
     numbers: Ints
     places: Ints
 
 
 class Range(NamedTuple):
-    """What GENERATE gives: those of first, first + step, ... last that exist."""
+    """Members by GENERATE: those of first, first + step, ... last that exist."""
 
     first: int
     last: int
@@ -69,13 +69,13 @@ class Range(NamedTuple):
     place: int
 
     def has(self, numbers: Ints) -> Bools:
-        """Tell which numbers are in the range."""
+        """Return which numbers are in the range, shape of `numbers`."""
         inside = (numbers >= self.first) & (numbers <= self.last)
         return np.asarray(inside & ((numbers - self.first) % self.step == 0))
 
 
 class Named(NamedTuple):
-    """A member that is named: a set, or by its instance a set, a node or an element of that ("Part-1-1.5")."""
+    """A member given by name: a set, or a set, node or element of an instance ("Part-1-1.5")."""
 
     name: str
     kind: str
@@ -83,7 +83,7 @@ class Named(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Members that a card adds to a set, the instance that it says they are of ("" for its own scope), and where."""
+    """Members that a card adds to a set, the INSTANCE of the card ("" for the scope of the card), and their place."""
 
     instance: str
     members: tuple[Numbers | Range | Named, ...]
@@ -91,7 +91,7 @@ class Part(NamedTuple):
 
 
 class SurfaceRow(NamedTuple):
-    """A line of *SURFACE: elements or nodes, the label of their faces, "" where it is left out, and where."""
+    """A data line of *SURFACE: elements or nodes, the face label ("" if omitted), and the place."""
 
     on: Named
     label: str
@@ -100,7 +100,7 @@ class SurfaceRow(NamedTuple):
 
 @dataclass
 class Surface:
-    """A surface: of faces (TYPE=ELEMENT), or of nodes; `unread` says why it is not followed."""
+    """A surface of faces (TYPE=ELEMENT) or of nodes; `unread` is the reason if it is not supported."""
 
     of_nodes: bool
     rows: list[SurfaceRow] = field(default_factory=list)
@@ -109,17 +109,17 @@ class Surface:
 
 @dataclass
 class Scope:
-    """What one scope holds.
+    """A part, an instance, the assembly or a flat deck.
 
     Attributes:
-        name: of the part or instance, "" of the assembly or a flat deck.
-        nodes, elements: card by card.
-        left_out: numbers of elements that no body is made of, by type.
+        name: of the part or instance, "" for the assembly or a flat deck.
+        nodes, elements: one entry per card.
+        left_out: numbers of elements that form no body, by type.
         sets: by kind, NSET or ELSET, then by key.
         surfaces: by key.
         names: the first spelling of each key.
-        internal: keys of sets that a program made for its surfaces.
-        notes: what should be known of it.
+        internal: keys of sets that a program generated for its surfaces.
+        notes: remarks for the user.
     """
 
     name: str
@@ -133,7 +133,7 @@ class Scope:
     notes: list[str] = field(default_factory=list)
 
     def instance(self, name: str) -> "Scope":
-        """Return a scope that holds the same, to which more may be added."""
+        """Return a copy of the scope under the name of an instance; additions do not change the part."""
         sets = {kind: {key: list(parts) for key, parts in ones.items()} for kind, ones in self.sets.items()}
         left_out = {type_: list(numbers) for type_, numbers in self.left_out.items()}
         return Scope(
@@ -143,7 +143,7 @@ class Scope:
         )
 
     def add(self, card: Card) -> None:
-        """Take what a card says of the mesh; raise MeshError where it cannot be read."""
+        """Add the mesh data of a card; raise MeshError if it cannot be read."""
         match card.keyword:
             case "NODE":
                 self._add_nodes(card)
@@ -158,7 +158,7 @@ class Scope:
         if card.parameters.get("SYSTEM", "R").upper() != "R":
             raise card.error("coordinates that are not rectangular are not read: write them as x, y, z")
         split = [(fields(row)[:4], place) for row, place in zip(_rows(card), card.places, strict=True)]
-        split = [one for one in split if one[0]]  # behind the coordinates may stand a normal
+        split = [one for one in split if one[0]]  # a normal may follow the coordinates
         rows, places = [row for row, _ in split], [place for _, place in split]
         width = max(map(len, rows), default=0)
         short = [(place, row) for row, place in split if len(row) < width]
@@ -193,23 +193,25 @@ class Scope:
         self._extend("ELSET", card, Part("", (Numbers(numbers, np.full(len(numbers), card.place)),), card.place))
 
     def _add_lines(self, card: Card, name: str, type_: ElementType | None) -> Ints:
-        """Take elements of lines, which may carry sets, and count all others; return the numbers of both."""
+        """Add line elements, which may define sets, and count other types; return the numbers of all."""
         rows = _joined(card, type_.n_nodes + 1 if type_ else 0)
-        known = [] if type_ is None else [row[: type_.n_nodes + 1] for row in rows]  # behind may stand an orientation
+        known = [] if type_ is None else [row[: type_.n_nodes + 1] for row in rows]  # an orientation may follow
         if type_ is None or not all(len(row) == type_.n_nodes + 1 and all(map(_WHOLE.fullmatch, row)) for row in known):
             firsts = [int(row[0]) for row in rows if row and _WHOLE.fullmatch(row[0]) and len(row[0]) < 19]
             self.left_out.setdefault(name or "no type", []).append(np.array(firsts, dtype=np.int64))
             return np.array(firsts, dtype=np.int64)
         places = [card.place] * len(rows)
         table = card.integers(known, places, f"an element of {name}").reshape(-1, type_.n_nodes + 1)
-        nodes = table[:, (1, 3, 2)] if type_.n_nodes == 3 else table[:, 1:]  # the middle stands between the ends
+        nodes = (
+            table[:, (1, 3, 2)] if type_.n_nodes == 3 else table[:, 1:]
+        )  # the middle node is listed between the ends
         self.elements.append(Elements(name, type_.kind, table[:, 0], nodes, np.array(places, dtype=np.int64)))
         return np.asarray(table[:, 0])
 
     def _add_set(self, card: Card) -> None:
         kind, parameters = card.keyword, card.parameters
         if not bare(parameters.get(kind, "")):
-            raise card.error(f"{kind}=NAME is wanted")
+            raise card.error(f"expected {kind}=NAME")
         instance = parameters.get("INSTANCE", "")
         members: list[Numbers | Range | Named] = []
         if kind == "NSET" and "ELSET" in parameters:
@@ -248,13 +250,13 @@ class Scope:
 
 
 def key_of(name: str) -> str:
-    """Return a name as it is compared: without quotation marks, in capitals unless it has some."""
+    """Return the key of a name: in upper case, or, if it is quoted, without the quotation marks."""
     name = name.strip()
     return bare(name) if name[:1] in ("'", '"') else name.upper()
 
 
 def found(table: Mapping[str, object], name: str) -> str | None:
-    """Return the key of a name in a table; where quotation marks are the only difference, that one; else None."""
+    """Return the key of a name in a table; also a single one that differs only in case; else None."""
     key = key_of(name)
     if key in table:
         return key
@@ -263,7 +265,7 @@ def found(table: Mapping[str, object], name: str) -> str | None:
 
 
 def counted(left_out: Mapping[str, int]) -> str:
-    """List types of elements with their counts."""
+    """Return a text of element types with their counts."""
     return ", ".join(f"{count} {name}" for name, count in sorted(left_out.items()))
 
 
@@ -279,7 +281,7 @@ def _rows(card: Card) -> list[bytes]:
 
 
 def _joined(card: Card, width: int) -> list[list[bytes]]:
-    """Return the rows of elements with the lines that continue them: up to `width` fields, 0 behind a comma only."""
+    """Join the rows of elements with their continuation lines: up to `width` fields; a blank field is 0."""
     rows: list[list[bytes]] = []
     goes_on = False
     for text in card.rows:
@@ -298,7 +300,7 @@ def _whole_elements(card: Card, name: str, n_nodes: int) -> tuple[Ints, Ints]:
     width = 1 + n_nodes
     for text, place in zip(card.rows, card.places, strict=True):
         row = fields(text)
-        if rows and len(rows[-1]) < width:  # the element goes on in this line
+        if rows and len(rows[-1]) < width:  # this line continues the element
             rows[-1] = rows[-1] + row
         elif row:
             rows.append(row)
@@ -318,7 +320,7 @@ def _range(card: Card, row: bytes, place: int) -> Range:
 
 
 def _listed(card: Card, kind: str) -> list[Numbers | Range | Named]:
-    """Return what the lines of a set list: numbers, and names of other sets."""
+    """Return the members listed in the data lines of a set: numbers, and names of other sets."""
     numbers: list[list[bytes]] = []
     members: list[Numbers | Range | Named] = []
     for row, place in zip(card.rows, card.places, strict=True):
@@ -331,7 +333,7 @@ def _listed(card: Card, kind: str) -> list[Numbers | Range | Named]:
 
 
 def totals(scopes: list[Scope]) -> Counter[str]:
-    """Return how many elements of each type are left out."""
+    """Return the number of elements left out, by type."""
     counts = Counter[str]()
     for scope in scopes:
         for type_, numbers in scope.left_out.items():

@@ -1,4 +1,4 @@
-"""Surfaces of a deck, *SURFACE, as facets of the body's elements.
+"""Convert the surfaces of a deck, *SURFACE, to facets of the body.
 
 Source: "Element-based surface definition" in the manual of Abaqus, and *SURFACE in that of CalculiX CrunchiX.
 """
@@ -17,25 +17,25 @@ from truespring.mesh.files.inp_scopes import Elements, Surface, SurfaceRow
 
 _NO_FACETS = np.zeros((0, 2), dtype=np.int64)
 
-# Faces of a shell as a whole; CalculiX counts them as its first two, and its edges from the third on.
+# The two sides of a shell; CalculiX numbers them 1 and 2, and the edges from 3.
 _SIDES = ("SNEG", "SPOS", "S1", "S2")
 
 
 class Surfaces:
-    """Finds the facets that surfaces name."""
+    """Finds the facets of surfaces."""
 
     def __init__(self, assembly: Assembly) -> None:
         self._assembly = assembly
         self._dim = max((dimension(block.kind) for block in assembly.cells), default=0)
 
     def facets(self, owner: Placed, surface: Surface) -> Ints:
-        """Return number and local facet of elements, shape (n, 2); raise MeshError where a face is none of the body."""
+        """Return (element number, local facet), shape (n, 2); raise MeshError if a face is not a facet of the body."""
         if surface.unread:
             raise MeshError(surface.unread)
         return np.concatenate([_NO_FACETS, *(self.row(owner, row) for row in surface.rows)])
 
     def row(self, owner: Placed, row: SurfaceRow) -> Ints:
-        """Return the facets of one line of a surface."""
+        """Return the facets of one data line of a surface, as (element number, local facet), shape (n, 2)."""
         named = self._assembly.named(owner, row.on, "ELSET") if row.on.name else self._assembly.all_elements(owner)
         found = [_NO_FACETS]
         for block in self._assembly.cells:
@@ -54,7 +54,7 @@ class Surfaces:
         raise MeshError(f"{label or 'the surface'} of {block.type} is no facet of the body")
 
     def _own_faces(self, block: Elements, label: str) -> Ints:
-        """Return the faces of elements of the body; without a label those that no other element shares."""
+        """Return the labelled faces of elements of the body; without a label, those that no other element shares."""
         if not label:
             owners, _, count = self._all
             return np.asarray(owners[np.isin(owners[:, 0], block.numbers) & (count == 1)])
@@ -68,7 +68,7 @@ class Surfaces:
         return np.stack([block.numbers, np.full(len(block.numbers), local)], axis=1)
 
     def _covered(self, block: Elements) -> Ints:
-        """Return the facets of the body that have the corners of shells upon it."""
+        """Return the facets of the body that coincide with the given shell elements."""
         owners, nodes, _ = self._all
         corners = np.full((len(block.numbers), 4), -1)
         width = 3 if block.kind == "triangle" else 4 if block.kind == "quadrilateral" else 2
@@ -81,9 +81,9 @@ class Surfaces:
 
     @cached_property
     def _all(self) -> tuple[Ints, Ints, Ints]:
-        """Of each facet of each element of the body: element and local facet, its corners in order, how many share it.
+        """Return all facets of all elements: (element, local facet), sorted corners, number of elements that share it.
 
-        Shapes (n, 2), (n, 4) with -1 where there are fewer, and (n,).
+        Shapes (n, 2), (n, 4) with -1 for missing corners, and (n,).
         """
         owners, nodes = [_NO_FACETS], [np.zeros((0, 4), dtype=np.int64)]
         for block in self._assembly.cells:

@@ -1,4 +1,4 @@
-"""Label images, whatever their format: numbers of voxels in their places, and the names of segments."""
+"""Label images, independent of their format: labels of voxels, voxel positions and names of segments."""
 
 from typing import Any, NamedTuple
 
@@ -7,16 +7,16 @@ import numpy as np
 from truespring.arrays import Bools, Floats
 from truespring.errors import MeshError, nearest
 
-# Labels beside which a list of all of them is of no help.
+# The most labels listed in a message.
 _MANY = 30
 
-# Axes whose directions have a cosine beyond the first are taken as perpendicular, and that is told: headers
-# round. Beyond the second the image is sheared.
+# The cosine between axes: above the first, e.g. by rounded headers, they are made perpendicular, with a note; above
+# the second the image is sheared.
 _UPRIGHT, _SHEARED = 1e-5, 1e-2
 
 
 class Segment(NamedTuple):
-    """A segment that an image names: its label in one of the image's layers."""
+    """A named segment: its label in one layer of the image."""
 
     name: str
     layer: int
@@ -24,15 +24,15 @@ class Segment(NamedTuple):
 
 
 class Labels(NamedTuple):
-    """A label image: whole numbers, each that of a cuboid about its place.
+    """A label image: an integer label per voxel; the voxel is centred at its position.
 
     Attributes:
-        values: the labels, shape (nx, ny, nz), of several layers (nx, ny, nz, n_layers).
-        spacing: of the places along each axis, in the file's unit, shape (3,).
-        origin: the place of the first one, shape (3,).
-        direction: the axes of the image in space, as columns, shape (3, 3).
-        segments: those that the image names.
-        notes: what should be known of the image, in words.
+        values: the labels, shape (nx, ny, nz), or (nx, ny, nz, n_layers) for several layers.
+        spacing: the distance of voxels along each axis [the file's unit], shape (3,).
+        origin: the centre of the first voxel [the file's unit], shape (3,).
+        direction: the unit vectors of the image axes, as columns, shape (3, 3).
+        segments: the named segments.
+        notes: remarks about the image for the user.
     """
 
     values: np.ndarray[Any, Any]
@@ -43,25 +43,25 @@ class Labels(NamedTuple):
     notes: tuple[str, ...] = ()
 
     def inside(self, label: int | str) -> Bools:
-        """Return which voxels have a label or are of a segment, shape (nx, ny, nz).
+        """Return which voxels have a label or belong to a segment, shape (nx, ny, nz).
 
-        Raises MeshError with what is there where none is, or the label stands in several layers.
+        Raises MeshError, with the labels of the image, if there are none or the label is in several layers.
         """
         layer, value = self._named(label) if isinstance(label, str) else self._numbered(label)
         found = np.asarray((self.values if self.values.ndim == 3 else self.values[..., layer]) == value)
         if not found.any():
-            raise MeshError(f"no voxel has the label {label!r}; there are {self._told()}")
+            raise MeshError(f"no voxel has the label {label!r}; there are {self._listed()}")
         return found
 
     def _named(self, name: str) -> tuple[int, int]:
         exact = [one for one in self.segments if one.name == name]
         same = exact or [one for one in self.segments if one.name.casefold() == name.casefold()]
         if len({(one.layer, one.value) for one in same}) > 1:
-            raise MeshError(f"{len(same)} segments are called '{name}': give a label; there are {self._told()}")
+            raise MeshError(f"{len(same)} segments are called '{name}': give a label; there are {self._listed()}")
         if not same:
             known = [one.name for one in self.segments]
             why = nearest(name, known) if known else ", the image has no names"
-            raise MeshError(f"there is no segment '{name}'{why}; there are {self._told()}")
+            raise MeshError(f"there is no segment '{name}'{why}; there are {self._listed()}")
         return same[0].layer, same[0].value
 
     def _numbered(self, value: int) -> tuple[int, int]:
@@ -71,11 +71,11 @@ class Labels(NamedTuple):
         if len(layers) > 1:
             raise MeshError(
                 f"the label {value} is in {len(layers)} of {self.values.shape[3]} layers: name the segment, as "
-                f'label = "{self.segments[0].name if self.segments else "liver"}"; there are {self._told()}'
+                f'label = "{self.segments[0].name if self.segments else "liver"}"; there are {self._listed()}'
             )
         return (layers or [0])[0], value
 
-    def _told(self) -> str:
+    def _listed(self) -> str:
         if self.segments:
             told = [f"{one.value} ('{one.name[:40]}')" for one in self.segments]
         else:
@@ -84,12 +84,12 @@ class Labels(NamedTuple):
 
 
 def checked(labels: Labels) -> Labels:
-    """Return labels that are whole numbers, on perpendicular axes; raise MeshError."""
+    """Return the labels as integers, on perpendicular axes; raise MeshError if this is not possible."""
     values = labels.values
     if values.ndim == 4 and labels.segments and max(one.layer for one in labels.segments) >= values.shape[3]:
         raise MeshError(f"a segment is in a layer that does not exist: there are {values.shape[3]}")
     if values.ndim not in (3, 4) or not values.size:
-        raise MeshError(f"the image has shape {values.shape}: three axes are wanted, none of them empty")
+        raise MeshError(f"the image has shape {values.shape}: expected three axes, none of them empty")
     if values.dtype.kind == "f":
         whole = np.isfinite(values).all() and (values == np.rint(values)).all()
         whole = whole and float(np.abs(values).max()) < 2**53
@@ -97,16 +97,16 @@ def checked(labels: Labels) -> Labels:
             raise MeshError("the image holds fractions, not labels: it was blurred or interpolated; segment it first")
         values = values.astype(np.int64)
     elif values.dtype.kind not in "iub":
-        raise MeshError(f"the image holds {values.dtype}: integers are wanted, one label a voxel")
+        raise MeshError(f"the image holds {values.dtype}: expected integers, one label per voxel")
     if not (np.isfinite(labels.spacing).all() and (labels.spacing > 0).all()):
         raise MeshError(f"spacing = {labels.spacing.tolist()}: each must be positive")
     if not np.isfinite(labels.origin).all():
-        raise MeshError(f"origin = {labels.origin.tolist()}: a finite place is wanted")
+        raise MeshError(f"origin = {labels.origin.tolist()}: expected finite numbers")
     return _upright(labels._replace(values=values))
 
 
 def _upright(labels: Labels) -> Labels:
-    """Return labels with the orthonormal axes nearest to theirs: the polar factor of the directions."""
+    """Return the labels with the nearest orthonormal axes: the orthogonal polar factor of `direction`."""
     cosines = labels.direction.T @ labels.direction - np.eye(3)
     off = float(np.abs(cosines).max()) if np.isfinite(cosines).all() else np.inf
     if off > _SHEARED:

@@ -1,4 +1,4 @@
-"""Label images as MetaImage: .mha, and .mhd with the voxels in a file beside it.
+"""Read label images in the MetaImage format: .mha, and .mhd with the voxels in another file of the folder.
 
 Source: https://itk.org/Wiki/ITK/MetaIO/Documentation; a row of TransformMatrix is an axis of the image.
 """
@@ -31,12 +31,12 @@ _TYPES = {
     **{"MET_LONG": "i4", "MET_ULONG": "u4", "MET_LONG_LONG": "i8", "MET_ULONG_LONG": "u8"},
     **{"MET_FLOAT": "f4", "MET_DOUBLE": "f8"},
 }
-# Keys of which several say the same.
+# Synonymous keys.
 _MATRIX = ("TransformMatrix", "Rotation", "Orientation")
 _ORIGIN = ("Offset", "Position", "Origin")
 _SPACING = ("ElementSpacing", "ElementSize")
 _ORDER = ("BinaryDataByteOrderMSB", "ElementByteOrderMSB")
-# What decides on the body: a key that is nearly one of these is a damaged one.
+# Keys that the geometry depends on: a key close to one of these is taken as damaged.
 _READ = (
     *("ObjectType", "NDims", "DimSize", "ElementType", "ElementDataFile", "ElementNumberOfChannels", "HeaderSize"),
     *("BinaryData", "CompressedData", "CompressedDataSize", *_MATRIX, *_ORIGIN, *_SPACING, *_ORDER),
@@ -48,12 +48,12 @@ _OTHERS = (
     "ElementToIntensityFunctionOffset",
 )
 _FREE = ("Comment", "Name", "ElementDataFile")  # of any text
-# A header is shorter.
+# The longest header [bytes].
 _LONGEST = 2**16
 
 
 def read_metaimage(file: Path) -> Labels:
-    """Read a .mha or .mhd file; raise MeshError."""
+    """Read a .mha or .mhd file; raise MeshError if it is damaged or not supported."""
     data = read_file(file, MeshError)
     header, begin = _header(data)
     n_axes = counts(header.get("NDims", ""), 1, "NDims")[0]
@@ -63,12 +63,12 @@ def read_metaimage(file: Path) -> Labels:
         raise MeshError(f"ElementType is '{code[:40]}'; {', '.join(_TYPES)} are read, one number a voxel")
     if header.get("ElementNumberOfChannels", "1") != "1":
         raise MeshError(
-            f"ElementNumberOfChannels is {header['ElementNumberOfChannels'][:20]}: one label a voxel is wanted"
+            f"ElementNumberOfChannels is {header['ElementNumberOfChannels'][:20]}: expected one label per voxel"
         )
     dtype = np.dtype(_TYPES[code]).newbyteorder(">" if any(_is(header, key) for key in _ORDER) else "<")
     refuse_large(shape, dtype)
     if n_axes != 3:
-        raise MeshError(f"the image has {n_axes} axes: three are wanted")
+        raise MeshError(f"the image has {n_axes} axes: expected three")
     values = _values(header, _stored(file.parent, header, data[begin:]), dtype, shape)
     matrix = numbers(_first(header, _MATRIX, "1 0 0 0 1 0 0 0 1"), 9, "TransformMatrix")
     return Labels(
@@ -80,7 +80,7 @@ def read_metaimage(file: Path) -> Labels:
 
 
 def _header(data: bytes) -> tuple[dict[str, str], int]:
-    """Return the keys with their values, and where the header ends: behind the line of ElementDataFile."""
+    """Return the values by key, and the length of the header, which ends with the line of ElementDataFile [bytes]."""
     header: dict[str, str] = {}
     begin = 0
     while "ElementDataFile" not in header:
@@ -88,7 +88,7 @@ def _header(data: bytes) -> tuple[dict[str, str], int]:
         line = data[begin:end].decode("latin-1").strip()
         key, sign, value = (part.strip() for part in line.partition("="))
         if not end or (line and not (sign and key.isascii() and key.isprintable())):
-            raise MeshError(f"this is no MetaImage: lines 'KEY = VALUE' up to ElementDataFile are wanted; {SAVE_ANEW}")
+            raise MeshError(f"this is no MetaImage: expected lines 'KEY = VALUE' up to ElementDataFile; {SAVE_ANEW}")
         begin = end
         if not line:
             continue
@@ -101,12 +101,12 @@ def _header(data: bytes) -> tuple[dict[str, str], int]:
             raise MeshError(f"the header has a key {key[:40]} (did you mean '{near[0]}'?): is it damaged? {SAVE_ANEW}")
         header[key] = value
     if header.get("ObjectType", "Image") != "Image":
-        raise MeshError(f"ObjectType is {header['ObjectType'][:40]}: an Image is wanted")
+        raise MeshError(f"ObjectType is {header['ObjectType'][:40]}: expected Image")
     return header, begin
 
 
 def _stored(folder: Path, header: dict[str, str], local: bytes) -> list[bytes]:
-    """Return the data of the voxels: behind the header, in a file beside it, or in several."""
+    """Return the stored voxels: after the header, or in one or several other files of the folder."""
     name = header["ElementDataFile"]
     if name.upper() in ("LOCAL", "LOCAL_DATA"):
         return [local]
@@ -124,13 +124,13 @@ def _values(header: dict[str, str], stored: list[bytes], dtype: np.dtype[Any], s
     if "BinaryData" in header and not _is(header, "BinaryData"):
         return text_values(b"\n".join(stored), dtype, shape)
     skip = numbers(header.get("HeaderSize", "0"), 1, "HeaderSize")[0]
-    if skip == -1:  # whatever stands before the voxels
+    if skip == -1:  # the voxels are at the end of the file
         size = n_voxels(shape) * dtype.itemsize // max(len(stored), 1)
         stored = [data[max(0, len(data) - size) :] for data in stored]
     elif skip >= 0:
         stored = [data[int(skip) :] for data in stored]
     else:
-        raise MeshError(f"HeaderSize is {skip:g}: -1, or bytes from 0 are wanted; {SAVE_ANEW}")
+        raise MeshError(f"HeaderSize is {skip:g}: expected -1, or a number of bytes from 0; {SAVE_ANEW}")
     return raw_values(b"".join(stored), dtype, shape)
 
 
@@ -151,5 +151,5 @@ def _first(header: dict[str, str], keys: tuple[str, ...], default: str) -> str:
 def _is(header: dict[str, str], key: str) -> bool:
     text = header.get(key, "False")
     if text.upper() not in ("TRUE", "FALSE", "1", "0"):
-        raise MeshError(f"{key} is '{text[:40]}': True or False are wanted; {SAVE_ANEW}")
+        raise MeshError(f"{key} is '{text[:40]}': expected True or False; {SAVE_ANEW}")
     return text.upper() in ("TRUE", "1")

@@ -1,4 +1,4 @@
-"""Label images as NIfTI-1 and NIfTI-2, one file, plain or by gzip.
+"""Read label images in the formats NIfTI-1 and NIfTI-2, single files, plain or compressed by gzip.
 
 Source: nifti1.h and nifti2.h, https://nifti.nimh.nih.gov: the fields, and the matrices of quaternion and of sform.
 """
@@ -18,7 +18,7 @@ from truespring.opening import read_file
 _Order = Literal["<", ">"]
 _ORDERS: tuple[_Order, ...] = ("<", ">")
 
-# By the size of the header [bytes]: what is read of it, and where that stands.
+# By the size of the header [bytes]: the fields that are read, and their offsets.
 _FIELDS: dict[int, dict[str, tuple[Any, int]]] = {
     348: {
         **{"dim": ("8i2", 40), "datatype": ("i2", 70), "bitpix": ("i2", 72), "pixdim": ("8f4", 76)},
@@ -35,22 +35,22 @@ _FIELDS: dict[int, dict[str, tuple[Any, int]]] = {
 }
 _MAGIC = {348: b"n+1", 540: b"n+2\0\r\n\x1a\n"}
 _TYPES = {2: "u1", 4: "i2", 8: "i4", 16: "f4", 64: "f8", 256: "i1", 512: "u2", 768: "u4", 1024: "i8", 1280: "u8"}
-# Lengths in millimetres, by the code of the unit; 0 does not tell it.
+# Units of length in millimetres, by code; code 0 is "unknown".
 _MILLIMETRES = {0: 1.0, 1: 1e3, 2: 1.0, 3: 1e-3}
 
-# NIfTI's axes point to the right, forward and up, those of DICOM, ITK and of a body here to the left and back.
+# The axes of NIfTI point right, anterior and superior (RAS), those of DICOM, ITK and here left and posterior (LPS).
 _TO_LPS = np.diag([-1.0, -1.0, 1.0])
 _LPS = (
     "NIfTI's places are RAS, with x to the right and y to the front; here they are LPS, as in DICOM and ITK: x and y "
     "have the other sign than in nibabel or FSL"
 )
 _NOWHERE = "its header has no places of voxels (qform and sform are 0): the first one is at the origin"
-# Places, and spacings, that differ by more of a voxel's edge are two different ones.
+# Positions and spacings that differ by more than this, relative to the voxel, are reported.
 _SAME = 1e-2
 
 
 def read_nifti(file: Path) -> Labels:
-    """Read a .nii or .nii.gz file; lengths become millimetres, places LPS. Raises MeshError."""
+    """Read a .nii or .nii.gz file; lengths in mm, positions in LPS. Raises MeshError if it is damaged."""
     data = read_file(file, MeshError)
     is_gzip = data[:2] == b"\x1f\x8b"
     try:
@@ -65,7 +65,7 @@ def read_nifti(file: Path) -> Labels:
         values = inflated_values(data, dtype, shape, "gzip", skip=offset)
     else:
         values = raw_values(memoryview(data)[offset:], dtype, shape)
-    with np.errstate(all="ignore"):  # a damaged header may hold any number: _places looks at what comes out
+    with np.errstate(all="ignore"):  # a damaged header may hold any number: _places checks the result
         matrix, spacing, notes = _places(header)
         values = _scaled(values, header)
     direction = matrix[:, :3] / np.linalg.norm(matrix[:, :3], axis=0)
@@ -73,7 +73,7 @@ def read_nifti(file: Path) -> Labels:
 
 
 def _header(begin: bytes) -> tuple[Any, _Order]:
-    """Return the fields of the header by name, and its order of bytes."""
+    """Return the fields of the header by name, and the byte order."""
     for size, fields in _FIELDS.items():
         for order in _ORDERS:
             if len(begin) < size or int(np.frombuffer(begin[:4], f"{order}i4")[0]) != size:
@@ -128,10 +128,10 @@ def _scaled(values: Values, header: Any) -> Values:
 
 
 def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
-    """Return the places (LPS) of voxels by their numbers and the spacing, shapes (3, 4) and (3,) [mm], and notes.
+    """Return the matrix from voxel indices to LPS positions and the spacing, shapes (3, 4) and (3,) [mm], and notes.
 
-    The places are those of sform where there is one, else of qform. A matrix that is rounded loses some of the spacing,
-    which the header tells, too.
+    The matrix is sform if the header has one, else qform. The spacing is pixdim, which is more precise than a
+    rounded matrix, unless the two differ.
     """
     sides = np.abs(header["pixdim"][1:4].astype(np.float64))
     rows = header["rows"].astype(np.float64)
@@ -140,22 +140,22 @@ def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
         raise MeshError(f"the header gives an unknown unit of length, {int(header['units']) & 7}; {SAVE_ANEW}")
     by_q = _by_quaternion(header, sides) if int(header["qform"]) > 0 else None
     if int(header["sform"]) > 0:
-        matrix, told = rows, "sform"
+        matrix, field = rows, "sform"
     elif by_q is not None:
-        matrix, told = by_q, "qform"
+        matrix, field = by_q, "qform"
     else:
-        matrix, told = _TO_LPS @ np.hstack([np.diag(sides), np.zeros((3, 1))]), "pixdim"
+        matrix, field = _TO_LPS @ np.hstack([np.diag(sides), np.zeros((3, 1))]), "pixdim"
     if not np.isfinite(matrix).all() or not (np.abs(matrix) < 1e12).all() or not abs(np.linalg.det(matrix[:, :3])) > 0:
-        raise MeshError(f"the header's {told} gives its voxels no places: it is not finite or flat; {SAVE_ANEW}")
-    notes = [_NOWHERE if told == "pixdim" else _LPS]
-    if told == "sform" and by_q is not None and not _same(rows, by_q):
+        raise MeshError(f"the header's {field} is not finite or is singular; {SAVE_ANEW}")
+    notes = [_NOWHERE if field == "pixdim" else _LPS]
+    if field == "sform" and by_q is not None and not _same(rows, by_q):
         notes.append("its header has two transforms, qform and sform, that differ: sform was taken, as nibabel does")
     norms = np.linalg.norm(matrix[:, :3], axis=0)
     if (np.abs(norms - sides) <= _SAME * norms).all():
         norms = sides
     else:
         notes.append(
-            f"its header has two spacings, {_listed(sides)} (pixdim) and {_listed(norms)} ({told}): the latter "
+            f"its header has two spacings, {_listed(sides)} (pixdim) and {_listed(norms)} ({field}): the latter "
             "was taken"
         )
     return _TO_LPS @ (unit * matrix), unit * norms, notes

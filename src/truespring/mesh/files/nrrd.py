@@ -1,4 +1,4 @@
-"""Label images as NRRD: .nrrd, .nhdr with the voxels beside it, and .seg.nrrd, the segmentations of 3D Slicer.
+"""Read label images in the NRRD format: .nrrd, .nhdr with the voxels in another file, .seg.nrrd of 3D Slicer.
 
 Source: https://teem.sourceforge.net/nrrd/format.html; of segmentations
 https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html: segments that overlap stand in
@@ -30,7 +30,7 @@ from truespring.mesh.files.raw_image import (
 )
 from truespring.opening import read_file
 
-# Each type by all of its names.
+# NumPy codes, with the names of each type.
 _NAMES = {
     "i1": "signed char, int8, int8_t",
     "u1": "uchar, unsigned char, uint8, uint8_t",
@@ -47,13 +47,13 @@ _TYPES = {name: code for code, names in _NAMES.items() for name in names.split("
 _METHODS = {"gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"}
 _TEXTS = ("text", "txt", "ascii")
 _ENCODINGS = ("raw", "hex", *_TEXTS, *_METHODS)
-# The axes of the spaces of patients, as ITK turns them: those that point to the right or the front change their signs.
+# Signs of the axes of each space, as in ITK: axes that point right or anterior are reversed.
 _SPACES = {
     **{"right-anterior-superior": (-1.0, -1.0), "ras": (-1.0, -1.0), "scanner-xyz": (1.0, 1.0)},
     **{"left-anterior-superior": (1.0, -1.0), "las": (1.0, -1.0)},
     **{"left-posterior-superior": (1.0, 1.0), "lps": (1.0, 1.0)},
 }
-# All fields of the format: a line with another one is damaged.
+# All fields of the format: any other field is an error.
 _FIELDS = {
     *("dimension", "type", "encoding", "endian", "content", "min", "max", "old min", "old max", "data file"),
     *("line skip", "byte skip", "number", "block size", "sample units", "sizes", "spacings", "thicknesses"),
@@ -66,32 +66,32 @@ _SPELLINGS = {
     **{"oldmax": "old max", "sampleunits": "sample units"},
 }
 _VECTOR = r"\([^()]*\)"
-_LONGEST = 2**22  # a header is shorter: Slicer writes hundreds of segments into it
+_LONGEST = 2**22  # the longest header [bytes]: Slicer writes hundreds of segments into it
 
 
 def read_nrrd(file: Path) -> Labels:
-    """Read a .nrrd, .nhdr or .seg.nrrd file; raise MeshError."""
+    """Read a .nrrd, .nhdr or .seg.nrrd file; raise MeshError if it is damaged or not supported."""
     data = read_file(file, MeshError)
     fields, keys, begin = _header(data)
-    n_axes = counts(_wanted(fields, "dimension"), 1, "dimension")[0]
-    sizes = counts(_wanted(fields, "sizes"), n_axes, "sizes")
-    kind = _wanted(fields, "type").lower()
+    n_axes = counts(_required(fields, "dimension"), 1, "dimension")[0]
+    sizes = counts(_required(fields, "sizes"), n_axes, "sizes")
+    kind = _required(fields, "type").lower()
     if kind not in _TYPES:
         raise MeshError(f"voxels of type '{kind[:40]}' are no labels: save them as whole numbers of 8 or 16 bits")
     dtype = np.dtype(_TYPES[kind])
     if dtype.itemsize > 1 and fields.get("encoding", "").lower() not in _TEXTS:
-        dtype = dtype.newbyteorder(_endian(_wanted(fields, "endian")))
+        dtype = dtype.newbyteorder(_endian(_required(fields, "endian")))
     refuse_large(sizes, dtype)
     values = _values(fields, _stored(file.parent, fields, data[begin:]), dtype, sizes)
     is_place = _axes_in_space(fields, sizes)
     spacing, origin, direction = _places(fields, is_place)
-    # Layers, where there are any, become the last axis.
+    # The axis of layers, if any, becomes the last one.
     values = np.moveaxis(values, np.flatnonzero(~is_place), range(int(is_place.sum()), n_axes))
     return Labels(values, spacing, origin, direction, segments=_segments(keys))
 
 
 def _header(data: bytes) -> tuple[dict[str, str], dict[str, str], int]:
-    """Return the fields, the keys with their values, and where the header ends: behind a blank line."""
+    """Return the fields, the key-value pairs, and the length of the header, which ends with a blank line [bytes]."""
     if not re.match(rb"NRRD000[1-9]\r?\n", data):
         raise MeshError(f"this is no NRRD image: it begins with NRRD and the version of the format; {SAVE_ANEW}")
     fields: dict[str, str] = {}
@@ -125,7 +125,7 @@ def _header(data: bytes) -> tuple[dict[str, str], dict[str, str], int]:
     return fields, keys, len(data)
 
 
-def _wanted(fields: Mapping[str, str], name: str) -> str:
+def _required(fields: Mapping[str, str], name: str) -> str:
     if name not in fields:
         raise MeshError(f"its header has no field '{name}'; {SAVE_ANEW}")
     return fields[name]
@@ -133,12 +133,12 @@ def _wanted(fields: Mapping[str, str], name: str) -> str:
 
 def _endian(text: str) -> Literal["<", ">"]:
     if text.lower() not in ("little", "big"):
-        raise MeshError(f"endian is '{text[:40]}': little or big is wanted; {SAVE_ANEW}")
+        raise MeshError(f"endian is '{text[:40]}': expected little or big; {SAVE_ANEW}")
     return "<" if text.lower() == "little" else ">"
 
 
 def _stored(folder: Path, fields: Mapping[str, str], behind: bytes) -> bytes:
-    """Return what is stored of the voxels, without what the header tells to skip."""
+    """Return the stored voxels, without the lines to skip."""
     name = fields.get("data file")
     if name is None:
         data = behind
@@ -163,7 +163,7 @@ def _skipped(fields: Mapping[str, str], data: bytes) -> bytes:
 
 
 def _values(fields: Mapping[str, str], data: bytes, dtype: np.dtype[Any], sizes: tuple[int, ...]) -> Values:
-    encoding = _wanted(fields, "encoding").lower()
+    encoding = _required(fields, "encoding").lower()
     if encoding not in _ENCODINGS:
         raise MeshError(f"the encoding '{encoding[:40]}' is not read; {', '.join(_ENCODINGS)} are")
     skip = int(numbers(fields.get("byte skip", "0"), 1, "byte skip")[0])
@@ -185,7 +185,7 @@ def _values(fields: Mapping[str, str], data: bytes, dtype: np.dtype[Any], sizes:
 
 
 def _axes_in_space(fields: Mapping[str, str], sizes: tuple[int, ...]) -> Any:
-    """Return which axes lie in space: the others have no direction, or are of kind list."""
+    """Return which axes are spatial, shape (n_axes,): the others have no direction, or are of kind list."""
     is_place = np.ones(len(sizes), dtype=bool)
     if "space directions" in fields:
         words = re.findall(rf"none|{_VECTOR}", fields["space directions"])
@@ -196,12 +196,12 @@ def _axes_in_space(fields: Mapping[str, str], sizes: tuple[int, ...]) -> Any:
         words = fields["kinds"].lower().split()
         is_place = np.array([word in ("domain", "space", "none", "???") for word in words])
     if is_place.shape != (len(sizes),) or is_place.sum() != min(3, len(sizes)) or len(sizes) > 4:
-        raise MeshError(f"the image has {len(sizes)} axes, {int(is_place.sum())} in space: three are wanted")
+        raise MeshError(f"the image has {len(sizes)} axes, {int(is_place.sum())} in space: expected three")
     return is_place
 
 
 def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, Floats]:
-    """Return spacing, origin and direction, in ITK's axes."""
+    """Return spacing, origin and direction in LPS, shapes (3,), (3,) and (3, 3)."""
     dim = int(is_place.sum())
     signs = np.ones(dim)
     space = fields.get("space", "").lower()
@@ -216,16 +216,16 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
         spacing = np.linalg.norm(axes, axis=0)
         direction = signs[:, None] * axes / np.where(spacing > 0, spacing, 1.0)
     else:
-        told = fields.get("spacings", " ".join(["1"] * len(is_place))).split()
-        if len(told) != len(is_place):
-            raise MeshError(f"'spacings' has {len(told)} numbers, there are {len(is_place)} axes; {SAVE_ANEW}")
-        own = [text for text, is_one in zip(told, is_place, strict=True) if is_one]
+        given = fields.get("spacings", " ".join(["1"] * len(is_place))).split()
+        if len(given) != len(is_place):
+            raise MeshError(f"'spacings' has {len(given)} numbers, there are {len(is_place)} axes; {SAVE_ANEW}")
+        own = [text for text, is_one in zip(given, is_place, strict=True) if is_one]
         spacing = np.array(numbers(" ".join("1" if text.lower() == "nan" else text for text in own), dim, "spacings"))
         direction = np.diag(signs)
     if "space origin" in fields:
         origin = signs * _vector(fields["space origin"], dim)
     elif "axis mins" in fields and "nan" not in fields["axis mins"].lower():
-        # An axis begins at the border of its first voxel, where its centers do not say otherwise.
+        # Without "centers: node", an axis begins at the border of its first voxel.
         centers = fields.get("centers", "").lower().split() or ["cell"] * len(is_place)
         half = np.array([0.0 if center == "node" else 0.5 for center in centers])
         if len(half) != len(is_place):
@@ -244,15 +244,15 @@ def _vector(text: str, dim: int) -> Floats:
 
 
 def _segments(keys: Mapping[str, str]) -> tuple[Segment, ...]:
-    """Return the segments that Slicer names: Segment0_Name, Segment0_LabelValue, Segment0_Layer."""
+    """Return the segments of 3D Slicer: Segment0_Name, Segment0_LabelValue, Segment0_Layer."""
     found = []
     numbered = sorted({int(read[1]) for key in keys if (read := re.match(r"Segment(\d{1,6})_", key))})
     for number in numbered:
-        told = {part: keys.get(f"Segment{number}_{part}", "") for part in ("Name", "ID", "LabelValue", "Layer")}
-        value, layer = told["LabelValue"] or str(number + 1), told["Layer"] or "0"
+        given = {part: keys.get(f"Segment{number}_{part}", "") for part in ("Name", "ID", "LabelValue", "Layer")}
+        value, layer = given["LabelValue"] or str(number + 1), given["Layer"] or "0"
         if not (re.fullmatch(r"-?\d{1,9}", value) and re.fullmatch(r"\d{1,4}", layer)):
             raise MeshError(
-                f"Segment{number} has LabelValue '{value[:20]}' and Layer '{layer[:20]}': whole numbers are wanted"
+                f"Segment{number} has LabelValue '{value[:20]}' and Layer '{layer[:20]}': expected integers"
             )
-        found.append(Segment(told["Name"] or told["ID"] or f"Segment{number}", int(layer), int(value)))
+        found.append(Segment(given["Name"] or given["ID"] or f"Segment{number}", int(layer), int(value)))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""What the formats of label images share: numbers behind a header, and the files that a header names."""
+"""Helpers of all readers of label images: voxel data, header values and the files that a header names."""
 
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,12 @@ from truespring.opening import file_beside, read_file
 
 Values = np.ndarray[Any, Any]
 
-#: The way out of a header that is damaged or of a kind that is not read.
+#: The advice for a damaged or unsupported file.
 SAVE_ANEW = "copy it again, or save it again from 3D Slicer or ITK-SNAP"
 
 
 def n_voxels(shape: tuple[int, ...]) -> int:
-    """Return how many voxels a shape has; raise MeshError where an axis is empty."""
+    """Return the number of voxels of a shape; raise MeshError if an axis is empty."""
     if not shape or min(shape) < 1:
         raise MeshError(f"the header gives the axes {list(shape)} voxels: each needs one at least")
     count = 1
@@ -26,13 +26,13 @@ def n_voxels(shape: tuple[int, ...]) -> int:
 
 
 def raw_values(data: bytes | memoryview, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Values:
-    """Return numbers whose first axis runs fastest; raise MeshError where there are more or fewer."""
-    wanted = n_voxels(shape) * dtype.itemsize
-    if len(data) != wanted:
-        which = "it is cut off" if len(data) < wanted else "it is longer than it should be"
-        told = " x ".join(map(str, shape))
+    """Return an array of `shape` from data whose first axis runs fastest; raise MeshError if the size is wrong."""
+    expected = n_voxels(shape) * dtype.itemsize
+    if len(data) != expected:
+        which = "it is cut off" if len(data) < expected else "it is longer than it should be"
+        size = " x ".join(map(str, shape))
         raise MeshError(
-            f"{which}: {told} voxels of {dtype.itemsize} bytes are {wanted} bytes, {len(data)} are there; {SAVE_ANEW}"
+            f"{which}: {size} voxels of {dtype.itemsize} bytes are {expected} bytes, found {len(data)}; {SAVE_ANEW}"
         )
     return np.frombuffer(data, dtype).reshape(shape, order="F")
 
@@ -40,7 +40,7 @@ def raw_values(data: bytes | memoryview, dtype: np.dtype[Any], shape: tuple[int,
 def inflated_values(
     data: bytes | memoryview, dtype: np.dtype[Any], shape: tuple[int, ...], method: str, skip: int = 0
 ) -> Values:
-    """Return compressed numbers behind `skip` bytes of another kind; raise MeshError where they are damaged."""
+    """Return an array of `shape` from compressed data, after `skip` bytes; raise MeshError if they are damaged."""
     size = skip + n_voxels(shape) * dtype.itemsize
     try:
         return raw_values(memoryview(inflated(data, size, method))[skip:], dtype, shape)
@@ -49,12 +49,12 @@ def inflated_values(
 
 
 def text_values(data: bytes, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Values:
-    """Return numbers that are written as text; raise MeshError where there are more or fewer."""
+    """Return an array of `shape` from numbers written as text; raise MeshError if their number is wrong."""
     if not data[-1:].isspace():
         raise MeshError(f"its last line has no line end: is it cut off? {SAVE_ANEW}")
     words = data.split()
     if len(words) != n_voxels(shape):
-        raise MeshError(f"{n_voxels(shape)} voxels are announced, {len(words)} are there; {SAVE_ANEW}")
+        raise MeshError(f"{n_voxels(shape)} voxels are announced, found {len(words)}; {SAVE_ANEW}")
     try:
         values = np.array([float(word) for word in words])
     except ValueError:
@@ -67,12 +67,12 @@ def text_values(data: bytes, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Va
 
 
 def data_beside(folder: Path, name: str) -> bytes:
-    """Return what stands in a file that a header names; raise MeshError where it lies elsewhere."""
+    """Return the bytes of a file that a header names; raise MeshError if it lies outside of the folder."""
     return read_file(file_beside(folder, name, MeshError), MeshError)
 
 
 def refuse_large(shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
-    """Raise MeshError for an image that does not fit into the memory."""
+    """Raise MeshError if an image does not fit into the memory."""
     try:
         refuse_too_large(n_voxels(shape) * dtype.itemsize)
     except ValueError as error:
@@ -80,19 +80,19 @@ def refuse_large(shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
 
 
 def numbers(text: str, count: int | None, what: str) -> list[float]:
-    """Return the finite numbers of a line of a header; raise MeshError where they are others or not `count`."""
+    """Return the numbers of a header line; raise MeshError if one is not finite or there are not `count`."""
     try:
         found = [float(word) for word in text.split()]
     except ValueError:
         found = []
     if not found or not np.isfinite(found).all() or (count is not None and len(found) != count):
-        raise MeshError(f"'{what}' is '{text[:40]}': {count or 'some'} numbers are wanted; {SAVE_ANEW}")
+        raise MeshError(f"'{what}' is '{text[:40]}': expected {count or 'some'} numbers; {SAVE_ANEW}")
     return found
 
 
 def counts(text: str, count: int | None, what: str) -> tuple[int, ...]:
-    """Return the whole numbers of a line of a header; raise MeshError where they are others or not `count`."""
+    """Return the integers of a header line; raise MeshError if one is negative or there are not `count`."""
     found = numbers(text, count, what)
     if any(value != int(value) or not 0 <= value < 2**40 for value in found):
-        raise MeshError(f"'{what}' is '{text[:40]}': whole numbers from 0 are wanted; {SAVE_ANEW}")
+        raise MeshError(f"'{what}' is '{text[:40]}': expected integers from 0; {SAVE_ANEW}")
     return tuple(map(int, found))

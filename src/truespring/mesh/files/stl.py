@@ -1,4 +1,4 @@
-"""STL files: triangles without connectivity and without a unit, ASCII or binary.
+"""Read and write STL files: triangles without connectivity and without a unit, ASCII or binary.
 
 Source of the binary form: 80 bytes of header, the number of facets as uint32, then for each facet a normal, three
 vertices as float32 and two bytes of attributes, all little-endian.
@@ -17,15 +17,15 @@ _MARKS = {b"solid": "s", b"facet": "f", b"vertex": "v", b"endfacet": "F", b"ends
 
 
 def parse_stl(data: bytes) -> Floats:
-    """Return the vertices of every facet in the file's order [the file's unit], shape (n_facets, 3, 3).
+    """Return the vertices of all facets in the file's order [the file's unit], shape (n_facets, 3, 3).
 
-    Raises MeshError where the file is no STL file, cut off or damaged; coordinates may be NaN or infinite.
+    Raises MeshError if it is no STL file, truncated or damaged; coordinates may be NaN or infinite.
     """
     return _binary(data) if _is_binary(data) else _text(data)
 
 
 def stl_bytes(facets: Floats) -> bytes:
-    """Return a binary STL file of facets, shape (n_facets, 3, 3), with their unit normals (0 where one has no area)."""
+    """Return a binary STL file of facets, shape (n_facets, 3, 3), with unit normals (0 for facets without area)."""
     across = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
     length = np.linalg.norm(across, axis=1, keepdims=True)
     record = np.zeros(len(facets), _FACET)
@@ -35,20 +35,20 @@ def stl_bytes(facets: Floats) -> bytes:
 
 
 def _is_binary(data: bytes) -> bool:
-    """Distinguish binary from text by the length, since a binary header may begin with "solid" as well."""
+    """Return whether the length is that of a binary file: a binary header may begin with "solid", too."""
     count = int.from_bytes(data[80:_HEADER], "little")
-    wanted = _HEADER + _FACET.itemsize * count
-    if len(data) == wanted:
+    expected = _HEADER + _FACET.itemsize * count
+    if len(data) == expected:
         if not count:
             raise MeshError("the file holds no facet")
         return True
-    if b"\0" not in data:  # text has none, and every binary file has
+    if b"\0" not in data:  # every binary file contains a zero byte, a text file none
         return False
     if len(data) < _HEADER:
         raise MeshError("this is no STL file, or it is cut off in its header")
-    state = "cut off, or no STL file" if len(data) < wanted else "damaged, or no STL file"
+    state = "cut off, or no STL file" if len(data) < expected else "damaged, or no STL file"
     raise MeshError(
-        f"the file is {state}: a binary STL of the {count:,} facets that its header names has {wanted:,} bytes, "
+        f"the file is {state}: a binary STL of the {count:,} facets that its header names has {expected:,} bytes, "
         f"this file has {len(data):,}"
     )
 
@@ -60,7 +60,7 @@ def _binary(data: bytes) -> Floats:
 def _text(data: bytes) -> Floats:
     if not re.match(rb"\s*solid\b", data, re.IGNORECASE):
         raise MeshError("this is no STL file: it does not begin with 'solid'")
-    # Names of solids may hold any word.
+    # Names of solids may contain any word.
     data = re.sub(rb"^([ \t]*(?:end)?solid)\b[^\r\n]*", rb"\1", data, flags=re.IGNORECASE | re.MULTILINE)
     words = [word.lower() for word in re.findall(rb"^[ \t]*([a-z]+)\b", data, re.IGNORECASE | re.MULTILINE)]
     _refuse_torn([word for word in words if word in _MARKS])
@@ -75,14 +75,14 @@ def _text(data: bytes) -> Floats:
 
 
 def _refuse_torn(words: list[bytes]) -> None:
-    """Raise MeshError where the keywords of a text file do not make whole solids of whole facets."""
+    """Raise MeshError if the keywords of a text file do not form complete solids of complete facets."""
     n_facets = words.count(b"facet")
     if not n_facets:
         raise MeshError("the file holds no facet")
-    wanted = {b"vertex": 3 * n_facets, b"endfacet": n_facets, b"endsolid": words.count(b"solid")}
-    lines = ", ".join(f"{words.count(word)} of {count} '{word.decode()}'" for word, count in wanted.items())
+    expected = {b"vertex": 3 * n_facets, b"endfacet": n_facets, b"endsolid": words.count(b"solid")}
+    lines = ", ".join(f"{words.count(word)} of {count} '{word.decode()}'" for word, count in expected.items())
     marks = "".join(_MARKS[word] for word in words)
-    if any(words.count(word) != count for word, count in wanted.items()):
+    if any(words.count(word) != count for word, count in expected.items()):
         raise MeshError(f"the file is cut off or damaged: it has {lines} lines")
     if marks.replace("fvvvF", "").replace("sS", ""):
         raise MeshError("the file is damaged: its facets and solids do not follow each other, each of three vertices")

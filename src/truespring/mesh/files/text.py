@@ -1,4 +1,4 @@
-"""Numbers out of the lines of text files, with the line where they are wrong."""
+"""Convert fields of text files to numbers; errors name the line."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,7 +11,7 @@ Rows = Sequence[Sequence[bytes]]
 
 
 def integers(rows: Rows, lines: Sequence[int], what: str) -> Ints:
-    """Return all fields of all rows, shape (n,); raise MeshError with the line of one that is no whole number."""
+    """Return all fields of all rows as integers, shape (n,); raise MeshError with the line of one that is not."""
     try:
         return np.array(_numbers(rows, lines, what, int, "a whole number"), dtype=np.int64)
     except OverflowError:
@@ -19,19 +19,19 @@ def integers(rows: Rows, lines: Sequence[int], what: str) -> Ints:
 
 
 def reals(rows: Rows, lines: Sequence[int], what: str) -> Floats:
-    """Return all fields of all rows, shape (n,); raise MeshError with the line of one that is no number."""
+    """Return all fields of all rows as numbers, shape (n,); raise MeshError with the line of one that is not."""
     return np.array(_numbers(rows, lines, what, _real, "a number"), dtype=np.float64)
 
 
 def refuse_ragged(rows: Rows, lines: Sequence[int], columns: int, what: str) -> None:
-    """Raise MeshError with the first line that has another number of fields."""
+    """Raise MeshError, with the line, if a row does not have `columns` fields."""
     for row, line in zip(rows, lines, strict=True):
         if len(row) != columns:
             raise MeshError(f"line {line}: {what} takes {columns} numbers, found {len(row)}")
 
 
 def word(field: bytes) -> str:
-    """Return a field as text that fits into a message."""
+    """Return a field as text for a message, shortened."""
     text = field.decode("utf-8", errors="replace").strip()
     return text if len(text) <= 40 else f"{text[:40]}..."
 
@@ -40,11 +40,11 @@ def _real(field: bytes) -> float:
     try:
         return float(field)
     except ValueError:
-        return float(field.upper().replace(b"D", b"E"))  # as Fortran writes 1.0D-3
+        return float(field.upper().replace(b"D", b"E"))  # Fortran writes 1.0D-3
 
 
 def _numbers(
-    rows: Rows, lines: Sequence[int], what: str, convert: Callable[[bytes], float], wanted: str
+    rows: Rows, lines: Sequence[int], what: str, convert: Callable[[bytes], float], expected: str
 ) -> list[float]:
     try:
         return [convert(field) for row in rows for field in row]
@@ -55,7 +55,7 @@ def _numbers(
             for field in row
             if not _converts(field, convert)
         )
-        raise MeshError(f"line {line}: {what}: '{word(field)}' is not {wanted}") from None
+        raise MeshError(f"line {line}: {what}: '{word(field)}' is not {expected}") from None
 
 
 def _converts(field: bytes, convert: Callable[[bytes], float]) -> bool:

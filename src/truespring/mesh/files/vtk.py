@@ -1,4 +1,4 @@
-"""Legacy VTK files, .vtk, text and binary.
+"""Read legacy VTK files, .vtk, text and binary.
 
 Source: "VTK File Formats", https://docs.vtk.org/en/latest/vtk_file_formats/; of version 5.1, whose cells are
 offsets and connectivity, vtkDataReader and vtkDataWriter.
@@ -18,13 +18,13 @@ from truespring.mesh.files.text import word
 from truespring.mesh.files.vtk_grid import Arrays, Grid
 from truespring.mesh.files.vtk_shapes import Lists, faces, lattice, lattice_points
 
-# The type of an array and numpy's name of it.
+# NumPy codes of the array types.
 _BIT = "b1"
 _CODES = {
     **{"char": "i1", "unsigned_char": "u1", "short": "i2", "unsigned_short": "u2", "int": "i4", "unsigned_int": "u4"},
     **{f"vtktype{sign}int{8 * size}": f"{sign or 'i'}{size}" for sign in ("", "u") for size in (1, 2, 4, 8)},
     **{"long": "i8", "unsigned_long": "u8", "float": "f4", "double": "f8", "bit": _BIT},
-    "vtkidtype": "i4",  # whatever its size in memory
+    "vtkidtype": "i4",  # for any size in memory
 }
 
 
@@ -33,7 +33,7 @@ _COORDINATES = ("X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES")
 
 
 def read_legacy_grid(data: bytes) -> Grid:
-    """Read a legacy .vtk file with its arrays; raise MeshError where it is damaged or holds no grid."""
+    """Read a legacy .vtk file with its arrays; raise MeshError if it is damaged or holds no grid."""
     head = re.match(
         rb"# vtk DataFile Version\s+(\d+)\.\d+[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)[ \t\r]*\n",
         data,
@@ -54,7 +54,7 @@ def read_legacy_grid(data: bytes) -> Grid:
     grid: dict[str, Any] = {}
     arrays: dict[str, dict[str, NDArray[Any]]] = {"POINT_DATA": {}, "CELL_DATA": {}, "": {}}
     active: str = ""
-    n_rows = 0  # whose arrays follow, and how many rows they have
+    n_rows = 0  # the owner of the arrays that follow, and their number of rows
     while fields := cursor.fields():
         match [fields[0].upper(), *fields[1:]]:
             case ["POINTS", count, kind]:
@@ -74,7 +74,7 @@ def read_legacy_grid(data: bytes) -> Grid:
                     arrays[active][name] = values
             case ["SCALARS", name, kind] | ["SCALARS", name, kind, _]:
                 if cursor.fields()[:1] != ["LOOKUP_TABLE"]:
-                    cursor.refuse(f"SCALARS {name}: its LOOKUP_TABLE is wanted here")
+                    cursor.refuse(f"SCALARS {name}: expected LOOKUP_TABLE")
                 n_components = cursor.count(fields[3]) if len(fields) == 4 else 1
                 arrays[active][unquote(name)] = cursor.array(kind, n_rows, n_components)
             case ["VECTORS" | "NORMALS", name, kind]:
@@ -82,7 +82,7 @@ def read_legacy_grid(data: bytes) -> Grid:
             case ["TENSORS" | "TENSORS6" as rank, name, kind]:
                 arrays[active][unquote(name)] = cursor.array(kind, n_rows, 9 if rank == "TENSORS" else 6)
             case ["GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", _, kind]:
-                cursor.array(kind, n_rows)  # numbers and marks of VTK's own
+                cursor.array(kind, n_rows)  # VTK's ids and flags
             case ["TEXTURE_COORDINATES", name, width, kind]:
                 arrays[active][unquote(name)] = cursor.array(kind, n_rows, cursor.count(width))
             case ["COLOR_SCALARS", _, width]:
@@ -102,11 +102,11 @@ def read_legacy_grid(data: bytes) -> Grid:
     for what, there in (("POINT_DATA", len(made.points)), ("CELL_DATA", len(made.types))):
         for name, values in (made.point_arrays if what == "POINT_DATA" else made.cell_arrays).items():
             if len(values) != there:
-                raise MeshError(f"array '{name}' of {what} has {len(values)} rows, wanted are {there}")
+                raise MeshError(f"array '{name}' of {what} has {len(values)} rows, expected {there}")
     return made
 
 
-# What each kind of data set has at least.
+# Required entries of each kind of data set.
 _MADE = {
     "UNSTRUCTURED_GRID": ("points", "cells", "types"),
     "STRUCTURED_GRID": ("points", "dims"),
@@ -116,7 +116,7 @@ _MADE = {
 
 
 def _made(data_set: str, grid: dict[str, Any], point_arrays: Arrays, cell_arrays: Arrays) -> Grid:
-    """Return the grid of what a file holds, of any kind of data set."""
+    """Return the grid of a data set of any kind."""
     points = grid["points"].astype(np.float64)
     if data_set in ("STRUCTURED_GRID", "RECTILINEAR_GRID"):
         return lattice(grid["dims"], points, point_arrays, cell_arrays)
@@ -127,16 +127,16 @@ def _made(data_set: str, grid: dict[str, Any], point_arrays: Arrays, cell_arrays
 
 
 class _Cursor:
-    """A legacy file that is read from its top to its bottom."""
+    """Reads a legacy file from start to end."""
 
     def __init__(self, data: bytes, begin: int, is_text: bool) -> None:
         self._data = data
         self._next = begin
-        self._here = begin  # where what was read last begins
+        self._here = begin  # the start of the last item read
         self._is_text = is_text
 
     def refuse(self, why: str) -> NoReturn:
-        """Raise MeshError."""
+        """Raise MeshError with the line or byte and the reason."""
         line = self._data.count(b"\n", 0, self._here) + 1
         raise MeshError(f"line {line}: {why}" if self._is_text else f"byte {self._here}: {why}")
 
@@ -148,14 +148,14 @@ class _Cursor:
         return line.decode("utf-8", errors="replace").strip()
 
     def fields(self) -> list[str]:
-        """Return the words of the next line that is not blank, none at the end of the file."""
+        """Return the words of the next line that is not blank; empty at the end of the file."""
         words: list[str] = []
         while not words and self._next < len(self._data):
             words = self.line().split()
         return words
 
     def count(self, text: str) -> int:
-        """Return a count that a keyword line gives."""
+        """Return a count of a keyword line; raise MeshError if it is not one."""
         if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
             self.refuse(f"'{text[:40]}' is no count")
         return int(text)
@@ -199,14 +199,14 @@ class _Cursor:
         return np.frombuffer(raw, dtype).astype(dtype.newbyteorder("="))
 
     def _headed_array(self, name: str, count: int) -> Ints:
-        """Return an array that its own line heads: its name and type."""
+        """Return an integer array that follows a line with its name and type, shape (count,)."""
         fields = self.fields()
         if len(fields) != 2 or fields[0].upper() != name or _CODES.get(fields[1].lower(), "f").startswith("f"):
-            self.refuse(f"{name} and a type of integers are wanted here, not '{' '.join(fields)[:40]}'")
+            self.refuse(f"expected {name} and an integer type, found '{' '.join(fields)[:40]}'")
         return self.array(fields[1], count).astype(np.int64)
 
     def lists(self, what: str, count: str, size: str, is_old: bool) -> Lists:
-        """Return cells: before version 5 each a number of points and these, later offsets and connectivity."""
+        """Return cells: before version 5 the count and points of each, since then offsets and connectivity."""
         if is_old:
             return self._old_lists(what, self.count(count), self.count(size))
         offsets = self._headed_array("OFFSETS", self.count(count))
@@ -235,11 +235,11 @@ class _Cursor:
             yield unquote(fields[0]), self.array(fields[3], self.count(fields[2]), self.count(fields[1]))
 
     def colors(self, n_rows: int, n_columns: int) -> None:
-        """Pass over colours: numbers from 0 to 1 in a text, bytes else."""
+        """Skip colours: numbers from 0 to 1 in text files, bytes in binary ones."""
         self.array("float" if self._is_text else "unsigned_char", n_rows, n_columns)
 
     def skip_metadata(self) -> None:
-        """Pass over what VTK says of an array, up to a blank line."""
+        """Skip the metadata of an array, up to a blank line."""
         while self.line():
             pass
 

@@ -1,4 +1,4 @@
-"""Any of VTK's files, by what it holds: legacy or XML, and XML that names its pieces in files beside it."""
+"""Read VTK files of any kind: legacy or XML, and parallel XML files with pieces in files of the same folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ from truespring.opening import file_beside, read_file
 
 _TYPES = {".vtu": "UnstructuredGrid", ".vtp": "PolyData", ".vts": "StructuredGrid", ".vtr": "RectilinearGrid"}
 
-#: By suffix, of the files that hold a grid and of those that name its pieces: what tells that a file is one.
+#: Functions that recognise a file, by suffix: of files that hold a grid, and of parallel files that name its pieces.
 VTK_FORMATS: Mapping[str, Recognises] = {
     ".vtu": is_vtk_xml(_TYPES[".vtu"]),
     ".vtk": is_vtk,
@@ -22,17 +22,17 @@ VTK_FORMATS: Mapping[str, Recognises] = {
     **{f".p{suffix[1:]}": is_vtk_xml(f"P{kind}") for suffix, kind in _TYPES.items()},
 }
 
-# A file may not name more pieces.
+# The most pieces of a parallel file.
 _MOST_PIECES = 100_000
 
 
 def read_vtk(data: bytes, folder: Path) -> Contents:
-    """Read the contents of a file in a folder, where the files lie that it names; raise MeshError as read_vtk_grid."""
+    """Read the contents of a VTK file; its pieces lie in `folder`. Raises MeshError as read_vtk_grid."""
     return contents(read_vtk_grid(data, folder))
 
 
 def read_vtk_grid(data: bytes, folder: Path) -> Grid:
-    """Read a file with its arrays; raise MeshError where it is damaged or holds no grid."""
+    """Read the grid of a VTK file with its arrays; raise MeshError if it is damaged or holds no grid."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     if data[:1000].lstrip()[:1] != b"<":
         return read_legacy_grid(data)
@@ -56,5 +56,5 @@ def _piece(file: Path, kind: str) -> list[Grid]:
     try:
         return read_grids(read_file(file, MeshError), kind)
     except MeshError as error:
-        told = str(error)
-        raise MeshError(told if told.startswith(str(file)) else f"{file.name}: {told}") from None
+        message = str(error)
+        raise MeshError(message if message.startswith(str(file)) else f"{file.name}: {message}") from None

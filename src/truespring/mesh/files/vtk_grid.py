@@ -1,4 +1,4 @@
-"""VTK's grids, whatever file they come from, and the cells and groups of a mesh that follow from them.
+"""VTK grids, independent of the file format, and their conversion to cells and groups of a mesh.
 
 Source: "VTK File Formats", https://docs.vtk.org/en/latest/vtk_file_formats/
 """
@@ -15,7 +15,7 @@ from truespring.mesh.files.contents import CELL_KINDS, Cells, Contents
 
 Arrays = Mapping[str, NDArray[Any]]
 
-# VTK's number of a cell type: its kind and the number of its nodes, None where that varies.
+# Kind and number of nodes by VTK's cell type; None if the number varies.
 _TYPES: dict[int, tuple[str, int | None]] = {
     1: ("vertex", 1),
     2: ("vertex", None),
@@ -61,14 +61,14 @@ _TYPES: dict[int, tuple[str, int | None]] = {
 _BEZIER = 75
 # Pixels and voxels number their nodes along x, then y, then z.
 _PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
-#: The nodes of VTK's linear wedge by ours, and back: its first triangle goes round as seen from outside, ours from
-#: inside.
+#: Node order of VTK's linear wedge from ours, and back: its first triangle is counterclockwise from outside, ours
+#: from inside.
 WEDGE = (0, 2, 1, 3, 5, 4)
 
-# More values than these are a quantity, not a choice of regions.
+# An array of more distinct values is a quantity, not region labels.
 _MOST_VALUES = 64
 
-# Arrays of numbers and marks that VTK and ParaView keep for themselves.
+# Arrays of ids and flags for internal use of VTK and ParaView.
 _NO_GROUPS = {
     *("vtkoriginalpointids", "vtkoriginalcellids", "vtkghosttype", "vtkghostlevels", "vtkvalidpointmask"),
     *("globalnodeid", "globalnodeids", "globalelementid", "globalelementids", "globalpointids", "globalcellids"),
@@ -81,11 +81,11 @@ class Grid(NamedTuple):
 
     Attributes:
         points: shape (n_points, 3).
-        offsets: where each cell begins in `connectivity`, and the end of the last one, shape (n_cells + 1,).
-        connectivity: the points of all cells.
-        types: VTK's numbers of the cell types, shape (n_cells,).
-        point_arrays, cell_arrays: by name, a row for each point or cell.
-        notes: what should be known of the file, in words.
+        offsets: the start of each cell in `connectivity`, and the end of the last one, shape (n_cells + 1,).
+        connectivity: the points of all cells, concatenated.
+        types: VTK's cell types, shape (n_cells,).
+        point_arrays, cell_arrays: by name, one row per point or cell.
+        notes: remarks about the file for the user.
     """
 
     points: Floats
@@ -98,7 +98,7 @@ class Grid(NamedTuple):
 
 
 def contents(grid: Grid) -> Contents:
-    """Return the contents of a grid; raise MeshError where its cells are not whole."""
+    """Return the contents of a grid; raise MeshError if offsets and connectivity do not fit."""
     points, offsets, connectivity, types, point_arrays, cell_arrays, notes = grid
     if len(offsets) != len(types) + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
         raise MeshError(f"{len(offsets)} offsets do not belong to {len(types)} cells, or do not ascend from 0")
@@ -120,7 +120,7 @@ def contents(grid: Grid) -> Contents:
 
 
 def _blocks(types: Ints, sizes: Ints) -> list[Ints]:
-    """Return the numbers of the cells that have one type and one number of nodes."""
+    """Return the indices of cells, grouped by type and number of nodes."""
     _, kind = np.unique(np.stack([types, sizes], axis=1), axis=0, return_inverse=True)
     order = np.argsort(kind.ravel(), kind="stable")
     return np.split(order, np.flatnonzero(np.diff(kind.ravel()[order])) + 1) if len(order) else []
@@ -130,19 +130,19 @@ def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cell
     first = numbers[0]
     if type_ not in _TYPES:
         raise MeshError(f"cell {first}: VTK's cell type {type_} is not supported")
-    kind, wanted = _TYPES[type_]
+    kind, expected = _TYPES[type_]
     n_nodes = int(offsets[first + 1] - offsets[first])
-    if n_nodes != wanted and (wanted is not None or n_nodes < CELL_KINDS[kind][1]):
+    if n_nodes != expected and (expected is not None or n_nodes < CELL_KINDS[kind][1]):
         raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
     nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
     order = {8: _PIXEL, 11: _VOXEL, 13: WEDGE}.get(type_)
-    if type_ >= _BEZIER:  # between the corners are control points, which lie on no edge
+    if type_ >= _BEZIER:  # the other nodes are control points, which do not lie on the edges
         nodes = nodes[:, : CELL_KINDS[kind][1]]
     return Cells(kind, nodes if order is None else nodes[:, order], numbers)
 
 
 def _choices(arrays: Arrays) -> list[tuple[str, NDArray[Any]]]:
-    """Return the arrays that may name groups: of whole numbers, one a row, and not VTK's own."""
+    """Return the arrays that may define groups: integers, one per row, not internal to VTK."""
     return [
         (name, values.ravel())
         for name, values in arrays.items()

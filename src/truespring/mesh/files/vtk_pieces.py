@@ -1,4 +1,4 @@
-"""A body in pieces, as programs that run on several processors write it: one grid of them all."""
+"""Join the pieces of a parallel VTK file into one grid."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,22 +10,22 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.files.vtk_grid import Arrays, Grid
 
-# Points of two pieces this near, as a share of the body's diameter, are one. Nearer than in mesh files of torn cells
-# (contents.py, 1e-7): pieces hold copies of one number, not places that several cells computed.
+# Points of two pieces closer than this, relative to the body's diameter, are merged. The tolerance is smaller than for
+# torn meshes (contents.py, 1e-7): pieces hold exact copies of the coordinates.
 _SAME_PLACE = 1e-9
-# A coordinate beyond this was damaged; its square still is a number.
+# Coordinates above this are taken as damaged; their squares are finite.
 _FAR = 1e30
-# Marks of cells that a piece holds for others to see, or that are not shown: duplicate, refined, hidden.
+# Flags of ghost cells and hidden cells: duplicate, refined, hidden.
 _GHOST = 1 | 8 | 32
-# Values of one point in two pieces that differ by more of the largest are two.
+# Values of a point in two pieces that differ by more than this, relative to the largest, are reported.
 _SAME_VALUE = 1e-6
 
 
 def one_grid(pieces: Sequence[Grid]) -> Grid:
-    """Return one grid of several pieces, without their ghost cells, joined where their points coincide.
+    """Return one grid of several pieces, without ghost cells, joined where their points coincide.
 
-    Points of one piece are left apart, as it has them. Cells that two pieces have are taken once. Raises MeshError
-    where no piece has a point.
+    Coincident points of the same piece stay distinct. Cells that are in two pieces are taken once. Raises MeshError
+    if no piece has a point.
     """
     there = [whole for piece in pieces if len(piece.points) and len((whole := _without_ghosts(piece)).points)]
     if not there:
@@ -44,14 +44,14 @@ def _without_ghosts(grid: Grid) -> Grid:
     if len(is_ghost) != len(grid.types) or not is_ghost.any():
         return grid
     own = _of_cells(grid, ~is_ghost)
-    # Points of ghost cells alone go with them.
+    # Points that only ghost cells use are removed.
     seen = np.zeros(len(grid.points), dtype=bool)
     seen[_known(grid.connectivity, seen)] = True
     kept = ~seen
     kept[_known(own.connectivity, seen)] = True
     number = np.cumsum(kept) - 1
     if own.connectivity.size and not 0 <= own.connectivity.min() <= own.connectivity.max() < len(kept):
-        return own  # damaged: told where the cells are read
+        return own  # damaged: reported when the cells are read
     return own._replace(
         points=own.points[kept],
         connectivity=number[own.connectivity],
@@ -64,7 +64,7 @@ def _known(nodes: Ints, points: Bools) -> Ints:
 
 
 def _of_cells(grid: Grid, kept: Bools) -> Grid:
-    """Return a grid of some of its cells, with all of its points."""
+    """Return the grid with the cells of `kept`, and all of its points."""
     sizes = np.diff(grid.offsets)
     return grid._replace(
         offsets=np.concatenate([[0], np.cumsum(sizes[kept])]).astype(np.int64),
@@ -107,7 +107,7 @@ def _joined(pieces: Sequence[Grid]) -> Grid:
 
 
 def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
-    """Return the number of each point in the whole, the first point of each number, and how many places stay apart."""
+    """Return the merged index of each point, the first point of each index, and the number of places not merged."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
@@ -117,7 +117,7 @@ def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
     pairs = finite[KDTree(points[finite]).query_pairs(_SAME_PLACE * size, output_type="ndarray").reshape(-1, 2)]
     n = len(points)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)))
-    # A place where one piece has several points may be a crack: nobody knows which of them meet.
+    # A place with several points of the same piece may be a crack: it is ambiguous which points to merge.
     n_pieces = int(owner.max()) + 1
     key, inverse, counts = np.unique(place.astype(np.int64) * n_pieces + owner, return_inverse=True, return_counts=True)
     apart = np.unique(place[counts[inverse] > 1])
@@ -141,7 +141,7 @@ def _renumbered(piece: Grid, number: Ints, begin: int) -> Ints:
 
 
 def _point_arrays(pieces: Sequence[Arrays], number: Ints, first: Ints) -> tuple[Arrays, list[tuple[str, float]]]:
-    """Return the values of the joined points, and which vectors differ at points that pieces share, by how much."""
+    """Return the arrays of the merged points, and the names and relative gaps of vectors that differ between pieces."""
     whole = _common(pieces)
     differing = []
     for name, values in whole.items():
@@ -156,7 +156,7 @@ def _point_arrays(pieces: Sequence[Arrays], number: Ints, first: Ints) -> tuple[
 
 
 def _common(pieces: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
-    """Return the arrays that all pieces have in one shape of rows, one behind the other."""
+    """Return the arrays that all pieces have with the same shape of rows, concatenated."""
     return {
         name: np.concatenate([piece[name] for piece in pieces])
         for name, values in pieces[0].items()
@@ -165,7 +165,7 @@ def _common(pieces: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
 
 
 def _repeated(grid: Grid, owner: Ints) -> Bools:
-    """Tell which cells another piece has before, by their points."""
+    """Return which cells repeat a cell of an earlier piece, by their points, shape (n_cells,)."""
     is_again = np.zeros(len(grid.types), dtype=bool)
     sizes = np.diff(grid.offsets)
     for size in np.unique(sizes).tolist():

@@ -1,4 +1,4 @@
-"""VTK's data sets that list no cells of an unstructured grid, as such grids: lattices, and faces with lines."""
+"""Convert VTK's structured data sets and PolyData to unstructured grids."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,24 +11,24 @@ from truespring.errors import MeshError
 from truespring.mesh.files.inflate import refuse_too_large
 from truespring.mesh.files.vtk_grid import Arrays, Grid
 
-#: The lists of PolyData, in the order in which its cells are numbered.
+#: The cell lists of PolyData, in the order of its cell numbers.
 FACES = ("verts", "lines", "polys", "strips")
 
-# VTK's number of a cell by its number of points, of a lattice by the axes along which it has cells.
+# VTK's cell type by number of points; of a structured grid by its number of axes with cells.
 _POLYGONS = {3: 5, 4: 9}
 _LATTICE = {0: 1, 1: 3, 2: 9, 3: 12}
 _CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 
 
 class Lists(NamedTuple):
-    """Cells of any number of points: where each begins in `connectivity`, and the end of the last."""
+    """Cells of any number of points: `offsets` are the start of each in `connectivity`, and the end of the last."""
 
     offsets: Ints
     connectivity: Ints
 
 
 def lattice(dims: Sequence[int], points: Floats, point_arrays: Arrays, cell_arrays: Arrays) -> Grid:
-    """Return a grid of hexahedra, of quadrilaterals where one axis has a single point; x runs fastest."""
+    """Return a structured grid as hexahedra, or as quadrilaterals if one axis has a single point; x runs fastest."""
     if len(dims) != 3 or min(dims) < 1 or math.prod(dims) != len(points):
         raise MeshError(f"a lattice of {' x '.join(map(str, dims))} points does not have {len(points)} of them")
     numbers = np.arange(len(points)).reshape(tuple(dims), order="F").squeeze()
@@ -49,7 +49,7 @@ def lattice(dims: Sequence[int], points: Floats, point_arrays: Arrays, cell_arra
 
 
 def lattice_points(coordinates: Sequence[Floats]) -> Floats:
-    """Return the points of a lattice by their coordinates along each axis; raise MeshError where these are too many."""
+    """Return the points of a rectilinear grid, shape (n_points, 3); raise MeshError if there are too many."""
     try:
         refuse_too_large(24 * math.prod(map(len, coordinates)))
     except ValueError as error:
@@ -59,7 +59,7 @@ def lattice_points(coordinates: Sequence[Floats]) -> Floats:
 
 
 def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell_arrays: Arrays) -> Grid:
-    """Return PolyData as a grid; lines become segments, strips triangles, each with the values of its cell."""
+    """Return PolyData as a grid; lines become segments, strips become triangles, with the values of their cell."""
     first, sizes, cells, types, rows = 0, [], [], [], []
     for name in FACES:
         if name not in lists:
@@ -73,7 +73,7 @@ def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell
             place = np.arange(len(connectivity))
             begin = np.flatnonzero(place + size <= offsets[1:][owner])
             pieces = connectivity[begin[:, None] + np.arange(size)]
-            if size == 3:  # every other triangle of a strip is turned round
+            if size == 3:  # every other triangle of a strip is reversed
                 odd = (begin - offsets[:-1][owner[begin]]) % 2 == 1
                 pieces[odd] = pieces[odd][:, [1, 0, 2]]
             owner, connectivity, count = owner[begin], pieces.ravel(), np.full(len(begin), size)
@@ -93,7 +93,7 @@ def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell
     order = np.concatenate(rows)
     for name, values in cell_arrays.items():
         if len(values) != first:
-            raise MeshError(f"array '{name}' of the cells has {len(values)} rows, {first} are wanted")
+            raise MeshError(f"array '{name}' of the cells has {len(values)} rows, expected {first}")
     return Grid(
         points,
         np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64),
@@ -105,6 +105,6 @@ def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell
 
 
 def refuse_torn(offsets: Ints, connectivity: Ints) -> None:
-    """Raise MeshError where offsets do not ascend from 0 to the end of the cells."""
+    """Raise MeshError if offsets do not ascend from 0 to the length of `connectivity`."""
     if not len(offsets) or offsets[0] != 0 or (np.diff(offsets) < 0).any() or offsets[-1] != len(connectivity):
         raise MeshError(f"offsets do not ascend from 0 to {len(connectivity)}, the number of points that cells list")

@@ -1,4 +1,4 @@
-"""VTK's XML files, .vtu, .vtp, .vts and .vtr: text, base64 and raw, plain or compressed by zlib or LZMA.
+"""Read VTK XML files, .vtu, .vtp, .vts and .vtr: text, base64 and raw, plain or compressed by zlib or LZMA.
 
 Source: "VTK XML Formats", https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html
 """
@@ -21,7 +21,7 @@ from truespring.mesh.files.inflate import inflated, refuse_too_large
 from truespring.mesh.files.vtk_grid import Grid
 from truespring.mesh.files.vtk_shapes import Lists, faces, lattice, lattice_points
 
-#: The types of arrays and the NumPy codes of them.
+#: NumPy codes of the array types.
 CODES = {
     **{"Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8"},
     **{"UInt8": "u1", "UInt16": "u2", "UInt32": "u4", "UInt64": "u8"},
@@ -35,18 +35,18 @@ _METHODS = {"vtkZLibDataCompressor": "zlib", "vtkLZMADataCompressor": "lzma"}
 
 
 def read_grids(data: bytes, kind: str | None = None) -> list[Grid]:
-    """Return the pieces of a file, of whatever kind of GRIDS it is, or of the one that is wanted.
+    """Return the pieces of a file of `kind`, a key of GRIDS; of any of these by default.
 
-    Raises MeshError where it is damaged, another, or compressed in another way.
+    Raises MeshError if it is damaged, of another kind, or compressed by an unsupported method.
     """
     root = root_of(data)
-    told = root.get("type", "")
-    root, reader = open_vtk(data, kind or told)
-    return [reader.grid(piece, told) for piece in root.iterfind(f"{told}/Piece")]
+    type_ = root.get("type", "")
+    root, reader = open_vtk(data, kind or type_)
+    return [reader.grid(piece, type_) for piece in root.iterfind(f"{type_}/Piece")]
 
 
 def root_of(data: bytes) -> ElementTree.Element:
-    """Return the XML of a VTK file without what is appended, which may be raw; raise MeshError where it is none."""
+    """Return the XML of a VTK file without the appended data; raise MeshError if it is no VTK file."""
     tag, end = _appended(data)
     text = data[: tag.end()] + data[end:] if tag else data
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
@@ -56,12 +56,12 @@ def root_of(data: bytes) -> ElementTree.Element:
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
     if root.tag != "VTKFile":
-        raise MeshError(f"this is no file of VTK's XML: a VTKFile is wanted, not {root.tag[:40]}")
+        raise MeshError(f"this is no file of VTK's XML: expected VTKFile, found {root.tag[:40]}")
     return root
 
 
 def _appended(data: bytes) -> tuple[re.Match[bytes] | None, int]:
-    """Return the tag before what is appended, None where there is none, and where that ends."""
+    """Return the match of the <AppendedData> tag (None without appended data), and the end of the appended data."""
     tag = re.search(rb"<AppendedData[^>]*>", data)
     end = data.rfind(b"</AppendedData>")
     if tag and end < tag.end():
@@ -70,21 +70,21 @@ def _appended(data: bytes) -> tuple[re.Match[bytes] | None, int]:
 
 
 def open_vtk(data: bytes, kind: str) -> "tuple[ElementTree.Element, Reader]":
-    """Return the XML of a VTK file of a kind, and what reads its arrays; raise MeshError where it is none."""
+    """Return the XML of a VTK file, and the Reader of its arrays; raise MeshError if it is of another kind."""
     root = root_of(data)
     if root.find(kind) is None:
-        raise MeshError(f"a VTKFile of type {kind} is wanted, not of type {root.get('type', 'none')[:40]}")
+        raise MeshError(f"expected a VTKFile of type {kind}, found type {root.get('type', 'none')[:40]}")
     tag, end = _appended(data)
     if tag is None:
         return root, Reader(root, memoryview(b""))
-    begin = tag.end() + 1  # it begins with an underscore, maybe behind blanks
+    begin = tag.end() + 1  # the data begin with an underscore, which blanks may precede
     while data[begin - 1 : begin].isspace():
         begin += 1
-    return root, Reader(root, memoryview(data)[begin:end])  # no copy: it is nearly the file
+    return root, Reader(root, memoryview(data)[begin:end])  # no copy: the data are most of the file
 
 
 class Reader:
-    """Reads the arrays of a file, which are written in one way."""
+    """Reads the arrays of a file, which share byte order, header type and compression."""
 
     def __init__(self, root: ElementTree.Element, appended: memoryview) -> None:
         self._order = _choice(root, "byte_order", _ORDERS, "LittleEndian")
@@ -93,10 +93,10 @@ class Reader:
         section = root.find("AppendedData")
         self._is_raw = section is not None and section.get("encoding") == "raw"
         self._appended = appended
-        self._n_bytes = 0  # of what was inflated so far
+        self._n_bytes = 0  # decompressed so far
 
     def grid(self, piece: ElementTree.Element, kind: str) -> Grid:
-        """Return what a piece of a kind of GRIDS holds."""
+        """Return the grid of a piece; `kind` is a key of GRIDS."""
         return GRIDS[kind](self, piece)
 
     def unstructured(self, piece: ElementTree.Element) -> Grid:
@@ -130,7 +130,7 @@ class Reader:
         dims = dims_of(piece)
         elements = piece.findall("Coordinates/DataArray")
         if len(elements) != 3:
-            raise MeshError(f"<Coordinates> has {len(elements)} arrays: three are wanted")
+            raise MeshError(f"<Coordinates> has {len(elements)} arrays: expected three")
         axes = [self._array(one, "Coordinates", count) for one, count in zip(elements, dims, strict=True)]
         return self._lattice(piece, dims, lattice_points([axis.ravel().astype(np.float64) for axis in axes]))
 
@@ -151,7 +151,7 @@ class Reader:
             return Lists(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
         ends = self._integers(piece, section, "offsets", n_cells)
         if len(ends) != n_cells:
-            raise MeshError(f"{n_cells} cells are announced, there are {len(ends)} offsets")
+            raise MeshError(f"{n_cells} cells are announced, found {len(ends)} offsets")
         return Lists(np.concatenate([[0], ends]), self._integers(piece, section, "connectivity", int(ends[-1])))
 
     def _integers(self, piece: ElementTree.Element, section: str, name: str, n_values: int) -> Ints:
@@ -163,7 +163,7 @@ class Reader:
         raise MeshError(f"<{section}> has no array '{name}' of integers")
 
     def arrays(self, piece: ElementTree.Element, section: str, n_rows: int) -> dict[str, NDArray[Any]]:
-        """Return the arrays of a section by name, shape (n_rows,) or (n_rows, components); texts are passed over."""
+        """Return the arrays of a section by name, shape (n_rows,) or (n_rows, components); strings are skipped."""
         arrays = {}
         for element in piece.iterfind(f"{section}/DataArray"):
             name = element.get("Name", section)
@@ -171,11 +171,11 @@ class Reader:
                 continue
             arrays[name] = self._array(element, section, n_rows)
             if len(arrays[name]) != n_rows:
-                raise MeshError(f"array '{name}' of <{section}> has {len(arrays[name])} rows, wanted are {n_rows}")
+                raise MeshError(f"array '{name}' of <{section}> has {len(arrays[name])} rows, expected {n_rows}")
         return arrays
 
     def _array(self, element: ElementTree.Element, section: str, n_rows: int) -> NDArray[Any]:
-        """Return an array, whose rows its reader counts; compressed ones must have as many as are wanted."""
+        """Return an array; the caller checks its number of rows, except that compressed ones must have `n_rows`."""
         try:
             code = CODES.get(element.get("type", ""))
             if code is None:
@@ -188,7 +188,7 @@ class Reader:
             raise MeshError(f"array '{name}' of <{section}> is damaged: {error}") from None
 
     def _values(self, element: ElementTree.Element, code: str, n_values: int) -> NDArray[Any]:
-        """Return the values of an array; raise ValueError or what decoding raises."""
+        """Return the values of an array; raise ValueError or an error of the decoder if it is damaged."""
         text = (element.text or "").split()
         match element.get("format", "ascii"):
             case "ascii" if code.startswith("f"):
@@ -206,10 +206,10 @@ class Reader:
                 raise ValueError(f"format {other[:40]} is not read")
         return np.frombuffer(data, np.dtype(self._order + code))
 
-    def _bytes(self, coded: memoryview, is_raw: bool, wanted: int) -> bytes | memoryview:
-        """Return the data that `coded` begins with: behind a header, base64 or raw, in compressed blocks or not.
+    def _bytes(self, coded: memoryview, is_raw: bool, expected: int) -> bytes | memoryview:
+        """Return the data at the start of `coded`: after a header, base64 or raw, plain or in compressed blocks.
 
-        Compressed data must have the bytes that are wanted, by their header, before they are inflated.
+        The header of compressed data is checked against the expected number of bytes before decompression.
         """
         size = self._header.itemsize
         (count,) = self._sizes(coded, 1, is_raw)
@@ -217,14 +217,14 @@ class Reader:
             head_alone, rest = _split(coded, size, is_raw)
             if is_raw or coded[: _length(size)].tobytes().endswith(b"="):
                 return _split(rest, count, is_raw)[0]
-            return _split(coded, size + count, is_raw)[0][len(head_alone) :]  # header and data are coded as one
+            return _split(coded, size + count, is_raw)[0][len(head_alone) :]  # header and data are one base64 text
         if count == 0:
             return b""
         _, block, last, *compressed = self._sizes(coded, 3 + count, is_raw)
-        sizes = [block] * (count - 1) + [last or block]  # of the blocks when they are inflated
-        if sum(sizes) != wanted:
-            raise ValueError(f"its header announces {sum(sizes)} bytes, {wanted} are wanted")
-        self._n_bytes += wanted
+        sizes = [block] * (count - 1) + [last or block]  # of the decompressed blocks
+        if sum(sizes) != expected:
+            raise ValueError(f"its header announces {sum(sizes)} bytes, expected {expected}")
+        self._n_bytes += expected
         refuse_too_large(self._n_bytes)
         data = _split(_split(coded, (3 + count) * size, is_raw)[1], sum(compressed), is_raw)[0]
         ends = np.cumsum([0, *compressed]).tolist()
@@ -238,20 +238,20 @@ class Reader:
 
 
 def _split(coded: memoryview, size: int, is_raw: bool) -> tuple[bytes | memoryview, memoryview]:
-    """Return the first `size` bytes, decoded, and what is coded behind them; raise ValueError where there are fewer."""
+    """Return the first `size` bytes, decoded, and the rest, still coded; raise ValueError if there are fewer."""
     length = size if is_raw else _length(size)
     data = coded[:length] if is_raw else base64.b64decode(coded[:length], validate=True)
     if len(data) < size:
-        raise ValueError(f"{size} bytes are announced, {len(data)} are there")
+        raise ValueError(f"{size} bytes are announced, found {len(data)}")
     return data[:size], coded[length:]
 
 
 def _length(size: int) -> int:
-    """Return the number of characters of so many bytes in base64."""
+    """Return the number of base64 characters of `size` bytes."""
     return 4 * -(-size // 3)
 
 
-#: By the type of the file: what reads a piece.
+#: The methods that read a piece, by the type of the file.
 GRIDS: dict[str, Callable[[Reader, ElementTree.Element], Grid]] = {
     "UnstructuredGrid": Reader.unstructured,
     "PolyData": Reader.poly,
@@ -261,10 +261,10 @@ GRIDS: dict[str, Callable[[Reader, ElementTree.Element], Grid]] = {
 
 
 def dims_of(piece: ElementTree.Element, name: str = "Extent") -> list[int]:
-    """Return the numbers of points along the axes of a piece of a lattice."""
+    """Return the number of points along each axis of a piece of a structured grid."""
     text = piece.get(name, "")
     if not re.fullmatch(r"\s*(-?[0-9]{1,9}\s+){5}-?[0-9]{1,9}\s*", text):
-        raise MeshError(f'{piece.tag} has {name}="{text[:40]}": six whole numbers are wanted')
+        raise MeshError(f'{piece.tag} has {name}="{text[:40]}": expected six integers')
     ends = [int(word) for word in text.split()]
     dims = [high - low + 1 for low, high in zip(ends[::2], ends[1::2], strict=True)]
     if min(dims) < 1:

@@ -1,4 +1,4 @@
-"""VTK's unstructured grids as .vtu files: base64 of zlib-compressed blocks, in the machine's byte order.
+"""Write VTK unstructured grids as .vtu files: base64 of zlib-compressed blocks, in native byte order.
 
 Source: "VTK XML Formats", https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html
 """
@@ -20,7 +20,7 @@ from truespring.mesh.files.vtk_grid import WEDGE
 from truespring.mesh.files.vtu import CODES
 
 _NAMES = {np.dtype(code): name for name, code in CODES.items()}
-_BLOCK = 1 << 20  # bytes that are compressed together
+_BLOCK = 1 << 20  # uncompressed bytes of a block
 
 
 def write_vtu(
@@ -35,10 +35,10 @@ def write_vtu(
     Args:
         file: the file.
         points: shape (n_points, 1 to 3); missing components are 0.
-        cells: blocks of a key of CELL_SHAPES and the points of its cells in VTK's order, shape (n_cells, k); of
-            wedges of first order in the order of ELEMENT_KINDS, which VTK's differs from.
-        point_arrays, cell_arrays: by name, a row for each point, or for each cell of all blocks in their order; of
-            floating-point or integer types.
+        cells: blocks of a key of CELL_SHAPES and the points of its cells in VTK's order, shape (n_cells, k); wedges
+            of first order are in the order of ELEMENT_KINDS, which differs from VTK's.
+        point_arrays, cell_arrays: by name, one row per point, or per cell of all blocks in their order; floats or
+            integers.
     """
     blocks = [(kind, nodes[:, WEDGE] if kind == "wedge" else nodes) for kind, nodes in cells]
     sizes = [np.full(len(nodes), nodes.shape[1], dtype=np.int64) for _, nodes in blocks]
@@ -77,7 +77,7 @@ def _array(name: str, values: NDArray[Any]) -> str:
 
 
 def _coded(values: NDArray[Any]) -> str:
-    """Return the numbers of blocks and their sizes as one text in base64, then the compressed blocks as another."""
+    """Return base64 text: the header (number and sizes of blocks), then the compressed blocks."""
     data = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("=")).tobytes()
     blocks = [zlib.compress(data[first : first + _BLOCK]) for first in range(0, len(data), _BLOCK)]
     header = np.array([len(blocks), _BLOCK, len(data) % _BLOCK, *map(len, blocks)], dtype=np.uint64)
