@@ -282,7 +282,7 @@ def test_markers_in_the_body(folder: Path, tmp_path: Path, capsys: pytest.Captur
         ((BENDING, EXAMPLES / "tissue.geo"), ".frd, .dat, .vtu"),
         ((BENDING, BENDING, "--unit", "kg"), "unit = 'kg'"),
         ((BENDING, BENDING, "--unit", "other.frd=mm"), "'other.frd' matches none of"),
-        ((BENDING, BENDING, "--axes", "x,y"), "x, y and z are wanted"),
+        ((BENDING, BENDING, "--axes", "x,y"), "x, y and z"),
         ((BENDING, BENDING, "--shift", "1,2,3,4"), "two or three lengths"),
         ((BENDING, BENDING, "--load-factor", "2"), "not above 0 and at most 1"),
         ((BENDING, BENDING, "--probe", "left-middle-of"), "left-middle-of"),

@@ -1,4 +1,4 @@
-"""Geometry that knows no physics: nodes, elements, named sides, selections."""
+"""Geometry without physics: nodes, elements, named sides, selections."""
 
 from truespring.mesh.cells import CELL_SHAPES as CELL_SHAPES
 from truespring.mesh.cells import quadrature as quadrature

@@ -1,4 +1,4 @@
-"""The cells of other programs' meshes, of first and second order: their shape functions, nodes in VTK's order."""
+"""Cells of first and second order in VTK's node order: reference coordinates, shape functions, quadrature."""
 
 import itertools
 from collections.abc import Iterable
@@ -16,16 +16,16 @@ Groups = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True, eq=False)
 class CellShape:
-    """A kind of cell in its own coordinates.
+    """A kind of cell in reference coordinates.
 
     Attributes:
         vtk_type: VTK's number of the cell type.
-        base: the kind of its corners alone.
-        corners: places of the corners, shape (n_corners, dim).
-        between: the corners midway between which each further node stands.
-        powers: exponents of the functions that span the shape functions, shape (n_nodes, dim + 1): of the own
-            coordinates, and of 1 / (1 - the third), which a pyramid has.
-        facets: what bounds it, by its corners, seen from outside anticlockwise; of a plane cell its edges.
+        base: name of the first-order cell with the same corners.
+        corners: reference coordinates of the corners, shape (n_corners, dim).
+        between: for each further node, the corners whose mean it is.
+        powers: exponents of the basis functions that span the shape functions, shape (n_nodes, dim + 1): of the
+            reference coordinates, and of 1 / (1 - z), nonzero for pyramids only.
+        facets: corners of its faces, anticlockwise seen from outside; of a plane cell its edges.
     """
 
     vtk_type: int
@@ -37,26 +37,26 @@ class CellShape:
 
     @property
     def dim(self) -> int:
-        """The dimensions that it fills."""
+        """Dimension of the cell."""
         return int(self.corners.shape[1])
 
     @cached_property
     def places(self) -> Floats:
-        """The nodes in own coordinates, shape (n_nodes, dim)."""
+        """Reference coordinates of the nodes, shape (n_nodes, dim)."""
         middles = [self.corners[list(few)].mean(axis=0) for few in self.between]
         return np.concatenate([self.corners, np.reshape(middles, (-1, self.dim))])
 
     @cached_property
     def _coefficients(self) -> Floats:
-        """What makes the shape functions of the functions that span them: each is 1 at its node, 0 at all others."""
+        """Coefficients of the shape functions in the basis: each is 1 at its node, 0 at all others."""
         return np.asarray(np.linalg.inv(_product(self.places, self.powers)))
 
     def shapes(self, at: Floats) -> Floats:
-        """Return the shape functions at own coordinates of shape (n, dim), shape (n, n_nodes)."""
+        """Return the shape functions, shape (n, n_nodes), at reference coordinates of shape (n, dim)."""
         return np.asarray(_product(at, self.powers) @ self._coefficients)
 
     def slopes(self, at: Floats) -> Floats:
-        """Return their derivatives by the own coordinates, shape (n, n_nodes, dim)."""
+        """Return the derivatives of the shape functions by the reference coordinates, shape (n, n_nodes, dim)."""
         found = np.empty((len(at), len(self.powers), self.dim))
         for axis in range(self.dim):
             lowered, raised = self.powers.copy(), self.powers.copy()
@@ -69,9 +69,10 @@ class CellShape:
         return found
 
     def smallest_jacobian(self, places: Floats) -> Floats:
-        """Return the smallest Jacobian of cells whose nodes are at `places` [m^dim], shape (n, n_nodes, dim) to (n,).
+        """Return the smallest Jacobian determinant of each cell [m^dim], shape (n,).
 
-        At their nodes and at Gauss points; a cell is folded where it is not positive.
+        `places` are the positions of their nodes [m], shape (n, n_nodes, dim). The Jacobian is taken at the nodes and
+        at Gauss points; a cell is folded where it is not positive.
         """
         smallest = np.full(len(places), np.inf)
         for slopes in self.slopes(np.concatenate([self.places, quadrature(self.base, 2)[0]])):
@@ -79,7 +80,7 @@ class CellShape:
         return smallest
 
     def clipped(self, at: Floats) -> Floats:
-        """Return own coordinates moved into the cell, shape (n, dim): unchanged inside."""
+        """Return reference coordinates, shape (n, dim), those outside the cell moved to its border."""
         inside = np.clip(at, -1.0 if self.base == "pyramid" else 0.0, 1.0)
         if self.base in ("triangle", "tetra", "wedge"):
             flat = inside[:, : 3 if self.base == "tetra" else 2]
@@ -91,11 +92,11 @@ class CellShape:
 
 
 def _product(at: Floats, powers: Floats) -> Floats:
-    """The products of powers of own coordinates, shape (n, n_powers)."""
+    """Return the basis functions, products of powers of the reference coordinates, shape (n, n_powers)."""
     found = np.ones((len(at), len(powers)))
     for axis in range(at.shape[1]):
         found *= at[:, axis, None] ** powers[:, axis]
-    if powers[:, -1].any():  # a pyramid: at its tip the other factors vanish faster
+    if powers[:, -1].any():  # a pyramid: at its apex the other factors vanish faster
         found *= np.maximum(1.0 - at[:, 2, None], _TIP) ** -powers[:, -1]
     return found
 
@@ -104,7 +105,7 @@ _TIP = 1e-9
 
 
 def _powers(exponents: Iterable[tuple[int, ...]]) -> Floats:
-    """Exponents without a factor 1 / (1 - third)."""
+    """Return exponents of polynomials: without the factor 1 / (1 - z) of pyramids."""
     return np.array([(*few, 0) for few in exponents], dtype=float)
 
 
@@ -113,7 +114,7 @@ def _cubic(dim: int, most: int) -> list[tuple[int, ...]]:
 
 
 def _serendipity(dim: int) -> list[tuple[int, ...]]:
-    """One square in each product at most (Arnold and Awanou, 2011: superlinear degree two)."""
+    """Return exponents of products with at most one square (Arnold and Awanou, 2011: superlinear degree two)."""
     return [few for few in _cubic(dim, 2) if few.count(2) <= 1]
 
 
@@ -122,12 +123,13 @@ def _simplex(dim: int, degree: int) -> list[tuple[int, ...]]:
 
 
 def _prism(flat: int, whole: bool) -> list[tuple[int, ...]]:
-    """Of a triangle times a line; not `whole`, without the products of two squares."""
+    """Return exponents of a triangle times a line; without the products of two squares unless `whole`."""
     plane = _simplex(2, flat)
     return [(*few, z) for few in plane for z in range(flat + 1) if whole or flat == 1 or z < 2 or sum(few) < 2]
 
 
-# Of first order the plane times xy / (1 - z); of second also that times x and y: on its triangles both are polynomials.
+# First order: linear functions and xy / (1 - z); second order: quadratic ones, that, and that times x and times y.
+# On the triangular faces all are polynomials.
 _PYRAMID = [(0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1, 1, 0, 1)]
 _PYRAMID_13 = [*((*few, 0) for few in _simplex(3, 2)), (1, 1, 0, 1), (2, 1, 0, 1), (1, 2, 0, 1)]
 
@@ -153,7 +155,7 @@ def _shape(vtk_type: int, base: str, powers: Floats, between: Groups = ()) -> Ce
     return CellShape(vtk_type, base, np.array(_CORNERS[base], dtype=float), between, powers, _FACETS[base])
 
 
-#: By the cell's name, as meshio and scikit-fem spell it. An entry is all that a kind of cell in results needs.
+#: Kinds of cells by name, as meshio and scikit-fem spell it. A new kind of cell in results needs only an entry.
 CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
     {
         "line": _shape(3, "line", _powers(_cubic(1, 1))),
@@ -184,17 +186,17 @@ CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
 
 @cache
 def quadrature(base: str, n: int) -> tuple[Floats, Floats]:
-    """Return Gauss points of a cell in its own coordinates, shape (n^dim, dim), and their weights.
+    """Return Gauss points of a cell in reference coordinates, shape (n^dim, dim), and their weights, shape (n^dim,).
 
-    `base` is a cell of CELL_SHAPES: a line, a quad, a triangle or a tetra. Polynomials of order 2 n - 1 are integrated
-    exactly, of a quad along each axis. Those of simplices are of a collapsed cube, by Gauss-Jacobi points along each
-    axis (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
+    `base` is "line", "quad", "triangle" or "tetra". Polynomials of order 2 n - 1 are integrated exactly, on a quad
+    along each axis. On simplices the points are those of a collapsed cube, Gauss-Jacobi points along each axis
+    (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
     """
     from scipy.special import roots_jacobi
 
     dim = {"line": 1, "quad": 2, "triangle": 2, "tetra": 3}[base]
     collapsed = base in ("triangle", "tetra")
-    at, weights, left = np.zeros((1, 0)), np.ones(1), np.ones(1)  # left: of the height 1 of a simplex
+    at, weights, left = np.zeros((1, 0)), np.ones(1), np.ones(1)  # left: remaining height of a simplex
     for axis in range(dim):
         power = dim - 1 - axis if collapsed else 0
         places, shares = roots_jacobi(n, power, 0)

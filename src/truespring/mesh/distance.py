@@ -1,4 +1,4 @@
-"""Distances between surfaces: of segments that bound a plane body, of triangles that bound one in space."""
+"""Distances between surfaces: segments that bound a plane body, triangles that bound a solid."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 
-# Rows that are compared with many columns are taken in blocks of about this many numbers, to bound the memory.
+# Size of blocks of rows times columns: limits the memory.
 _BLOCK = 250_000
 
 # Places of a facet at which its distance is taken, as shares of its corners, and their weights in a mean square.
@@ -21,16 +21,17 @@ _WEIGHTS = {2: np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) / 24, 3: np.array([3, 3, 3,
 
 
 class Gap(NamedTuple):
-    """How far two surfaces are apart [m]: root mean square over the size of both, and the largest, Hausdorff's."""
+    """Distance between two surfaces [m]: root mean square over the measure of both, and maximum (Hausdorff)."""
 
     rms: float
     max: float
 
 
 def gap(mine: Floats, theirs: Floats) -> Gap:
-    """Measure surfaces against each other both ways; facets of shape (n, 2, 2) or (n, 3, 3) [m], by their corners.
+    """Return the distance between two surfaces, taken in both directions.
 
-    Distances are taken at nine places of each segment, at seven of each triangle.
+    `mine` and `theirs` are the corners of their facets [m], shape (n, 2, 2) or (n, 3, 3). Distances are taken at nine
+    places of each segment, at seven of each triangle.
     """
     if np.array_equal(mine, theirs):
         return Gap(0.0, 0.0)  # exactly, which feet of perpendiculars are not
@@ -41,17 +42,17 @@ def gap(mine: Floats, theirs: Floats) -> Gap:
 
 
 def _apart(facets: Floats, others: Floats) -> Floats:
-    """Distance of places of each facet to the nearest of the others [m], shape (n, places)."""
+    """Return the distance of places on each facet to the nearest of the others [m], shape (n, places)."""
     shares = _PLACES[facets.shape[1]]
     places = np.einsum("pc,ncd->npd", shares, facets)
     return distance_to(places.reshape(-1, facets.shape[2]), others).reshape(-1, len(shares))
 
 
 def distance_to(points: Floats, facets: Floats) -> Floats:
-    """Distance of each point, shape (n, dim) [m], to the nearest facet, shape (m, 2 or 3, dim); shape (n,).
+    """Return the distance of each point to the nearest facet [m], shape (n,).
 
-    Looks at the facets with the nearest middles only; a facet further than these is at least its middle's distance
-    less its own reach away, which tells for which points that was not enough.
+    `points` have shape (n, dim) [m], `facets` shape (m, 2 or 3, dim) [m]. Only the facets with the nearest centres are
+    compared; for points to which a facet with a farther centre may be nearer, more facets are compared.
     """
     from scipy.spatial import KDTree
 
@@ -74,7 +75,7 @@ def distance_to(points: Floats, facets: Floats) -> Floats:
 
 
 def _to_each(points: Floats, facets: Floats) -> Floats:
-    """Distance of each point to each facet of its row [m]; facets of shape (n_points or 1, k, corners, dim)."""
+    """Return distances [m], shape (n_points, k); `facets` have shape (n_points or 1, k, corners, dim)."""
     if facets.shape[2] == 2:
         return _to_segments(points, facets[:, :, 0], facets[:, :, 1])
     a, b, c = facets[:, :, 0], facets[:, :, 1], facets[:, :, 2]
@@ -102,13 +103,13 @@ def _to_segments(points: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def blocks(rows: Ints, n_columns: int) -> list[Ints]:
-    """Cut rows into pieces that, with so many columns each, bound the memory."""
+    """Divide rows into blocks that limit the memory for `n_columns` numbers per row."""
     size = max(1, _BLOCK // n_columns)
     return [rows[first : first + size] for first in range(0, len(rows), size)]
 
 
 def _sizes(facets: Floats) -> Floats:
-    """Length of segments [m], area of triangles [m^2], shape (n,)."""
+    """Return lengths of segments [m] or areas of triangles [m^2], shape (n,)."""
     if facets.shape[1] == 2:
         return np.asarray(np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1))
     spans = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])

@@ -1,4 +1,4 @@
-"""Points joined by cells of any kinds, as other programs have them, and where a place lies among them."""
+"""Grids of cells of any kinds, and interpolation in them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,25 +13,25 @@ from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError
 from truespring.mesh.cells import CELL_SHAPES, CellShape
 
-# A place this far off every cell still belongs to the body: chords of a curved side. A share of the diameter.
+# Tolerance outside of all cells as a fraction of the diameter: sides may be chords of a curve.
 _OUTSIDE = 1e-3
 
-# Own coordinates that moved less than this in a step of Newton's method are found.
+# Newton's method for reference coordinates: tolerance of a step, number of steps.
 _FOUND = 1e-12
 _MOST_STEPS = 30
-_FAR = 4.0  # and those that ran so far away are not in the cell
+_FAR = 4.0  # coordinates beyond this have diverged
 
-# Pairs of a place and a cell that are looked at together, which bounds the memory.
+# Number of pairs of a place and a cell per block: limits the memory.
 _BLOCK = 200_000
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """How values at the points of a grid are carried to other places.
+    """Interpolation from the points of a grid to other places.
 
     Attributes:
-        weights: sparse, shape (n_places, n_points): rows sum to 1. Beyond the grid the nearest cell's own
-            interpolation goes on to the tolerance that belongs to the body, and stops there.
+        weights: sparse, shape (n_places, n_points): rows sum to 1. Just outside the grid, within a tolerance, the
+            nearest cell is extrapolated; farther outside, the value is that of the nearest point.
         distance: to the grid [m], zero inside, shape (n_places,).
         outside: whether a place lies outside of the body, shape (n_places,).
     """
@@ -41,19 +41,19 @@ class Interpolation:
     outside: Bools
 
     def carry(self, values: Floats) -> Floats:
-        """Return values at the places, shape (n_places, ...), of those at the points, shape (n_points, ...)."""
+        """Return interpolated values, shape (n_places, ...); `values` at the points have shape (n_points, ...)."""
         return np.asarray(self.weights @ values)
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Points joined by cells of any kinds.
+    """Points and cells of any kinds.
 
     Attributes:
-        points: at rest [m], shape (n_points, dim).
+        points: undeformed positions [m], shape (n_points, dim).
         cells: point numbers by a key of CELL_SHAPES, in VTK's order, shape (n_cells, k).
 
-    Raises MeshError where a kind is not known or a cell names a point that does not exist.
+    Raises MeshError if a kind is unknown or a cell names a point that does not exist.
     """
 
     points: Floats
@@ -81,7 +81,7 @@ class Grid:
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Dimension of the space."""
         return int(self.points.shape[1])
 
     @property
@@ -91,18 +91,18 @@ class Grid:
 
     @property
     def cell_dim(self) -> int:
-        """The dimensions that its cells fill: 0 of points alone."""
+        """Dimension of the cells, 0 without cells."""
         return max((CELL_SHAPES[kind].dim for kind in self.cells), default=0)
 
     @property
     def fills(self) -> bool:
-        """Whether its cells fill the dimensions of its points, so that it has an inside."""
+        """Whether the cells have the dimension of the space."""
         return self.cell_dim == self.dim
 
     def locate(self, places: Floats) -> Interpolation:
-        """Find the cell that holds each of `places` [m], shape (n, dim), or is nearest to it; see Interpolation.
+        """Return the interpolation to `places` [m], shape (n, dim), from the cells that contain them or are nearest.
 
-        Own coordinates of curved cells are found by Newton's method. Far outside the nearest point stands for a cell.
+        Reference coordinates are found by Newton's method. Far outside, the value is that of the nearest point.
         """
         n_places, width = len(places), max(len(CELL_SHAPES[kind].powers) for kind in self.cells)
         best = np.full(n_places, np.inf)
@@ -126,7 +126,7 @@ class Grid:
         return Interpolation(weights, away, best > self._tolerance)
 
     def _stand_in(self, places: Floats, missing: Bools, best: Floats, columns: Ints, shares: Floats) -> None:
-        """Give places outside of all cells the nearest point of the cells."""
+        """Assign the nearest point to places outside of all cells."""
         from scipy.spatial import KDTree
 
         if not missing.any():
@@ -147,7 +147,7 @@ class Grid:
 
 
 class _Bins:
-    """Cells by the boxes of a regular division of space that theirs touch: few to look at for each place."""
+    """Regular grid of boxes with the cells whose bounding box intersects each."""
 
     def __init__(self, nodes: Floats, tolerance: float) -> None:
         """Take the nodes of each cell, shape (n_cells, k, dim), and how far around it places belong to it [m]."""
@@ -202,9 +202,9 @@ class _Bins:
 
 
 def _found(shape: CellShape, nodes: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Return own coordinates of places (n, dim) in cells with `nodes` (n, k, dim), and how far outside they are [m].
+    """Return reference coordinates of places (n, dim) in cells with `nodes` (n, k, dim), and distances outside [m].
 
-    The coordinates go on beyond the cell; of a place off a surface they are those of its foot.
+    Coordinates of places outside are extrapolated; of places off a surface they are those of the projection.
     """
     own = np.tile(shape.corners.mean(axis=0), (len(places), 1))
     going = np.arange(len(places))
@@ -228,7 +228,7 @@ def _missing(shape: CellShape, nodes: Floats, places: Floats, own: Floats) -> Fl
 
 
 def _solved(jacobian: Floats, missing: Floats) -> Floats:
-    """Return steps that make up for what is missing, at most 1: least squares on a surface, none in a flat cell."""
+    """Return the Newton steps, at most 1: least squares on a surface, zero in a degenerate cell."""
     turned = jacobian.swapaxes(1, 2)
     normal, right = turned @ jacobian, turned @ missing[:, :, None]
     size = np.einsum("naa->n", normal) / normal.shape[1]

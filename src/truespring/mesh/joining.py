@@ -1,4 +1,4 @@
-"""Points that stand at one place, as where each cell of a file has nodes of its own."""
+"""Merge points with equal coordinates, as in files that store the nodes of each cell separately."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from truespring.arrays import Floats, Ints
 
 
 def distinct_points(places: Floats, near: float) -> tuple[Ints, Ints]:
-    """Number the distinct places, those nearer than `near` once, chains of them too.
+    """Number the distinct places; places within a distance of `near`, and chains of such places, count as one.
 
     Args:
-        places: shape (n, dim).
-        near: in the same unit.
+        places: coordinates, shape (n, dim).
+        near: distance, in the unit of `places`.
 
-    Returns a row of each distinct place, shape (n_distinct,), and the number of each row, shape (n,).
+    Returns the first row of each distinct place, shape (n_distinct,), and the number of each row's place, shape (n,).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

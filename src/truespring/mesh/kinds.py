@@ -1,4 +1,4 @@
-"""The table of element kinds: local node numbers only, no coordinates."""
+"""The table of element kinds, by local node numbers."""
 
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -9,26 +9,27 @@ Groups = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True)
 class ElementKind:
-    """The table entry of an element.
+    """An element kind: its connectivity, in local node numbers.
 
     Attributes:
-        dim: the dimensions that it fills.
-        n_nodes: the number of its nodes.
+        dim: dimension of the element.
+        n_nodes: number of nodes.
         edges, diagonals, body_diagonals: the pairs that may carry a spring: edges, diagonals of a
             quadrilateral or of a face, diagonals through the body.
-        facets: what bounds the element, seen from outside anticlockwise; beside quadrilaterals a triangle names its
-            last corner twice: a quadrilateral whose last two corners are one is the same, area and shape functions.
-        corners: neighbours that span a Jacobian at a node, the node first, in right-handed order; the
-            element is inverted where one is not positive. Simplices have the same one at every node. A pyramid has
-            none at its tip, where it vanishes by nature: along a line to there it is that at the base, shrinking.
-        simplices: triangles or tetrahedra, each counted by `simplex_weight`, whose measures add up to
-            the element's own: of a hexahedron both divisions into five, of a wedge or a pyramid two that divide each
-            face of four corners both ways, whose mean is exact.
+        facets: faces of a solid, edges of a plane element, anticlockwise seen from outside. If the element also has
+            quadrilateral faces, a triangle repeats its last corner: a quadrilateral with two equal corners has the
+            same area and shape functions.
+        corners: a node and the neighbours that span the Jacobian there, in right-handed order; the element is
+            inverted if one Jacobian is not positive. Simplices have one for all nodes. A pyramid has none at its apex,
+            where the Jacobian is 0: along a line to the apex it is that at the base, scaled.
+        simplices: triangles or tetrahedra whose measures, times `simplex_weight`, sum to the measure of the element:
+            both divisions of a hexahedron into five, two divisions of a wedge or pyramid that split each quadrilateral
+            face along both diagonals. Their mean is exact.
         vtk: the name of the cell in CELL_SHAPES.
-        sharing: for each pair (edges first) how many elements of an unbounded regular mesh share it;
-            empty where that depends on the mesh.
-        merged: its nodes as the corners of a quadrilateral or hexahedron, of which some are one; so a mesh of several
-            kinds holds it.
+        sharing: for each pair (edges first), the number of elements of an unbounded regular mesh that share it;
+            empty if that depends on the mesh.
+        merged: its nodes as the corners of a quadrilateral or hexahedron with repeated corners, as a mesh of several
+            kinds stores it.
     """
 
     dim: int
@@ -46,7 +47,7 @@ class ElementKind:
 
     @property
     def links(self) -> Links:
-        """All pairs that may carry a spring: edges, then diagonals, then body diagonals."""
+        """Pairs that may carry a spring: edges, then diagonals, then body diagonals."""
         return self.edges + self.diagonals + self.body_diagonals
 
 
@@ -144,7 +145,7 @@ ELEMENT_KINDS: MappingProxyType[str, ElementKind] = MappingProxyType(
     }
 )
 
-#: What `Mesh.element` says of a mesh of several kinds.
+#: `Mesh.element` of a mesh of several kinds.
 MIXED = "mixed"
 
 _PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "polyhedron": "polyhedra"}
@@ -156,7 +157,7 @@ def plural(kind: str) -> str:
 
 
 def counted(count: int, kind: str) -> str:
-    """Say how many cells of a kind there are: "1 wedge", "8 hexahedra"."""
+    """Return a count with the name of a kind of cell: "1 wedge", "8 hexahedra"."""
     return f"{count} {kind if count == 1 else plural(kind)}"
 
 

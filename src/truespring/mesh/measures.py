@@ -1,4 +1,4 @@
-"""What each corner's shape function integrates to over edges, faces and elements: how uniform loads are shared."""
+"""Integrals of the shape functions over edges, faces and elements: the nodal shares of uniform loads."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ _HEXAHEDRON = np.array([[*corner, level] for level in (-1, 1) for corner in _QUA
 
 
 def element_corner_measures(mesh: Mesh) -> Floats:
-    """Integrate each corner's shape function over the elements [m^dim of the kind], shape (n_elements, k).
+    """Return the integral of each corner's shape function over its element [m^dim], shape (n_elements, corners).
 
-    Corners of elements of several kinds that are one have parts that add up.
+    The parts of corners that a mesh of several kinds repeats sum to that of the node.
     """
     whole = corner_measures if mesh.dim == 2 else _hexahedra
     if mesh.element in ("quadrilateral", "hexahedron", MIXED):
@@ -29,10 +29,11 @@ def element_corner_measures(mesh: Mesh) -> Floats:
 
 
 def _hexahedra(corners: Floats) -> Floats:
-    """By 2 x 2 x 2 Gauss points, exact: shape function and Jacobian are of third order along each axis together.
+    """Return the integrals over hexahedra of corners (n, 8, 3), shape (n, 8), by 2 x 2 x 2 Gauss points.
 
-    Also where corners are one, as those of other kinds in `ElementKind.merged`: towards these a Jacobian falls linearly
-    or, of a pyramid, as the square, and the shape functions add up to those of the kind.
+    Exact: the product of shape function and Jacobian is of third order along each axis. This includes repeated corners
+    (`ElementKind.merged`): towards these the Jacobian decreases linearly, in a pyramid quadratically, and the shape
+    functions of equal corners sum to that of the kind.
     """
     share = np.zeros(corners.shape[:2])
     for point in _HEXAHEDRON / np.sqrt(3):
@@ -44,10 +45,10 @@ def _hexahedra(corners: Floats) -> Floats:
 
 
 def corner_measures(corners: Floats) -> Floats:
-    """Integrate each corner's shape function over edges, triangles or quadrilaterals [m^k], shape (n, corners).
+    """Return the integral of each corner's shape function over edges [m] or faces [m^2], shape (n, corners).
 
-    Corners of shape (n, 2 to 4, dim). Quadrilaterals by 2 x 2 Gauss points, exact where they are plane, and where two
-    corners are one, a triangle.
+    `corners` are positions [m], shape (n, 2 to 4, dim). Quadrilaterals use 2 x 2 Gauss points, which is exact for plane
+    ones, also with two equal corners.
     """
     n_corners = corners.shape[1]
     if n_corners < 4:
@@ -64,7 +65,7 @@ def corner_measures(corners: Floats) -> Floats:
 
 
 def facet_measures(corners: Floats) -> Floats:
-    """Length [m] of edges or area [m^2] of triangles and quadrilaterals; corners of shape (n, 2 to 4, dim)."""
+    """Return lengths [m] of edges or areas [m^2] of faces, shape (n,); `corners` [m] of shape (n, 2 to 4, dim)."""
     if corners.shape[1] == 2:
         return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
     if corners.shape[1] == 4:

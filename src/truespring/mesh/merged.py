@@ -1,4 +1,4 @@
-"""Elements of several kinds in one table: each as a quadrilateral or hexahedron, some of whose corners are one."""
+"""Elements of several kinds in one table: each as a quadrilateral or hexahedron, with repeated corners."""
 
 import itertools
 from collections.abc import Mapping
@@ -9,19 +9,19 @@ from truespring.arrays import Bools, Ints
 from truespring.errors import MeshError
 from truespring.mesh.kinds import ELEMENT_KINDS, MIRRORED, MIXED, ElementKind
 
-#: The kind whose corners each element has, by the dimensions that it fills.
+# The kind as which elements are stored, by dimension.
 _WHOLE = {2: "quadrilateral", 3: "hexahedron"}
 
 
 def width(dim: int) -> int:
-    """Return the number of corners that the table has for each element; raise MeshError where there is no such."""
+    """Return the number of columns of the table; raise MeshError unless `dim` is 2 or 3."""
     if dim not in _WHOLE:
         raise MeshError(f"elements of several kinds fill 2 or 3 dimensions, the nodes have {dim}")
     return ELEMENT_KINDS[_WHOLE[dim]].n_nodes
 
 
 def mixed_table(cells: Mapping[str, Ints]) -> Ints:
-    """Return elements of several kinds in one table, shape (n_elements, 4 or 8), kind after kind."""
+    """Return elements of several kinds in one table, shape (n_elements, 4 or 8), in the order of `cells`."""
     tables = []
     for kind, elements in cells.items():
         own = ELEMENT_KINDS.get(kind)
@@ -38,9 +38,9 @@ def mixed_table(cells: Mapping[str, Ints]) -> Ints:
 
 
 def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
-    """Find the kinds in a table: of each the numbers of its elements, ascending, and their own nodes.
+    """Return for each kind in a table the numbers of its elements, ascending, and their nodes, each once.
 
-    Raises MeshError where corners are one that are not in any kind.
+    Raises MeshError if the repeated corners of an element match no kind.
     """
     found, known = {}, np.zeros(len(elements), dtype=bool)
     for name, kind in ELEMENT_KINDS.items():
@@ -60,14 +60,14 @@ def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
 
 
 def kinds_in(elements: Ints, kind: str) -> list[tuple[str, Ints, Ints]]:
-    """Return the kinds in a table of elements of a kind or "mixed": of each its name, numbers and nodes of elements."""
+    """Return name, element numbers and element nodes of each kind in a table; `kind` is a kind or "mixed"."""
     if kind != MIXED:
         return [(kind, np.arange(len(elements)), elements)]
     return [(name, numbers, own) for name, (numbers, own) in unmerged(elements).items()]
 
 
 def mirrored(elements: Ints, kind: str, which: Bools) -> Ints:
-    """Return a table of elements of a kind or "mixed", some of them in the order of their mirror images."""
+    """Return a table with the elements `which` in the node order of their mirror images; `kind` may be "mixed"."""
     found = elements.copy()
     for name, numbers, own in kinds_in(elements, kind):
         here = which[numbers]
@@ -77,16 +77,16 @@ def mirrored(elements: Ints, kind: str, which: Bools) -> Ints:
 
 
 def repeats(elements: Ints) -> Bools:
-    """Tell which elements name a node twice, shape (n_elements,)."""
+    """Return whether each element names a node twice, shape (n_elements,)."""
     ordered = np.sort(elements, axis=1)
     return np.asarray((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
 
 
 def turned(elements: Ints) -> Ints:
-    """Return a table whose elements are turned so that corners that are one stand as `ElementKind.merged` has them.
+    """Return a table with elements rotated so that repeated corners are placed as in `ElementKind.merged`.
 
-    Programs write wedges and pyramids as bricks with corners that are one, whichever these are. What is of no kind
-    stays as it is.
+    Programs write wedges and pyramids as bricks with repeated corners, in various places. Elements that match no kind
+    are unchanged.
     """
     found = elements.copy()
     left = np.flatnonzero(repeats(elements))
@@ -100,7 +100,7 @@ def turned(elements: Ints) -> Ints:
 
 
 def _turns(corners: int) -> list[list[int]]:
-    """The rotations of a square or a cube, each as the order that it brings their corners into."""
+    """Return the rotations of a square or a cube as permutations of its corners."""
     dim = int(corners).bit_length() - 1
     places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
     places = 2 * places[:corners, :dim] - 1
@@ -115,7 +115,7 @@ def _turns(corners: int) -> list[list[int]]:
 
 
 def _are(elements: Ints, kind: ElementKind) -> Bools:
-    """Tell which elements have just those corners as one that the kind has."""
+    """Return whether each element repeats exactly the corners that the kind repeats, shape (n_elements,)."""
     own = np.ones(len(elements), dtype=bool)
     for one in range(elements.shape[1]):
         for other in range(one):

@@ -1,4 +1,4 @@
-"""The mesh: nodes, elements of one kind or of several, and what follows from them alone."""
+"""The mesh: nodes, elements of one or several kinds, groups, and derived quantities."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -31,24 +31,24 @@ _NONE: Mapping[str, Ints] = MappingProxyType({})
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Nodes joined by elements, of one kind or of several; see `of_kinds`.
+    """Nodes and elements of one kind, or of several: see `of_kinds`.
 
     Attributes:
-        nodes: reference positions [m], shape (n_nodes, dim).
-        elements: node numbers, shape (n_elements, nodes of the kind). Of several kinds each is a quadrilateral or
-            hexahedron, some of whose corners are one as `ElementKind.merged` tells.
-        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses); "mixed" of several.
+        nodes: undeformed positions [m], shape (n_nodes, dim).
+        elements: node numbers, shape (n_elements, nodes of the kind). In a mesh of several kinds each is a
+            quadrilateral or hexahedron, with corners repeated as in `ElementKind.merged`.
+        element: the kind, a key of ELEMENT_KINDS; "line" in any dimension (networks, trusses); "mixed" for several.
         node_groups: node numbers by name, ascending; names for supports, loads and probes.
         element_groups: element numbers by name, ascending; names for regions of another material.
         facet_groups: facets by name, shape (n, 2): an element and the number of its facet in its kind's `facets`, in
             lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
             becomes one: the facets' nodes.
-        notes: what should be known of a mesh that was read, in words.
-        middles: where the nodes between the ends of each of `edges` are [m], shape (n_edges, dim), of triangles and
-            tetrahedra of second order; None where edges are straight. Elements of first order have none of them.
+        notes: remarks on the mesh, such as those of a reader.
+        middles: positions of the middle nodes of `edges` [m], shape (n_edges, dim), for triangles and tetrahedra of
+            second order; None if all edges are straight. Elements of first order do not use them.
 
-    Raises MeshError where numbers do not fit each other, an element is inverted, degenerate or there
-    twice, or a node belongs to no element.
+    Raises MeshError if arrays do not match, an element is inverted, degenerate or duplicate, or a node belongs to no
+    element.
     """
 
     nodes: Floats
@@ -96,8 +96,8 @@ class Mesh:
         """Return a mesh of elements of one kind or several.
 
         `cells` are node numbers by kind, keys of ELEMENT_KINDS, each of shape (n, nodes of the kind). Elements are
-        numbered kind after kind. They should meet face to face: where two triangles of other elements lie on a
-        quadrilateral, nodes are joined but not what lies between them.
+        numbered in the order of `cells`. Faces should match: two triangles on a quadrilateral share only its nodes, and
+        displacements between these are not continuous.
         """
         there = {kind: elements for kind, elements in cells.items() if len(elements)}
         if len(there) == 1:
@@ -160,7 +160,7 @@ class Mesh:
         return np.asarray(_DEGENERATE * longest ** (self.kind.dim / 2))
 
     def _refuse(self, bad: Bools, what: str, why: str, places: Callable[[], Floats]) -> None:
-        """Name, count and locate what is wrong."""
+        """Raise MeshError with number, reason and first place if any entry of `bad` is true."""
         if bad.any():
             first = int(bad.argmax())
             place = ", ".join(f"{coordinate:.6g}" for coordinate in places()[first])
@@ -174,7 +174,7 @@ class Mesh:
         for name, facets in self.facet_groups.items():
             given = np.asarray(facets)
             if given.ndim != 2 or given.shape[1:] != (2,) or not np.issubdtype(given.dtype, np.integer):
-                raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are wanted")
+                raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are expected")
             there, last = n_facets(self.elements, self.element), len(self.elements) - 1
             beyond = not len(given) or (given < 0).any() or (given[:, 0] > last).any()
             if beyond or (given[:, 1] >= there[given[:, 0]]).any():
@@ -189,7 +189,7 @@ class Mesh:
 
     @property
     def kind(self) -> ElementKind:
-        """The table entry of the elements; raises MeshError where they are of several kinds."""
+        """The entry of ELEMENT_KINDS; raises MeshError for a mesh of several kinds."""
         if self.element == MIXED:
             raise MeshError(
                 f"this is for elements of one kind, the mesh has {self.kinds} elements: springs and fem take several"
@@ -198,20 +198,20 @@ class Mesh:
 
     @cached_property
     def blocks(self) -> tuple["Block", ...]:
-        """The elements kind by kind."""
+        """The elements by kind."""
         if self.element != MIXED:
             return (Block(np.arange(len(self.elements)), self),)
         return tuple(Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items())
 
     def _part(self, kind: str, elements: Ints) -> "Mesh":
-        """Some elements of one kind on all the nodes, which need not all be theirs: checked with the whole."""
+        """Return a mesh of some elements of one kind on all nodes, without checks."""
         part = object.__new__(Mesh)
         groups = dict.fromkeys(("node_groups", "element_groups", "facet_groups"), _NONE)
         part.__dict__.update(nodes=self.nodes, elements=elements, element=kind, notes=(), **groups)
         return part
 
     def _by_block(self, values: Callable[["Mesh"], Floats]) -> Floats:
-        """What each kind's elements have, in the order of the elements, shape (n_elements,)."""
+        """Return values computed by kind, in the order of the elements, shape (n_elements,)."""
         found = np.empty(len(self.elements))
         for numbers, part in self.blocks:
             found[numbers] = values(part)
@@ -219,12 +219,12 @@ class Mesh:
 
     @property
     def element_kinds(self) -> tuple[str, ...]:
-        """The kinds of its elements, keys of ELEMENT_KINDS."""
+        """Kinds of the elements, keys of ELEMENT_KINDS."""
         return (self.element,) if self.element != MIXED else tuple(part.element for _, part in self.blocks)
 
     @property
     def kinds(self) -> str:
-        """The kind of its elements, to stand before "elements": "wedge"; of several "8 hexahedron and 2 wedge"."""
+        """Kind of the elements in words: "wedge", or of several kinds "8 hexahedron and 2 wedge"."""
         if self.element != MIXED:
             return self.element
         *some, last = (f"{len(numbers)} {part.element}" for numbers, part in self.blocks)
@@ -232,17 +232,17 @@ class Mesh:
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """The elements by VTK's names of their kinds, in the order of `blocks`."""
+        """Elements by key of CELL_SHAPES, in the order of `blocks`."""
         return {part.kind.vtk: part.elements for _, part in self.blocks}
 
     @property
     def element_dim(self) -> int:
-        """The dimensions that its elements fill."""
+        """Dimension of the elements."""
         return self.dim if self.element == MIXED else self.kind.dim
 
     @property
     def dim(self) -> int:
-        """The number of directions."""
+        """Dimension of the space."""
         return int(self.nodes.shape[1])
 
     @property
@@ -271,7 +271,7 @@ class Mesh:
         return self.means(self.nodes)
 
     def means(self, values: Floats) -> Floats:
-        """Return the mean of what each element's nodes have, shape (n_nodes, ...) to (n_elements, ...)."""
+        """Return the means of nodal values, shape (n_nodes, ...), over each element, shape (n_elements, ...)."""
         total = np.zeros((len(self.elements), *values.shape[1:]))
         for numbers, part in self.blocks:
             own = np.zeros((len(numbers), *values.shape[1:]))
@@ -282,9 +282,9 @@ class Mesh:
         return total
 
     def pair_keys(self, pairs: Links) -> Ints:
-        """Return a number for each local pair of nodes of each element, shape (pairs, n_elements).
+        """Return a key for each local pair of nodes of each element, shape (pairs, n_elements).
 
-        The same for the same two nodes: the smaller node number times n_nodes plus the larger one.
+        The key is the smaller node number times n_nodes plus the larger one.
         """
         keys = np.empty((len(pairs), len(self.elements)), dtype=np.int64)
         for key, (one, other) in zip(keys, pairs, strict=True):
@@ -295,38 +295,38 @@ class Mesh:
 
     @cached_property
     def edges(self) -> Ints:
-        """Every edge of the elements once, shape (n_edges, 2)."""
+        """Edges of the elements, each once, shape (n_edges, 2)."""
         keys = np.concatenate([part.pair_keys(part.kind.edges).ravel() for _, part in self.blocks])
         keys.sort(kind="stable")
         return np.stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], self.n_nodes), axis=1)
 
     @cached_property
     def facets(self) -> Ints:
-        """Every facet of every element once, in one element's own order of nodes, shape (n_facets, k).
+        """Facets of the elements, each once, in the node order of one of its elements, shape (n_facets, k).
 
-        Beside quadrilaterals triangles name their last corner twice.
+        In a table with quadrilaterals, triangles repeat their last corner.
         """
         return self.facets_of(self.elements)[0]
 
     @cached_property
     def boundary(self) -> Ints:
-        """The facets that belong to one element only, in that element's own order of nodes, shape (n, k).
+        """Facets that belong to one element only, in the node order of that element, shape (n, k).
 
-        Beside quadrilaterals triangles name their last corner twice. A quadrilateral on which two triangles of other
-        elements lie does not bound the body, nor do they.
+        In a table with quadrilaterals, triangles repeat their last corner. A quadrilateral covered by two triangles of
+        other elements, and these triangles, are not part of the boundary.
         """
         facets, alone = self.facets_of(self.elements)
         found = np.asarray(facets[alone])
         return found[~halved(found)] if self.element == MIXED and self.dim == 3 else found
 
     def facet_nodes(self, facets: Ints) -> Ints:
-        """Return the nodes of facets, given as `facet_groups` holds them; from outside anticlockwise, shape (n, k)."""
+        """Return nodes of facets (see `facet_groups`), anticlockwise seen from outside, shape (n, k)."""
         return facet_nodes(self.elements, self.element, facets)
 
     def facets_of(self, elements: Ints, within: Bools | None = None) -> tuple[Ints, Bools]:
-        """Return each facet of `elements` once, and whether but one of them has it; shapes (n, k) and (n,).
+        """Return each facet of `elements` once, shape (n, k), and whether only one element has it, shape (n,).
 
-        With `within`, true for some nodes, only the facets all of whose nodes are among these.
+        With `within`, shape (n_nodes,), return only the facets for whose nodes it is true.
         """
         facets = facet_columns(elements, self.element)
         if within is not None:
@@ -336,11 +336,11 @@ class Mesh:
 
     @cached_property
     def forms(self) -> Forms:
-        """The elements that translations carry into each other, node by node."""
+        """Elements of equal form: equal up to a translation."""
         return find_forms(self.nodes, self.elements)
 
     def _jacobians(self, at: Corners) -> Iterator[Floats]:
-        """The Jacobian at each corner of elements whose nodes have the coordinates `at`; of lines the length."""
+        """Yield the Jacobian at each corner of elements [m^dim], given node coordinates; for lines the length [m]."""
         if self.element == "line":
             yield np.sqrt(squared_distance(at, 0, 1))
         else:
@@ -349,8 +349,8 @@ class Mesh:
     def corner_jacobians(self, positions: Floats) -> Floats:
         """Return the Jacobian at each corner of each element [m^dim], shape (n_elements, corners).
 
-        For lines, whose Jacobian has no sign, the length. The element is inverted where one is not positive. Of several
-        kinds those with fewer corners have their last one repeated.
+        For lines it is the length. An element is inverted if one of its Jacobians is not positive. In a mesh of several
+        kinds, the last value is repeated for elements with fewer corners.
         """
         if self.element == MIXED:
             most = max(len(block.kind.corners) for _, block in self.blocks)
@@ -366,14 +366,14 @@ class Mesh:
         return found
 
     def smallest_area_ratio(self, positions: Floats) -> float:
-        """Return the smallest corner Jacobian over its rest value: not positive where an element is inverted.
+        """Return the smallest ratio of a deformed to an undeformed corner Jacobian.
 
-        In space it is a ratio of volumes. Not a number where a position is none.
+        It is not positive if an element is inverted. In 3D it is a ratio of volumes. NaN if a position is NaN.
         """
         if self.element == MIXED:
             return float(np.min([part.smallest_area_ratio(positions) for _, part in self.blocks]))
         smallest = np.inf
-        with np.errstate(over="ignore", invalid="ignore"):  # a solver may ask of a state that has run away
+        with np.errstate(over="ignore", invalid="ignore"):  # the state may have diverged
             for part, at in corners_in_slices(positions, self.elements):
                 for jacobian, rest in zip(self._jacobians(at), self._rest_jacobians[part].T, strict=True):
                     smallest = np.minimum(smallest, (jacobian / rest).min())
@@ -385,13 +385,13 @@ class Mesh:
 
     @cached_property
     def measures(self) -> Floats:
-        """Length, area or volume of each element at rest [m^dim of the kind], shape (n_elements,)."""
+        """Undeformed length, area or volume of each element [m^dim], shape (n_elements,)."""
         if self.element == "line":
             return np.asarray(self._rest_jacobians[:, 0])
         return self.measures_at(self.nodes)
 
     def measures_at(self, positions: Floats) -> Floats:
-        """Signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact for each kind."""
+        """Return the signed area or volume of each element at `positions` [m^dim], shape (n_elements,); exact."""
         if self.element == MIXED:
             return self._by_block(lambda part: part.measures_at(positions))
         found = np.zeros(len(self.elements))
@@ -402,7 +402,7 @@ class Mesh:
 
     @cached_property
     def parts(self) -> Ints:
-        """The connected part of the mesh that each node belongs to, numbered from 0, shape (n_nodes,)."""
+        """Number of the connected part of each node, from 0, shape (n_nodes,)."""
         corners = self.elements.astype(np.int32)
         ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
         graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
@@ -410,7 +410,7 @@ class Mesh:
 
 
 class Block(NamedTuple):
-    """The elements of one kind: their numbers in the mesh, ascending, and a mesh of them alone on all its nodes."""
+    """Elements of one kind: their numbers in the mesh, ascending, and a mesh of them on all nodes."""
 
     numbers: Ints
     mesh: Mesh

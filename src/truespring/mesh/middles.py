@@ -1,4 +1,4 @@
-"""Elements of second order: triangles and tetrahedra with a node in the middle of each edge, straight or curved."""
+"""Second-order triangles and tetrahedra: a node in the middle of each edge, straight or curved."""
 
 from typing import NamedTuple
 
@@ -8,32 +8,32 @@ from truespring.arrays import Floats, Ints
 from truespring.mesh.cells import CELL_SHAPES, quadrature
 from truespring.mesh.mesh import Mesh
 
-# The cell of second order that has so many corners: an edge, a triangle, a tetrahedron.
+# Second-order cells by number of corners: edge, triangle, tetrahedron.
 _SHAPES = {2: CELL_SHAPES["line3"], 3: CELL_SHAPES["triangle6"], 4: CELL_SHAPES["tetra10"]}
-# Middles this near to straight edges are on them, a share of the body's diameter.
+# Tolerance of straight edges as a fraction of the body's diameter.
 _STRAIGHT = 1e-9
-# Gauss points along each axis: what a shape function and the Jacobian of a curved tetrahedron make is of fifth order.
+# Gauss points along each axis: shape function times Jacobian of a curved tetrahedron is of fifth order.
 _GAUSS = 3
 
 
 class SecondOrder(NamedTuple):
-    """The nodes of a mesh of elements of second order: those of `mesh`, then one in the middle of each of its edges."""
+    """Nodes of a second-order mesh: those of `mesh`, then one in the middle of each edge."""
 
     mesh: Mesh
 
     @property
     def nodes(self) -> Floats:
-        """Positions at rest [m], shape (n_nodes + n_edges, dim)."""
+        """Undeformed positions [m], shape (n_nodes + n_edges, dim)."""
         return np.concatenate([self.mesh.nodes, self.middles])
 
     @property
     def middles(self) -> Floats:
-        """Positions of the nodes on the edges [m], shape (n_edges, dim): the mesh's own, else halfway."""
+        """Positions of the nodes on the edges [m], shape (n_edges, dim): those of the mesh, else halfway."""
         own = self.mesh.middles
         return self.mesh.nodes[self.mesh.edges].mean(axis=1) if own is None else own
 
     def of(self, cells: Ints) -> Ints:
-        """Return all nodes of edges, triangles or tetrahedra given by their corners, in VTK's order."""
+        """Return the nodes of cells given by corners, shape (n, k), in VTK's order, shape (n, n_nodes)."""
         shape = _SHAPES.get(cells.shape[1])
         if shape is None:
             return cells
@@ -41,7 +41,7 @@ class SecondOrder(NamedTuple):
         return np.concatenate([cells, middles], axis=1)
 
     def shares(self, cells: Ints) -> Floats:
-        """Integrate each shape function over cells as `of` returns them [m^k], shape (n, k); of nodes alone 1."""
+        """Return the integral of each shape function over cells from `of` [m^k], shape (n, k); 1 for single nodes."""
         if cells.shape[1] == 1:
             return np.ones(cells.shape)
         shape = next(one for one in _SHAPES.values() if len(one.powers) == cells.shape[1])
@@ -55,21 +55,22 @@ class SecondOrder(NamedTuple):
 
 
 def edge_numbers(mesh: Mesh, pairs: Ints) -> Ints:
-    """Return the number in `mesh.edges` of pairs of nodes that are edges, shape (..., 2) to (...)."""
+    """Return the number in `mesh.edges` of edges given by their ends, shape (..., 2); the result has shape (...)."""
     low, high = pairs.min(axis=-1), pairs.max(axis=-1)
     keys = mesh.edges[:, 0] * mesh.n_nodes + mesh.edges[:, 1]  # ascending, as the edges are
     return np.asarray(np.searchsorted(keys, low * mesh.n_nodes + high))
 
 
 def fitting_middles(mesh: Mesh, pairs: Ints, places: Floats) -> tuple[Floats | None, int]:
-    """Return the middle of each edge of a mesh [m], None where all are straight, and how many elements did not fit.
+    """Return the middle nodes of the edges of a mesh [m], and the number of elements that they would fold.
 
-    These are folded by the middles given; their edges stay straight, and so do those that have no middle given.
+    The middle nodes have shape (n_edges, dim), None if all edges are straight. Edges of elements that would be folded,
+    and edges without a given middle, are straight.
 
     Args:
-        mesh: of triangles or tetrahedra.
-        pairs: the ends of edges, in any order and any number of times, shape (n, 2); the last one counts.
-        places: the middle of each [m], shape (n, dim).
+        mesh: a mesh of triangles or tetrahedra.
+        pairs: ends of edges, shape (n, 2); of repeated edges the last one is used.
+        places: position of the middle node of each [m], shape (n, dim).
     """
     straight = mesh.nodes[mesh.edges].mean(axis=1)
     middles = straight.copy()

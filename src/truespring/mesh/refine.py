@@ -1,4 +1,4 @@
-"""Meshes of half the size: each element divided at the middles of its edges, faces and body."""
+"""Uniform refinement: divide each element at the middles of its edges, faces and body."""
 
 import itertools
 from collections.abc import Sequence
@@ -17,20 +17,20 @@ from truespring.mesh.mesh import Mesh
 from truespring.mesh.middles import SecondOrder, edge_numbers, fitting_middles
 from truespring.mesh.rows import ascending, distinct_rows
 
-# A tetrahedron's corners and middles of its edges, in the order of the kind's own: four corners are cut off, and the
+# Nodes of a tetrahedron: corners, then middles of its edges in the order of the kind. Four corners are cut off, and the
 # octahedron between them is halved twice through the middles of two opposite edges.
 _TETRAHEDRON = (
     *((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)),
     *((4, 5, 6, 8), (4, 6, 7, 8), (6, 8, 9, 7), (5, 6, 8, 9)),
 )
 
-# A wedge's corners, middles of its edges, then of its faces of four corners: four wedges below and four above.
+# Nodes of a wedge: corners, middles of edges, middles of quadrilateral faces. Four wedges below, four above.
 _WEDGE = (
     *((0, 6, 8, 12, 15, 17), (6, 1, 7, 15, 13, 16), (8, 7, 2, 17, 16, 14), (6, 7, 8, 15, 16, 17)),
     *((12, 15, 17, 3, 9, 11), (15, 13, 16, 9, 4, 10), (17, 16, 14, 11, 10, 5), (15, 16, 17, 9, 10, 11)),
 )
-# A pyramid's corners, middles of its edges and of its base: pyramids at its five corners and one upside down in the
-# middle, and a tetrahedron at each edge of the base between them.
+# Nodes of a pyramid: corners, middles of edges, middle of the base. Pyramids at the corners, an inverted one in
+# the middle, and a tetrahedron at each edge of the base.
 _PYRAMID = (
     *((0, 5, 13, 8, 9), (5, 1, 6, 13, 10), (13, 6, 2, 7, 11), (8, 13, 7, 3, 12)),
     *((9, 10, 11, 12, 4), (9, 12, 11, 10, 13)),
@@ -39,27 +39,28 @@ _BETWEEN = ((5, 9, 10, 13), (6, 10, 11, 13), (7, 11, 12, 13), (8, 12, 9, 13))
 
 
 class _Division(NamedTuple):
-    """How an element is divided: the corners whose middle each new node is, and the children by kind and nodes."""
+    """Division of an element: for each new node the corners whose mean it is; kind and nodes of each child."""
 
     parents: tuple[tuple[int, ...], ...]
     children: tuple[tuple[str, tuple[int, ...]], ...]
 
 
 def refined(mesh: Mesh) -> Mesh:
-    """Return the mesh with each edge halved: two elements a line, four a face, eight a body; groups are carried over.
+    """Return the mesh with each edge halved: four elements for each plane one, eight for each solid one.
 
-    Of a pyramid six pyramids and four tetrahedra. A group of elements or of facets has their parts, and its group of
-    nodes those of the parts. To a group of nodes alone a new node belongs where all nodes that it is the middle of do.
-    Edges through middles of their own are divided there, and go on as curves; where parts would be folded all are
-    taken for straight, and a note says so.
-    Raises MeshError for lines, and where a face of four corners lies on two triangles.
+    A pyramid becomes six pyramids and four tetrahedra. Groups are kept: groups of elements or facets have the parts of
+    their members, and the nodes of these; a group of nodes alone gains the new nodes whose parents are all in it.
+    Curved edges are divided at their middle node, and their halves are curved; if an element would be folded, all edges
+    become straight, with a note.
+
+    Raises MeshError for lines, and if a quadrilateral face lies on two triangles.
     """
     if mesh.element == MIXED and mesh.dim == 3:
         facets, alone = mesh.facets_of(mesh.elements)
         if halved(facets[alone]).any():
             raise MeshError(
-                "this mesh cannot be refined: faces of four corners lie on two triangles of other elements, which new "
-                "nodes would tear apart; put pyramids between them, or refine it where it was made"
+                "this mesh cannot be refined: quadrilateral faces lie on two triangles of other elements, which new "
+                "nodes would separate; put pyramids between them, or refine it in the program that made it"
             )
     try:
         return _refined(mesh)
@@ -111,14 +112,14 @@ def _refined(mesh: Mesh) -> Mesh:
 
 
 def _halfway(mesh: Mesh, groups: Ints) -> Floats:
-    """The middle of groups of nodes [m], shape (n, dim): of the ends of an edge the mesh's own."""
+    """Return the mean position of each group of nodes [m], shape (n, dim); of curved edges the middle node."""
     if mesh.middles is None:
         return np.asarray(mesh.nodes[groups].mean(axis=1))
     return np.asarray(mesh.middles[edge_numbers(mesh, groups)])
 
 
 def _curved(finer: Mesh, mesh: Mesh) -> Mesh:
-    """The refined mesh with edges that lie where those of elements of second order are, inside them too."""
+    """Return the refined mesh with the middle nodes of its edges on the second-order elements of `mesh`."""
     whole, (_, children) = SecondOrder(mesh), _division(mesh.element)
     corners = np.array([nodes for _, nodes in children])
     local_edges = corners[:, np.array(mesh.kind.edges)].reshape(-1, 2)
@@ -130,9 +131,9 @@ def _curved(finer: Mesh, mesh: Mesh) -> Mesh:
 
 
 def _children(mesh: Mesh, divisions: Sequence[_Division], numbers: Sequence[Ints]) -> tuple[str, Ints, Ints]:
-    """The kind and the table of all children, those of an element one after the other, and the first of each element.
+    """Return kind and table of all children, element after element, and the number of each element's first child.
 
-    `numbers` are the nodes of each kind's elements: corners, then new ones, those of few parents first.
+    `numbers` are the nodes of the elements of each kind: corners, then new nodes by ascending number of parents.
     """
     kinds = {kind for _, children in divisions for kind, _ in children}
     kind = kinds.pop() if len(kinds) == 1 else MIXED
@@ -152,7 +153,7 @@ def _merged(kind: str, nodes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _of_elements(mesh: Mesh, by_kind: Sequence[int]) -> Ints:
-    """A number of each kind for its elements, shape (n_elements,)."""
+    """Return the value of its kind for each element, shape (n_elements,)."""
     found = np.empty(len(mesh.elements), dtype=np.int64)
     for (numbers, _), value in zip(mesh.blocks, by_kind, strict=True):
         found[numbers] = value
@@ -164,7 +165,7 @@ def _children_of(first: Ints, count: Ints) -> Ints:
 
 
 def _parts_of(mesh: Mesh, facets: Ints, first: Ints) -> Ints:
-    """The facets of the children that make up facets of their parents, each as element and local facet."""
+    """Return the facets of children that cover facets of their parents, as element and local facet, shape (n, 2)."""
     found = []
     for numbers, part in mesh.blocks:
         own = facets[np.isin(facets[:, 0], numbers)]
@@ -178,7 +179,7 @@ def _parts_of(mesh: Mesh, facets: Ints, first: Ints) -> Ints:
 
 
 def _by_size(parents: tuple[tuple[int, ...], ...]) -> list[int]:
-    """The places of new nodes in the order in which those of few parents come first."""
+    """Return the indices of new nodes by ascending number of parents."""
     return sorted(range(len(parents)), key=lambda place: (len(parents[place]), place))
 
 
@@ -205,7 +206,7 @@ def _of_one(kind: str, children: tuple[tuple[int, ...], ...]) -> tuple[tuple[str
 
 
 def _of_cube(element: str) -> _Division:
-    """A square or cube: the lattice of three nodes along each axis."""
+    """Return the division of a square or cube by the lattice of three nodes along each axis."""
     dim = ELEMENT_KINDS[element].dim
     ring = ((0, 0), (1, 0), (1, 1), (0, 1))
     corners = ring if dim == 2 else tuple((*corner, level) for level in (0, 1) for corner in ring)

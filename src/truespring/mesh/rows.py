@@ -1,4 +1,4 @@
-"""Rows of integers that are equal, found by sorting numbers that they are packed into."""
+"""Distinct rows of integers, by sorting rows packed into single integers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ _LARGEST = 2**63 - 1
 
 @dataclass(frozen=True, eq=False)
 class Distinct:
-    """Each of some rows once, in lexicographic order.
+    """The distinct rows of a table, in lexicographic order.
 
     Attributes:
-        order: of all rows, those that are equal in the order given, shape (n_rows,).
-        starts: where in that order each distinct one begins, shape (n_distinct,).
+        order: numbers of the rows in lexicographic order (stable), shape (n_rows,).
+        starts: index in `order` of the first of each group of equal rows, shape (n_distinct,).
     """
 
     order: Ints
@@ -24,26 +24,26 @@ class Distinct:
 
     @property
     def first(self) -> Ints:
-        """The first row of each, shape (n_distinct,)."""
+        """Number of the first row of each group, shape (n_distinct,)."""
         return np.asarray(self.order[self.starts])
 
     @property
     def count(self) -> Ints:
-        """How many rows are equal to each, shape (n_distinct,)."""
+        """Number of rows in each group, shape (n_distinct,)."""
         return np.diff(self.starts, append=len(self.order))
 
     @property
     def of(self) -> Ints:
-        """The place of every row among the distinct ones, shape (n_rows,)."""
+        """Number of the group of each row, shape (n_rows,)."""
         places = np.empty(len(self.order), dtype=np.int64)
         places[self.order] = np.repeat(np.arange(len(self.starts)), self.count)
         return places
 
 
 def distinct_rows(columns: Ints | Sequence[Ints]) -> Distinct:
-    """Find the distinct ones among rows, given as their columns, each of shape (n_rows,)."""
+    """Return the distinct rows of a table, given by its columns, each of shape (n_rows,)."""
     keys = _packed(columns)
-    # Of one key the stable order, which is quick for numbers that ascend over long stretches, as those of meshes do.
+    # A stable sort is fast for long ascending runs, as numbers in meshes have.
     order = np.lexsort(keys[::-1]) if len(keys) > 1 else np.argsort(keys[0], kind="stable")
     new = np.zeros(len(order), dtype=bool)
     new[:1] = True
@@ -54,9 +54,9 @@ def distinct_rows(columns: Ints | Sequence[Ints]) -> Distinct:
 
 
 def ascending(columns: Ints | Sequence[Ints]) -> list[Ints]:
-    """Return the columns of the same rows, each row sorted."""
+    """Return the columns of the table with each row sorted."""
     ordered = list(columns)
-    for turn in range(len(ordered)):  # neighbours change places until none need to
+    for turn in range(len(ordered)):  # odd-even transposition sort
         for left in range(turn % 2, len(ordered) - 1, 2):
             one, other = ordered[left], ordered[left + 1]
             ordered[left], ordered[left + 1] = np.minimum(one, other), np.maximum(one, other)
@@ -64,7 +64,7 @@ def ascending(columns: Ints | Sequence[Ints]) -> list[Ints]:
 
 
 def _packed(columns: Ints | Sequence[Ints]) -> list[Ints]:
-    """Keys in whose lexicographic order the rows are in theirs: as many columns in each as an integer holds."""
+    """Return integer keys with the lexicographic order of the rows; each packs as many columns as fit."""
     keys, room = [np.zeros(len(columns[0]), dtype=np.int64)], 1
     for column in columns if len(columns[0]) else ():
         lowest = int(column.min())

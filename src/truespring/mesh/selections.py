@@ -1,4 +1,4 @@
-"""Selections: from what a user writes (a side, a plane, a box, a point) to node numbers and their shares."""
+"""Selections by side, plane, box, point or group: node numbers, facets and nodal shares."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from truespring.mesh.measures import corner_measures, element_corner_measures
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
 
-#: Side names: direction and whether it is the upper end.
+#: Sides by name: axis, and whether it is the upper end.
 SIDES: dict[str, tuple[int, bool]] = {
     "left": (0, False),
     "right": (0, True),
@@ -23,8 +23,7 @@ SIDES: dict[str, tuple[int, bool]] = {
 }
 AXES = "xyz"
 
-# A node lies on a side or plane within this share of the mesh's diameter: well above the rounding
-# of units and shapes, well below any element.
+# Tolerance of sides and planes as a fraction of the mesh's diameter: above rounding, below the size of any element.
 _TOLERANCE = 1e-6
 
 
@@ -38,7 +37,7 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """The nodes within two opposite corners [m], the border included."""
+    """The nodes in the box between two opposite corners [m], including its border."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -46,7 +45,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """The one node nearest to a point [m]; of several equally near, the one with smaller coordinates."""
+    """The node nearest to a point [m]; of several at equal distance, the one with smaller coordinates."""
 
     point: tuple[float, ...]
 
@@ -56,7 +55,7 @@ Selection = str | Plane | Box | Near | Sequence[int]
 
 
 def select(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the nodes selected, ascending; raise MeshError where there is none."""
+    """Return the numbers of the selected nodes, ascending, shape (n,); raise MeshError if there is none."""
     match on:
         case str() if on in mesh.node_groups:
             return mesh.node_groups[on]
@@ -73,9 +72,9 @@ def select(mesh: Mesh, on: Selection) -> Ints:
 
 
 def select_elements(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the elements selected, ascending; raise MeshError where there is none.
+    """Return the numbers of the selected elements, ascending, shape (n,); raise MeshError if there is none.
 
-    `on` is an element group of the mesh, a Box that holds their centres, or element numbers.
+    `on` is an element group of the mesh, a Box that contains their centres, or element numbers.
     """
     match on:
         case str() if on in mesh.element_groups:
@@ -145,18 +144,18 @@ def _numbers(numbers: Sequence[int], n_there: int, what: str) -> Ints:
 
 
 def nearest_node(mesh: Mesh, point: Sequence[float]) -> int:
-    """Return the node nearest to `point` [m]; of several equally near, the one with smaller coordinates."""
+    """Return the node nearest to `point` [m]; of several at equal distance, the one with smaller coordinates."""
     if len(point) != mesh.dim:
-        raise MeshError(f"point {list(point)}: {mesh.dim} coordinates are wanted")
+        raise MeshError(f"point {list(point)}: {mesh.dim} coordinates are expected")
     distance = np.linalg.norm(mesh.nodes - np.array(point), axis=1)
     ties = np.flatnonzero(distance <= distance.min() + 1e-9 * mesh.diameter)
     return int(min(ties, key=lambda node: tuple(mesh.nodes[node])))
 
 
 def named_point(mesh: Mesh, name: str) -> int:
-    """Return the node nearest to a point named by sides joined: "right-middle", "left-top", "middle".
+    """Return the node nearest to a point named by joined sides, such as "right-middle", "left-top" or "middle".
 
-    Of a group of the mesh, the node nearest to the group's centre.
+    For the name of a node group, return the node of the group nearest to its centre.
     """
     if name in mesh.node_groups:
         group = mesh.node_groups[name]
@@ -181,9 +180,9 @@ def named_point(mesh: Mesh, name: str) -> int:
 
 
 def named_facets(mesh: Mesh, on: Selection) -> Ints | None:
-    """Return the facets that a group of the mesh names, each once, from outside anticlockwise; None where none has.
+    """Return the facets of a facet group, anticlockwise from outside, shape (n, 2 to 4); None for other selections.
 
-    Shape (n, 2 to 4). A facet between two elements is there as that of one of them.
+    A facet between two elements is listed once, as that of one of them.
     """
     if not isinstance(on, str) or on not in mesh.facet_groups:
         return None
@@ -192,16 +191,16 @@ def named_facets(mesh: Mesh, on: Selection) -> Ints | None:
 
 
 def loaded(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the nodes that a load acts on, ascending: of a group that names facets, theirs."""
+    """Return the numbers of the nodes that a load acts on, ascending; for a facet group the nodes of its facets."""
     facets = named_facets(mesh, on)
     return select(mesh, on) if facets is None else np.unique(facets)
 
 
 def shares(mesh: Mesh, on: Selection) -> tuple[Ints, Floats]:
-    """Return the nodes that a load acts on and the share of a uniform total that each takes, shape (n,), sum 1.
+    """Return the nodes that a load acts on and their fractions of a uniform load, both of shape (n,), sum 1.
 
-    Consistent with linear elements: the cells that carry the load (`covering`) share by their measure;
-    nodes that none covers share equally.
+    Consistent with linear elements: by the measures of the cells that carry the load (`covering`). Equal for nodes
+    without such cells.
     """
     nodes = loaded(mesh, on)
     covered = covering(mesh, on)
@@ -214,12 +213,11 @@ def shares(mesh: Mesh, on: Selection) -> tuple[Ints, Floats]:
 
 
 def covering(mesh: Mesh, on: Selection) -> tuple[Ints, Floats] | None:
-    """Return the cells that carry a load on a selection, and each corner's part of their measures [m^k].
+    """Return the cells that carry a load on a selection and each corner's part of their measures [m^k].
 
-    Both of shape (n, corners); None where nodes stand alone.
-
-    These are the facets that a group names. Of nodes they are the elements that lie wholly in the selection, else the
-    facets of the boundary that do, else those inside, else the edges: the first of them that reach all nodes.
+    Both have shape (n, corners). For a facet group the cells are its facets. For other selections they are the first of
+    these that cover all nodes: elements within the selection, boundary facets within it, inner facets, edges. None if
+    none of them does.
     """
     named = named_facets(mesh, on)
     if named is not None:
@@ -244,16 +242,16 @@ def covering(mesh: Mesh, on: Selection) -> tuple[Ints, Floats] | None:
 
 
 def _reach(cells: Ints, nodes: Ints) -> bool:
-    """Whether cells of these nodes only have all of them."""
+    """Return whether the cells, which have no other nodes, cover all `nodes`."""
     return len(np.unique(cells)) == len(nodes)
 
 
 def facets_within(mesh: Mesh, on: Selection) -> Ints:
-    """Return the facets that a load per area acts on, seen from outside anticlockwise, shape (n, 2 to 4).
+    """Return the facets that a load per area acts on, anticlockwise seen from outside, shape (n, 2 to 4).
 
-    These are the facets that a group names, on the boundary or inside. Of nodes they are the facets of the boundary
-    all of whose nodes are selected. Beside quadrilaterals triangles name their last corner twice. Raises MeshError
-    where there is none.
+    For a facet group they are its facets, on the boundary or inside; for other selections the boundary facets whose
+    nodes are all selected. In a table with quadrilaterals, triangles repeat their last corner. Raises MeshError if
+    there is none.
     """
     named = named_facets(mesh, on)
     if named is not None:
@@ -271,7 +269,7 @@ def facets_within(mesh: Mesh, on: Selection) -> Ints:
 
 
 def outer_facets(mesh: Mesh, on: Selection) -> Ints:
-    """Return `facets_within`; raise MeshError where one of them lies between two elements and so has no outside."""
+    """Return `facets_within`; raise MeshError if one lies between two elements, where a pressure has no side."""
     facets = facets_within(mesh, on)
     within = np.zeros(mesh.n_nodes, dtype=bool)
     within[facets] = True

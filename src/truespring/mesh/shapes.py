@@ -1,4 +1,4 @@
-"""Shapes that are made here, each a function that returns a Mesh."""
+"""Meshes of simple shapes."""
 
 import math
 from collections.abc import Sequence
@@ -91,7 +91,7 @@ _TWO = ((0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7))
 
 
 def _six_pyramids(corners: Floats, cells: Ints) -> Mesh:
-    """A pyramid on each face of each cell, its tip in the middle."""
+    """Return a mesh of six pyramids per cell, with their apex in its middle."""
     inwards = np.array(ELEMENT_KINDS["hexahedron"].facets)[:, ::-1]
     tips = np.repeat(len(corners) + np.arange(len(cells)), len(inwards))
     pyramids = np.column_stack([cells[:, inwards].reshape(-1, 4), tips])
@@ -99,7 +99,7 @@ def _six_pyramids(corners: Floats, cells: Ints) -> Mesh:
 
 
 def _grid(lengths: Sequence[float], counts: Sequence[int]) -> tuple[Floats, Ints]:
-    """Nodes [m] of a grid, x running fastest, and its rectangles or boxes."""
+    """Return nodes [m] of a grid, x fastest, shape (n_nodes, dim), and its cells, shape (n_cells, 4 or 8)."""
     axes = [np.linspace(0, length, count + 1) for length, count in zip(lengths, counts, strict=True)]
     nodes = np.stack([axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij")][::-1], axis=1)
     strides = np.cumprod([1, *(count + 1 for count in counts)])[:-1]
@@ -111,9 +111,9 @@ def _grid(lengths: Sequence[float], counts: Sequence[int]) -> tuple[Floats, Ints
 
 
 def _body_centred(corners: Floats, cells: Ints) -> Mesh:
-    """The body-centred-cubic tetrahedra: four about the line between the middles of two cells that share a face.
+    """Return body-centred-cubic tetrahedra: four around the line between the middles of two cells that share a face.
 
-    At a face of the outside its middle takes the place of the other cell's: the same tetrahedra, halved.
+    On the boundary the middle of the face replaces that of the other cell: the same tetrahedra, halved.
     """
     hexahedra = Mesh(corners, cells, "hexahedron")
     n_corners, n_cells, n_faces = len(corners), len(cells), len(hexahedra.kind.facets)
@@ -136,7 +136,7 @@ def _body_centred(corners: Floats, cells: Ints) -> Mesh:
 
 
 def refuse_too_large(n_nodes: int, dim: int) -> None:
-    """Raise MeshError where a mesh of `n_nodes` cannot be solved in the memory of this machine."""
+    """Raise MeshError if a solve with `n_nodes` nodes does not fit in the available memory."""
     needed = _BYTES_A_NODE[dim] * n_nodes
     there = available_memory()
     if needed > there:
@@ -154,7 +154,7 @@ def _known(value: str, allowed: Sequence[str], name: str) -> None:
 def _checked(
     size: Sequence[float], elements: Sequence[int], shape: str, axes: str, nodes_a_cell: int = 1
 ) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Lengths [m] and counts of cells along the axes."""
+    """Return lengths [m] and numbers of cells along the axes; raise MeshError if they are invalid."""
     lengths = _values(size, "size", shape, axes)
     counts = _values(elements, "elements", shape, axes)
     if not all(math.isfinite(length) and length > 0 for length in lengths):
@@ -176,4 +176,4 @@ def _values(values: Sequence[float], name: str, shape: str, axes: str) -> tuple[
     try:
         return tuple(float(value) for value in values)
     except (TypeError, ValueError):
-        raise MeshError(f"{name} = {list(values)}: numbers are wanted, lengths in metres") from None
+        raise MeshError(f"{name} = {list(values)}: numbers are expected, lengths in metres") from None

@@ -1,4 +1,4 @@
-"""A deformed body as another program left it: a triangulated piece of the plane, and distances to it."""
+"""Deformed surfaces from other programs: triangulated regions of the plane or in space, and distances to them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,11 +9,11 @@ from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError
 from truespring.mesh.distance import blocks, distance_to, gap
 
-# A place counts as inside a triangle up to this share of the surface's diameter beyond its edges:
-# above the rounding of single precision files, far below any element.
+# Tolerance outside the edges of a triangle as a fraction of the surface's diameter: above the rounding of
+# single-precision files, far below the size of any element.
 _INSIDE = 1e-6
 
-# A triangle of less height over length holds nothing: shares there would be rounding.
+# Triangles with a smaller ratio of height to length contain no place: barycentric coordinates would be rounding.
 _NEEDLE = 1e-6
 
 
@@ -24,10 +24,9 @@ class Surface:
     Attributes:
         points: [m], shape (n_points, 2).
         triangles: point numbers, shape (n_triangles, 3).
-        load_factor: the load level that it belongs to.
+        load_factor: its load level.
 
-    Raises MeshError where there is no triangle, a triangle names a point that does not exist, or no
-    edge bounds the region.
+    Raises MeshError if there is no triangle, a triangle names a point that does not exist, or there is no outline.
     """
 
     points: Floats
@@ -59,7 +58,7 @@ class Surface:
 
     @property
     def facets(self) -> Floats:
-        """The outline by the ends of its edges [m], shape (n_edges, 2, 2)."""
+        """The ends of the edges of the outline [m], shape (n_edges, 2, 2)."""
         return np.asarray(self.points[self.outline])
 
     @property
@@ -78,17 +77,17 @@ class Surface:
         return float(np.linalg.norm(self.upper - self.lower))
 
     def locate(self, places: Floats) -> tuple[Ints, Floats, Floats]:
-        """Find the triangle that holds each of `places` [m], shape (n, 2), or one near that it is least beyond.
+        """Find the triangle that contains each of `places` [m], shape (n, 2), or else one near by.
 
-        Returns the triangles' numbers, shape (n,); the barycentric shares of their points, shape (n, 3),
-        sum 1; and the distance to the surface [m], shape (n,), zero inside.
+        Returns the numbers of the triangles, shape (n,); the barycentric coordinates, shape (n, 3), sum 1; and the
+        distance to the surface [m], shape (n,), zero inside.
         """
         from scipy.spatial import KDTree
 
         centres = self._corners.mean(axis=1)
         tree = KDTree(centres)
         slack = _INSIDE * self.diameter
-        # No triangle reaches a place further from its centre: candidates up to there are enough.
+        # No triangle contains a place further from its centre.
         reach = float(np.linalg.norm(self._corners - centres[:, None], axis=2).max()) + slack
         triangle, shares = np.empty(len(places), dtype=np.int64), np.empty((len(places), 3))
         beyond, seen = np.empty(len(places)), np.empty(len(places))
@@ -109,10 +108,10 @@ class Surface:
         return np.asarray(self.points[self.triangles])
 
     def _least_beyond(self, places: Floats, candidates: Ints) -> tuple[Ints, Floats, Floats]:
-        """Pick for each place, among its row of triangles, the one whose edges it is least beyond [m]."""
+        """Return the best candidate triangle for each place, barycentric coordinates, and distance outside [m]."""
         corners = self._corners[candidates]
         to_corner = corners - places[:, None, None]
-        # Twice the signed areas that a place spans with the edge opposite to each corner; their sum is the triangle's.
+        # Twice the signed areas of the triangles of a place and the edge opposite to each corner.
         areas = np.stack([_cross(to_corner[:, :, (c + 1) % 3], to_corner[:, :, (c + 2) % 3]) for c in range(3)], axis=2)
         whole = areas.sum(axis=2, keepdims=True)
         opposite = np.linalg.norm(np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2), axis=3)
@@ -128,12 +127,12 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Shell:
-    """A surface in space.
+    """A triangulated surface in space.
 
     Attributes:
         points: [m], shape (n_points, 3).
         triangles: point numbers, shape (n_triangles, 3).
-        load_factor: the load level that it belongs to.
+        load_factor: its load level.
     """
 
     points: Floats
@@ -142,7 +141,7 @@ class Shell:
 
     @property
     def facets(self) -> Floats:
-        """The triangles by their corners [m], shape (n_triangles, 3, 3)."""
+        """The corners of the triangles [m], shape (n_triangles, 3, 3)."""
         return np.asarray(self.points[self.triangles])
 
 
@@ -151,9 +150,9 @@ class SurfaceDistance:
     """Distances of a body's outline and nodes to a surface [m].
 
     Attributes:
-        outline_rms, outline_max: of either outline to the other one; the rms is taken over the length
-            of both, so that it does not depend on how finely they are divided.
-        nodes_rms, nodes_max: of each node of the body to the nearest point of the surface.
+        outline_rms, outline_max: distance of each outline to the other; the rms is over the length of both, independent
+            of their subdivision.
+        nodes_rms, nodes_max: distance of each node of the body to the nearest point of the surface.
     """
 
     outline_rms: float
@@ -163,7 +162,10 @@ class SurfaceDistance:
 
 
 def surface_distance(positions: Floats, boundary: Ints, surface: Surface) -> SurfaceDistance:
-    """Measure nodes at `positions`, shape (n_nodes, 2), and the outline of edges `boundary` against `surface`."""
+    """Return the distances of a body to a surface.
+
+    `positions` are its nodes [m], shape (n_nodes, 2); `boundary` its outline, node numbers of shape (n_edges, 2).
+    """
     outlines = gap(positions[boundary], surface.points[surface.outline])
     nodes = _nearest(surface.points, positions, 1)[0]
     return SurfaceDistance(
@@ -175,7 +177,7 @@ def surface_distance(positions: Floats, boundary: Ints, surface: Surface) -> Sur
 
 
 def _nearest(points: Floats, places: Floats, n_near: int) -> tuple[Floats, Ints]:
-    """Distances [m] and numbers of the `n_near` points nearest to each place, shapes (n_places, n_near)."""
+    """Return distances [m] and numbers of the `n_near` points nearest to each place, shape (n_places, n_near)."""
     from scipy.spatial import KDTree
 
     distance, number = KDTree(points).query(places, k=np.arange(1, n_near + 1))

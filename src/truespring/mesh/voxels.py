@@ -1,4 +1,4 @@
-"""From a label image to a body: each voxel of an organ a cube, as large as wanted."""
+"""Read a body from a label image: a hexahedron for each voxel, or cubes of a given size."""
 
 import math
 from pathlib import Path
@@ -15,26 +15,24 @@ from truespring.mesh.mesh import Mesh
 from truespring.mesh.shapes import refuse_too_large
 from truespring.units import unit_of
 
-# The image is looked at in so many places along each edge of a cube: it is part of the body where more than
-# half of them are.
+# Samples along each edge of a cube: the cube belongs to the body if more than half of its samples do.
 _SAMPLES = 3
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
 
 @renamed_argument("scale", "unit")
 def read_voxels(file: str | Path, label: int | str, edge: float | None = None, unit: str | float = "mm") -> Mesh:
-    """Read the body of one label from a label image, a hexahedron a voxel.
+    """Read the body with a label from a label image as a mesh of hexahedra.
 
     Args:
         file: the image: .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vti or .npy.
-        label: the body's own, a number, or the name of a segment of a .seg.nrrd file.
-        edge: of the cubes wanted [m]; None takes the voxels as they are, cuboids where their spacing is.
-        unit: the image's unit of length, such as "mm", or "0.2 mm" where one of its is so long; a number is in metres.
+        label: label of the body: a number, or the name of a segment of a .seg.nrrd file.
+        edge: edge length of the cubes [m]; None makes a hexahedron of each voxel, with the spacing of the image.
+        unit: the image's unit of length, such as "mm" or "0.2 mm"; a number is in metres.
 
-    Of several parts that no face joins the largest is taken; the notes say what was left out. Places are those of
-    the image: origin, spacing and direction count; of medical images x points to the patient's left and y to the back
-    (LPS, as in DICOM and ITK). Raises MeshError, with the file, where the image cannot be read
-    or has no such label, or nothing is left of it.
+    Of parts that share no face only the largest is read; a note counts the rest. Node positions follow the origin,
+    spacing and direction of the image; in medical images x points to the patient's left, y to the back (LPS, as in
+    DICOM and ITK). Raises MeshError, with the file, if the image cannot be read, has no such label, or fills no cube.
     """
     scale = unit_of(unit, "length", f"{file}: unit", MeshError)
     if edge is not None and not (math.isfinite(edge) and edge > 0):
@@ -60,21 +58,21 @@ def _mesh(labels: Labels, label: int | str, edge: float | None, scale: float) ->
     filled, notes = _largest_part(filled, label)
     refuse_too_large(int(filled.sum()), 3)
     nodes, elements = _cubes(filled)
-    # The corner of the first voxel; its place is its middle.
+    # Lower corner of the first voxel; the origin is its centre.
     corner = scale * labels.origin + labels.direction @ ((low - 0.5) * spacing)
-    if np.linalg.det(labels.direction) < 0:  # the axes of a mirror image: the order of nodes is mirrored too
+    if np.linalg.det(labels.direction) < 0:  # left-handed axes: mirror the order of nodes
         elements = elements[:, [4, 5, 6, 7, 0, 1, 2, 3]]
     places = corner + (nodes * sides) @ labels.direction.T
     thin = [axis for axis, count in zip("xyz", np.ptp(nodes, axis=0), strict=True) if count == 1]
     if thin:
-        notes.append(f"one cube thick along its {' and '.join(thin)} axis: it bends as no real body does")
+        notes.append(f"one cube thick along its {' and '.join(thin)} axis: its bending stiffness is wrong")
     return Mesh(places, elements, "hexahedron", notes=(*labels.notes, *notes))
 
 
 def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
-    """Which cubes of an edge [m] are filled by more than half."""
+    """Return which cubes of an edge [m] are filled by more than half, shape by the cubes along each axis."""
     counts = np.ceil(np.array(inside.shape) * spacing / edge - 1e-9).astype(int)
-    refuse_too_large(int(counts.prod()) // 8, 3)  # a body fills that much of its box at least, if it is one
+    refuse_too_large(int(counts.prod()) // 8, 3)  # a body is assumed to fill at least an eighth of its box
     at = [
         ((np.arange(count * _SAMPLES) + 0.5) / _SAMPLES * edge / side).astype(int)
         for count, side in zip(counts, spacing, strict=True)
@@ -89,7 +87,7 @@ def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
 
 
 def _largest_part(filled: Bools, label: int | str) -> tuple[Bools, list[str]]:
-    """The largest part whose cubes share faces, without the empty layers around it, and a note on what is left out."""
+    """Return the largest part whose cubes share faces, and a note on the parts left out."""
     parts, n_parts = ndimage.label(filled)
     if n_parts == 1:
         return filled, []
@@ -103,7 +101,7 @@ def _largest_part(filled: Bools, label: int | str) -> tuple[Bools, list[str]]:
 
 
 def _cubes(filled: Bools) -> tuple[Floats, Ints]:
-    """Corners of cubes, counted along the axes, and the eight of each cube."""
+    """Return the corners of cubes, in edges along each axis, shape (n, 3), and those of each cube, shape (m, 8)."""
     shape = np.array(filled.shape) + 1
     corners = np.argwhere(filled)[:, None] + _CORNERS
     numbers = np.ravel_multi_index(tuple(corners.reshape(-1, 3).T), tuple(shape))

@@ -1,4 +1,4 @@
-"""Results whose cells have points of their own, joined where they stand at one place and move alike."""
+"""Merge duplicate points of results: those with equal position and displacement."""
 
 from dataclasses import replace
 
@@ -7,15 +7,15 @@ import numpy as np
 from truespring.mesh.joining import distinct_points
 from truespring.reference.record import Record
 
-# Shares of the body's diameter and of the largest displacement: a vertex as several cells compute it in float32.
+# Tolerances, as fractions of the body's diameter and of the largest displacement: rounding in float32.
 _SAME_PLACE, _ALIKE = 1e-7, 1e-5
 
 
 def joined(record: Record) -> Record:
-    """Return a record whose points at one place are one, where these move alike at every level; and a note.
+    """Return a record with duplicate points merged, and a note; duplicates have equal displacement at every level.
 
-    deal.II and discontinuous elements are written with points of their own for each cell. Where some that stand at
-    one place move apart, as the faces of a crack or of two bodies, all stay as they are.
+    Programs such as deal.II write the points of each cell separately. If some points at equal positions differ in
+    displacement, as on the faces of a crack or of two bodies, no point is merged.
     """
     used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for nodes in record.cells.values())]))
     if not len(used) or not np.isfinite(record.points[used]).all():

@@ -1,4 +1,4 @@
-"""Measured markers: tables of where each was at rest and how far it has moved."""
+"""Read measured markers: tables of undeformed positions and displacements."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ _KNOWN: dict[str, Dimension | None] = {"marker": None, "load_factor": None}
 _KNOWN.update(dict.fromkeys(_LENGTHS, "length"))
 
 _FORM = "marker,x [mm],y [mm],ux [mm],uy [mm]"
-# What else a column of names, and of load factors, may be called.
+# Other names of columns.
 _SYNONYMS = {
     "name": "marker",
     "id": "marker",
@@ -30,7 +30,7 @@ _SYNONYMS = {
 
 
 def _synonyms(names: Sequence[str]) -> dict[str, str]:
-    """Return what the names of other programs mean: U, V, W of VIC-3D, "Points:0" and "displacement:0" of ParaView."""
+    """Return the column for each name of other programs, such as U of VIC-3D, "displacement:0" of ParaView."""
     places = components(names, PLACES)
     moves = components(names, DISPLACEMENTS) or components(names, (), "uvw")
     return {
@@ -41,19 +41,19 @@ def _synonyms(names: Sequence[str]) -> dict[str, str]:
 
 
 def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | None = None) -> Record:
-    """Read the positions of markers from CSV files with a line of column names.
+    """Read markers from CSV files whose first line names the columns.
 
-    Columns are x, y and in space z; ux, uy, uz, the displacement; and, where there are any, `marker`, a name, and
-    `load_factor`: rows with one value of it are a level. Numbers are metres, or in the unit behind a column's name:
-    "x [mm]", "x (mm)", "x_mm". Tables of VIC-3D (X, Y, Z, U, V, W) and ParaView ("Points:0", "displacement:0") are
-    read, too; columns that tell something else are left out, and that is noted.
+    Columns are x, y, in space z, for the undeformed position; ux, uy, uz for the displacement; optional are `marker`, a
+    name, and `load_factor`, whose rows of equal value are a level. Numbers are in metres, or in the unit given in the
+    column's name: "x [mm]", "x (mm)", "x_mm". The columns of VIC-3D (X, Y, Z, U, V, W) and ParaView ("Points:0",
+    "displacement:0") are recognised; other columns are skipped, with a note.
 
     Args:
-        file: where the markers were at rest, and their displacement; with `undeformed`, where they have gone.
-        reading: is called with the share that is read.
-        undeformed: where they were at rest; markers are the same by name, or by row where they have none.
+        file: undeformed positions and displacements; with `undeformed`, deformed positions.
+        reading: called with the fraction that has been read.
+        undeformed: undeformed positions; markers are matched by name, or by row if they have no names.
 
-    Returns a record of kind "csv" in metres. Raises ReferenceFileError with file and line where a file is damaged, a
+    Returns a record of kind "csv" in metres. Raises ReferenceFileError, with file and line, if a file is damaged, a
     level has other markers than the first, or there is no displacement.
     """
     data = _columns(file)
@@ -102,7 +102,7 @@ def _columns(file: Path) -> Columns:
 
 
 def _notes(data: Columns, file: Path) -> tuple[str, ...]:
-    """Return what should be known of the columns; raise where places have units and displacements have none."""
+    """Return notes on the columns; raise ReferenceFileError if only positions, or only displacements, have units."""
     without = [name for name in _LENGTHS if name in data.columns and not data.units[name]]
     having = [name for name in _LENGTHS if name in data.columns and data.units[name]]
     notes = []
@@ -119,12 +119,12 @@ def _notes(data: Columns, file: Path) -> tuple[str, ...]:
 
 
 def _are_halves(without: Sequence[str], having: Sequence[str]) -> bool:
-    """Whether the places are told in one way, the displacements in the other."""
+    """Return whether one list holds only positions and the other only displacements."""
     return len({name[0] == "u" for name in without}) == len({name[0] == "u" for name in having}) == 1
 
 
 def _in_space(data: Columns, axes: list[str], quantity: str = "") -> Floats:
-    """Return a column for each axis, of zeros where there is none, shape (n_rows, 3)."""
+    """Return the columns of a vector [m], zero for missing axes, shape (n_rows, 3)."""
     values = np.zeros((data.n_rows, 3))
     for axis in axes:
         values[:, _AXES.index(axis)] = data.numbers(quantity + axis)
@@ -140,7 +140,7 @@ def _levels(data: Columns) -> list[tuple[float, Ints]]:
 
 
 def _names(data: Columns, rows: Ints, file: Path) -> tuple[str, ...]:
-    """Return the names of the markers in some rows, none where the file has none."""
+    """Return the names of the markers in `rows`, empty if the file has no names."""
     if "marker" not in data.columns:
         return ()
     texts = data.texts("marker")
@@ -158,7 +158,7 @@ def _names(data: Columns, rows: Ints, file: Path) -> tuple[str, ...]:
 def _in_order(
     data: Columns, rows: Ints, names: tuple[str, ...], n_markers: int, load_factor: float, file: Path
 ) -> Ints:
-    """Return the rows of a level in the order of the markers at rest; raise where the markers are others."""
+    """Return the rows of a level in the order of the undeformed markers; raise if the markers differ."""
     level = f"at load_factor {load_factor:g}" if "load_factor" in data.columns else "here"
     if bool(names) != ("marker" in data.columns):
         raise ReferenceFileError(f"{file}:1: only one of both files has a column marker: add it to both, or to none")
@@ -177,7 +177,7 @@ def _in_order(
 
 
 def _refuse_other_rest(data: Columns, places: Floats, points: Floats, rows: Ints, file: Path) -> None:
-    """Raise where a marker rests elsewhere than in the first level."""
+    """Raise ReferenceFileError if the undeformed position of a marker differs from that in the first level."""
     other = (places != points).any(axis=1) & np.isfinite(points).all(axis=1)
     if other.any():
         where = data.line(int(rows[other.argmax()]))

@@ -1,4 +1,4 @@
-"""From a record in its file's own unit and axes to a path in metres, along our axes and from our origin."""
+"""Convert a record in the unit and axes of its file to a solution in metres, in the axes of the study."""
 
 import itertools
 import math
@@ -15,21 +15,22 @@ from truespring.problem import Problem
 from truespring.reference.record import Record
 from truespring.units import unit_of
 
-# A body this thin lies in a plane, a share of its diameter; displacements out of it are as small beside the others.
+# Tolerance of a plane body as a fraction of its diameter, and of the largest displacement.
 _FLAT = 1e-6
 
 
 @dataclass(frozen=True)
 class Placing:
-    """Where a file's body lies.
+    """Unit, axes and position of the body of a file.
 
     Attributes:
         unit: the file's unit of length, such as "mm".
-        axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
-        shift: what is added to its places then [m], shape (3,).
-        load_factor: of a file of one level; None takes full load.
-        full_time: the file's time of full load; None takes 1, or the last time where that is later.
-        force_unit: the file's unit of force, such as "N"; None leaves out energies of files that tell none.
+        axes: axes of the file along x, y and z of the study: with ("x", "z", "-y") the study's y is the file's z, and
+            the study's z is the file's -y.
+        shift: translation after that [m], shape (3,).
+        load_factor: load factor of a file with one level; None means full load.
+        full_time: time of full load in the file; None means 1, or the last time if that is later.
+        force_unit: unit of force in the file, such as "N"; None omits energies, unless the file has them in J.
     """
 
     unit: str = "m"
@@ -43,7 +44,7 @@ class Placing:
         letters = [axis.removeprefix("-") for axis in self.axes]
         if sorted(letters) != list(AXES):
             raise ReferenceFileError(
-                f"axes = {','.join(self.axes)}: x, y and z are wanted in some order, each with or without a minus"
+                f"axes = {','.join(self.axes)}: x, y and z are expected in some order, each with or without a minus"
             )
         if self.load_factor is not None and not 0 < self.load_factor <= 1:
             raise ReferenceFileError(f"load_factor = {self.load_factor:g} is not above 0 and at most 1")
@@ -73,10 +74,10 @@ class Placing:
 
 
 def placed(record: Record, placing: Placing, label: str) -> Solution:
-    """Return a record as a path, its body a mesh of the corners of its cells; see mesh.corner_mesh.
+    """Return a record as a solution on the mesh of the corners of its cells (see mesh.corner_mesh).
 
-    Stability, convergence, loads and supports are not known of it. Raises ReferenceFileError where its cells are no
-    mesh, or its levels no load levels.
+    Its stability, convergence, loads and supports are unknown. Raises ReferenceFileError if the cells are not a valid
+    mesh, or the levels are not load levels.
     """
     record, left_out = _without_unknown(record)
     points = placing.positions(record.points)
@@ -112,7 +113,7 @@ def placed(record: Record, placing: Placing, label: str) -> Solution:
 
 
 def _without_unknown(record: Record) -> tuple[Record, list[str]]:
-    """A record without the points whose displacement it does not tell, and without their cells; and a word on it."""
+    """Return a record without the points of unknown displacement and their cells, and a note on these."""
     known = np.logical_and.reduce([np.isfinite(level.displacement).all(axis=1) for level in record.levels])
     if known.all():
         return record, []
@@ -126,13 +127,13 @@ def _without_unknown(record: Record) -> tuple[Record, list[str]]:
         levels=tuple(replace(level, displacement=level.displacement[known]) for level in record.levels),
         names=tuple(name for name, there in zip(record.names, known, strict=False) if there),
     ), [
-        f"the displacement of {(~known).sum()} of {len(known)} points is not told: they are left out, and {n_left} "
+        f"the displacement of {(~known).sum()} of {len(known)} points is unknown: they were left out, and {n_left} "
         "cells that have them"
     ]
 
 
 def unproven(label: str) -> str:
-    """Return the warning that what was read was not solved here."""
+    """Return the warning that a result was read, not solved."""
     return (
         f"read from {label}, not solved here: its convergence and stability are those of the program that wrote it; "
         "stability not proven"
@@ -140,13 +141,13 @@ def unproven(label: str) -> str:
 
 
 def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[str]]:
-    """The load factor of each level, and what should be known of how they were found."""
+    """Return the load factor of each level, and notes on their origin."""
     times = [level.time for level in record.levels]
     if placing.load_factor is not None:
         if len(times) > 1:
             raise ReferenceFileError(
-                f"{record.file} has {len(times)} levels, a load factor is for a file of one: say the time of full load "
-                "(--full-time) where its times are no load factors"
+                f"{record.file} has {len(times)} levels, a load factor is for a file of one: give the time of full "
+                "load (--full-time) if its times are not load factors"
             )
         return [placing.load_factor], []
     if any(later <= earlier for earlier, later in itertools.pairwise(times)) or times[0] < 0:
@@ -156,7 +157,7 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
     if placing.full_time is not None:
         if last > placing.full_time * (1 + 1e-6):
             raise ReferenceFileError(
-                f"{record.file} goes on to time {last:g}, beyond that of full load, {placing.full_time:g}"
+                f"{record.file} ends at time {last:g}, after the time of full load, {placing.full_time:g}"
             )
         return [_rounded(time / placing.full_time) for time in times], []
     if last <= 1 + 1e-6:
@@ -168,17 +169,17 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
         return [1.0], [f"its only level, of time {last:.6g}, was taken as full load"]
     return [_rounded(time / last) for time in times], [
         f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1, the last as "
-        "full load; --full-time tells another"
+        "full load; change this by --full-time"
     ]
 
 
 def _rounded(load_factor: float) -> float:
-    """Full load exactly, where digits of a file fall short of it."""
+    """Return a load factor, exactly 1 if it is 1 up to the digits of a file."""
     return 1.0 if math.isclose(load_factor, 1.0, rel_tol=1e-6) else load_factor
 
 
 def _dim(record: Record, points: Floats, moves: list[Floats]) -> int:
-    """2 where all lies and moves in a plane of constant z, and no cell fills space."""
+    """Return 2 if all points stay in a plane of constant z and no cell is solid, else 3."""
     if any(kind.startswith(("tetra", "hexahedron", "wedge", "pyramid")) for kind in record.cells):
         return 3
     flat = np.ptp(points[:, 2]) <= _FLAT * np.linalg.norm(np.ptp(points, axis=0))
@@ -187,7 +188,7 @@ def _dim(record: Record, points: Floats, moves: list[Floats]) -> int:
 
 
 def _mesh_first(grid: Grid, nodes: Ints) -> Ints:
-    """The points that a cell or the mesh has, those of the mesh first."""
+    """Return the numbers of the points of the cells and of the mesh, those of the mesh first."""
     used = np.zeros(len(grid.points), dtype=bool)
     for cells in grid.cells.values():
         used[cells] = True
@@ -209,9 +210,9 @@ def told_state(
     energy: float = math.nan,
     applied_force: Floats | None = None,
 ) -> State:
-    """Return a state of which no more is known than how far each point has moved [m], shape (n_points, dim).
+    """Return a state with known displacement [m], shape (n_points, dim); unknown quantities are NaN or None.
 
-    The mesh's nodes are the first of the points; energy [J] and the total applied force [N] where they are told.
+    The first points are the nodes of the mesh. `energy` [J] and the total applied force [N] may be known.
     """
     positions = mesh.nodes + displacement[: mesh.n_nodes]
     unknown = np.full(mesh.dim, math.nan if load_factor else 0.0)

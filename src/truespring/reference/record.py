@@ -1,4 +1,4 @@
-"""What a result file holds, whatever its format: places, cells, and how far each place has moved at each level."""
+"""Contents of a result file of any format: points, cells, and displacements at each level."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from truespring.arrays import Floats, Ints
 
-#: Called by readers of large files with the share that is read, 0 to 1.
+#: Called by readers of large files with the fraction that has been read, 0 to 1.
 Reading = Callable[[float], None]
 
 
@@ -15,10 +15,10 @@ class Level:
     """A load level.
 
     Attributes:
-        time: what the file counts levels by: a time, a load factor or a number.
-        displacement: of each point [the file's unit of length], shape (n_points, 3).
-        energy: stored elastic energy [J, of CalculiX the deck's units], None where the file tells none.
-        force: total of the loads [N, of CalculiX the deck's unit], shape (3,), None where the file tells none.
+        time: time, load factor or number of the level in the file.
+        displacement: displacement of each point [the file's unit of length], shape (n_points, 3).
+        energy: stored elastic energy [J; for CalculiX in the units of the deck], None if the file has none.
+        force: total of the loads [N; for CalculiX in the unit of the deck], shape (3,), None if the file has none.
     """
 
     time: float
@@ -29,18 +29,18 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A result as its file tells it: in its own unit of length, its own axes.
+    """A result in the unit of length and the axes of its file.
 
     Attributes:
-        file: where it was read.
-        kind: the format, such as "frd": becomes the kind of the path.
-        points: where each point was at rest [the file's unit of length], shape (n_points, 3); a plane body has z = 0.
-        cells: rows of `points` by a key of CELL_SHAPES ("quad", "hexahedron20", ...), in VTK's order of
-            nodes, each of shape (n_cells, k); empty for markers.
-        levels: in the file's order, at least one; a state of rest is among them only if the file has it.
-        names: the number or name that the file gives each point, of length n_points.
-        stopped: whether the file tells that the run did not get to its end.
-        notes: what should be known of the file, in words.
+        file: path of the file.
+        kind: format, such as "frd"; also the kind of the solution.
+        points: undeformed position of each point [the file's unit of length], shape (n_points, 3); z = 0 if plane.
+        cells: point numbers by key of CELL_SHAPES ("quad", "hexahedron20", ...), in VTK's node order, each of shape
+            (n_cells, k); empty for markers.
+        levels: at least one level, in the order of the file; the undeformed state only if the file has it.
+        names: number or name of each point in the file, of length n_points, or empty.
+        stopped: whether the run stopped early, according to the file.
+        notes: remarks on the file.
     """
 
     file: Path

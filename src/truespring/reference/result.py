@@ -1,4 +1,4 @@
-"""Any result file, by its content and its suffix: as its file tells it, and as a path."""
+"""Read result files of any format, as a record or as a solution."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -27,10 +27,10 @@ class Format(NamedTuple):
     """A format of result files.
 
     Attributes:
-        recognises: whether a file begins as those of the format do.
-        read: returns the record of a file; takes the file, what to call with the share that is read, and `options`.
+        recognises: returns whether the beginning of a file is that of the format.
+        read: returns the record of a file; takes the file, a callback for progress, and `options`.
         options: which of `field`, `undeformed`, `mesh` it takes.
-        unnoticed: why a truncated file may pass for a whole one, and where; empty where any truncation is an error.
+        unnoticed: when a truncated file is read without an error; empty if any truncation is an error.
         is_marked: whether every file of the format is recognised by its content.
     """
 
@@ -43,7 +43,7 @@ class Format(NamedTuple):
 
 _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
 
-#: By suffix in small letters; of a file that several recognise the one with its suffix counts, else the first.
+#: Formats by lower-case suffix; if several recognise a file, the one with its suffix is used, else the first.
 READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
         ".frd": Format(is_frd, read_frd, unnoticed="truncated after a level it is a run that stopped; a note says so"),
@@ -66,12 +66,12 @@ READERS: MappingProxyType[str, Format] = MappingProxyType(
 
 
 def format_of(file: Path) -> str | None:
-    """Return the key in READERS of a file's format: by its content, else its suffix; None where neither tells."""
+    """Return the key in READERS of a file's format: by its content, else its suffix; None if unknown."""
     return format_by_head(file.suffix, _head(file), {suffix: form.recognises for suffix, form in READERS.items()})
 
 
 def _head(file: Path) -> bytes:
-    """What a file begins with, nothing where it cannot be read: whoever reads it tells why."""
+    """Return the first bytes of a file, empty if it cannot be read (its reader then raises the error)."""
     try:
         with open_file(file, ReferenceFileError) as stream:
             return stream.read(HEAD)
@@ -98,21 +98,22 @@ def read_result(
     mesh: str | Path | None = None,
     reading: Reading | None = None,
 ) -> Solution:
-    """Read a result that another program wrote as a path that can be compared with others.
+    """Read a result of another program as a solution, for comparison with others.
 
     Args:
         file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
             table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
-        axes: the file's axes along ours: ("x", "z", "-y") has its z along our y, and our z against its y.
-        shift: what is added to its places then [m].
-        load_factor: of a file of one level; full load by default.
-        full_time: the file's time of full load; by default 1, or its last time where that is later.
-        force_unit: the file's unit of force, without which the energies of a .dat file are left out.
+        axes: axes of the file along x, y and z of the study: with ("x", "z", "-y") the study's y is the file's z, and
+            the study's z is the file's -y.
+        shift: translation after that [m].
+        load_factor: load factor of a file with one level; full load by default.
+        full_time: time of full load in the file; by default 1, or the last time if that is later.
+        force_unit: unit of force in the file; without it the energies of a .dat file are omitted.
         field, undeformed, mesh, reading: see read_record.
 
-    The path has a mesh of the corners of the file's cells, no loads and no supports; further nodes of its cells are
-    in `all_positions` of its states. Raises ReferenceFileError where the file cannot be read or holds no body.
+    The solution has a mesh of the corners of the file's cells, no loads and no supports; `all_positions` of its states
+    includes the further nodes of the cells. Raises ReferenceFileError if the file cannot be read or has no body.
     """
     placing = Placing(unit, tuple(axes), tuple(shift), load_factor, force_unit, full_time)
     record = read_record(file, field=field, undeformed=undeformed, mesh=mesh, reading=reading)
@@ -127,17 +128,17 @@ def read_record(
     mesh: str | Path | None = None,
     reading: Reading | None = None,
 ) -> Record:
-    """Read a result that another program wrote; its content tells the format, else its suffix.
+    """Read a result of another program as a record; its format is found by content, else by suffix.
 
     Args:
         file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
             table of markers or a .stl file.
-        field: of VTK files, the name of the displacement.
-        undeformed: of tables of markers and STL files, the file with the state at rest.
-        mesh: of .dat files, the deck with nodes and elements.
-        reading: is called with the share that is read, which ascends to 1.
+        field: name of the displacement, for VTK files.
+        undeformed: file with the undeformed state, for tables of markers and STL files.
+        mesh: deck with nodes and elements, for .dat files.
+        reading: called with the fraction that has been read, ascending to 1.
 
-    Raises ReferenceFileError where the file cannot be read, or an option is not for its format.
+    Raises ReferenceFileError if the file cannot be read, or an option does not apply to its format.
     """
     file = Path(file)
     if file.is_dir():
@@ -158,7 +159,7 @@ def read_record(
     for name in given.keys() - READERS[key].options:
         others = ", ".join(other for other, form in READERS.items() if name in form.options)
         raise ReferenceFileError(f"{file}: {name} is not for {key} files, but for {others}")
-    if not (key == ".dat" and file.is_file()):  # of an empty one its reader knows why
+    if not (key == ".dat" and file.is_file()):  # the reader reports empty files
         refuse_unreadable(file)
     try:
         record = READERS[key].read(file, reading, **given)

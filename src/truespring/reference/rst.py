@@ -1,7 +1,7 @@
-"""Results of Ansys Mechanical APDL, .rst, through ansys-mapdl-reader.
+"""Read results of Ansys Mechanical APDL, .rst, by ansys-mapdl-reader.
 
-On a damaged file that library may end its process, fill the memory or never return: it works in a process of its
-own, which hands its arrays over as files.
+On a damaged file that library may crash, exhaust the memory or hang: it runs in a separate process, which writes its
+arrays to files.
 """
 
 import importlib.util
@@ -24,13 +24,12 @@ from truespring.reference.vtk_cells import VTK_EMPTY, sized
 
 _CHILD = "import sys; from truespring.reference.rst import unpack; unpack(sys.argv[1], sys.argv[2])"
 
-# Seconds without a further result set after which the library is held to be caught in a damaged file, beside some
-# for each byte; and memory beyond which it is.
+# Limits beyond which a file counts as damaged: time without a further result set [s] and [s/byte], memory [byte].
 _PATIENCE, _SLOWEST = 60.0, 1e-6
 _MEMORY, _MEMORY_PER_BYTE = 2 << 30, 50
 
-# Words of four bytes: the first record holds 100, its code of results is 12; the second is the header of the results,
-# behind its own length: 80, of Ansys before 14 it was 40, and files were smaller than 2^32 words.
+# Words of four bytes. The first record begins with 100, and its code of results is 12. The second record is the header
+# of the results, preceded by its length: 80; 40 in Ansys before 14, whose files were smaller than 2^32 words.
 # Source: file fdresu.inc of Ansys, whose names the library's _rst_keys.py lists.
 _LENGTH, _HEAD, _WORDS = 103, 105, 185
 _RESULTS = 12
@@ -42,7 +41,7 @@ _AGAIN = "copy it again from where Ansys wrote it"
 
 
 def is_rst(head: bytes) -> bool:
-    """Whether a file begins as Ansys' results do."""
+    """Return whether the beginning of a file is that of an Ansys result."""
     words = (np.frombuffer(head[:12], f"{order}i4") for order in "<>" if len(head) >= 12)
     return any(word[0] == 100 and word[2] == _RESULTS for word in words)
 
@@ -50,14 +49,14 @@ def is_rst(head: bytes) -> bool:
 def read_rst(file: Path, reading: Reading | None = None) -> Record:
     """Read the nodal displacement of all result sets in a .rst file of Ansys.
 
-    Needs `pip install 'truespring[ansys]'`. Cells are as that library gives them to VTK.
+    Needs `pip install 'truespring[ansys]'`. Cells are those that the library passes to VTK.
 
     Args:
         file: the result.
-        reading: is called with the share of the result sets that is read.
+        reading: called with the fraction of the result sets that has been read.
 
-    Returns a record of kind "rst", names being the numbers of nodes, times those of the result sets. Raises
-    ReferenceFileError where the library is missing, the file is damaged, cut off or no structural result.
+    Returns a record of kind "rst", whose names are the node numbers and whose times are those of the result sets.
+    Raises ReferenceFileError if the library is missing, or the file is damaged, truncated or no structural result.
     """
     refuse_unreadable(file)
     if importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None:
@@ -69,7 +68,7 @@ def read_rst(file: Path, reading: Reading | None = None) -> Record:
 
 
 def _header(file: Path) -> tuple[int, bool]:
-    """Return the number of result sets, and whether they are modes; raise where the file does not fit its header."""
+    """Return the number of result sets, and whether they are modes; raise if the header contradicts the file."""
     with open_file(file, ReferenceFileError) as stream:
         data = stream.read(4 * _WORDS)
     order = ">" if data[:4] == (100).to_bytes(4, "big") else "<"
@@ -79,10 +78,14 @@ def _header(file: Path) -> tuple[int, bool]:
     if len(words) < _WORDS:
         raise ReferenceFileError(f"{file} is cut off in its header: {_AGAIN}")
     length, size = int(words[_LENGTH]), file.stat().st_size
-    head = np.where(np.arange(_WORDS - _HEAD) < length, words[_HEAD:_WORDS], 0)  # what an older one lacks is 0
+    head = np.where(
+        np.arange(_WORDS - _HEAD) < length, words[_HEAD:_WORDS], 0
+    )  # words missing in an older header are 0
     end = int(head[_LONG_END] % 2**32 + (head[_LONG_END + 1] << 32)) or int(head[_END])
     if 4 * end > size:
-        raise ReferenceFileError(f"{file} is cut off: its header says {4 * end:,} bytes, it has {size:,}: {_AGAIN}")
+        raise ReferenceFileError(
+            f"{file} is cut off: its header announces {4 * end:,} bytes, it has {size:,}: {_AGAIN}"
+        )
     pointers = head[_POINTERS] % 2**32 + (head[list(_HIGH)] << 32)
     n_sets = int(head[_N_SETS])
     if not 0 <= n_sets <= head[_MOST_SETS] <= size or (pointers < 0).any() or (pointers >= end).any():
@@ -93,7 +96,7 @@ def _header(file: Path) -> tuple[int, bool]:
 
 
 def _run(file: Path, folder: Path, n_sets: int, reading: Reading | None) -> None:
-    """Let the library unpack a file into a folder; raise where it fails, ends, hangs or fills the memory."""
+    """Unpack a file into a folder in a separate process; raise if it fails, hangs or exhausts the memory."""
     import psutil
 
     size = file.stat().st_size
@@ -145,7 +148,7 @@ def _record(file: Path, folder: Path, is_mode: bool) -> Record:
     kept, notes = without_modes(levels, [is_mode] * len(levels))
     n_empty = int((types == VTK_EMPTY).sum())
     if n_empty:
-        notes += (f"{n_empty} elements of types that no body is made of are left out",)
+        notes += (f"{n_empty} elements of types without volume were left out",)
     if n_lost:
         notes += (f"{n_lost} cells lack some of the nodes between their corners: they are taken by their corners",)
     placed = {name: row[nodes] for name, nodes in cells.items()}
@@ -156,7 +159,7 @@ def _record(file: Path, folder: Path, is_mode: bool) -> Record:
 
 
 def unpack(file: str, folder: str) -> None:
-    """Read a file by the library and write its arrays into a folder: mesh.npz, set000000.npy, ..., or refused.txt."""
+    """Read a file by the library; write its arrays to a folder: mesh.npz, set000000.npy, ..., or refused.txt."""
     from ansys.mapdl import reader
 
     result = reader.read_binary(file)
@@ -196,7 +199,7 @@ def _displacement(result: Any, number: int, numbers: Ints) -> Floats:
     names = result.result_dof(number)
     displacement = np.full((len(numbers), 3), np.nan)
     rows = places(numbers, np.asarray(nodes, dtype=np.int64))
-    known = rows >= 0  # of the others no cell is read
+    known = rows >= 0  # no cell that is read has the others
     for axis, name in enumerate(("UX", "UY", "UZ")):
         displacement[rows[known], axis] = values[known, names.index(name)] if name in names else 0.0
     return displacement

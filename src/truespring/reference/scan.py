@@ -1,4 +1,4 @@
-"""Large result files, read once from top to bottom: their lines in columns of fixed width, and where one is wrong."""
+"""Read large result files once, from top to bottom: lines with columns of fixed width, and binary values."""
 
 import re
 from collections.abc import Iterator
@@ -16,20 +16,20 @@ from truespring.errors import ReferenceFileError
 from truespring.opening import open_file
 from truespring.reference.record import Reading
 
-# Lines that are held at a time: what bounds the memory that reading takes beside what is kept.
+# Number of lines in memory at a time: limits the memory use of reading.
 CHUNK = 1 << 12
 
-# A line that is longer is none: it is cut there, and then refused.
+# Length at which a line is cut; what follows the cut then raises an error.
 _LONGEST = 1000
 
-# A number as "%12.5E" writes it, with the blanks in front.
+# A number written by "%12.5E", with leading blanks.
 _WRITTEN = re.compile(rb" *[+-]?(?:\d+\.\d+E[+-]\d{2,3}|nan|inf)", re.IGNORECASE)
 
 _BLANK = np.isin(np.arange(256), list(b" \r\n"))
 
 
 class Scan:
-    """A file that is being read; `line_number` is that of the line that was read last."""
+    """A file that is being read; `line_number` is the number of the last line read."""
 
     def __init__(self, file: Path, stream: BufferedReader, reading: Reading | None) -> None:
         self.file = file
@@ -39,12 +39,12 @@ class Scan:
         self._is_binary = False
 
     def refuse(self, why: str, line_number: int | None = None) -> NoReturn:
-        """Raise ReferenceFileError with the place, the line read last unless another is given."""
+        """Raise ReferenceFileError with the place: byte of a binary file, else line, by default the last one read."""
         where = f"byte {self._stream.tell()}" if self._is_binary else f"line {line_number or self.line_number}"
         raise ReferenceFileError(f"{self.file}: {where}: {why}")
 
     def line(self) -> bytes:
-        """Return the next line with its end, empty at the end of the file."""
+        """Return the next line with its line end; empty at the end of the file."""
         line = self._stream.readline(_LONGEST)
         self.line_number += 1
         if self.line_number % CHUNK == 0:
@@ -52,18 +52,18 @@ class Scan:
         return line
 
     def lines(self, count: int) -> list[bytes]:
-        """Return the next lines with their ends, fewer at the end of the file."""
+        """Return the next `count` lines with their line ends; fewer at the end of the file."""
         lines = list(islice(iter(lambda: self._stream.readline(_LONGEST), b""), count))
         self.line_number += len(lines)
         self._tell()
         return lines
 
     def skip(self, mark: bytes) -> None:
-        """Pass over all lines up to and with the next one that begins with `mark`; refuse where there is none."""
+        """Skip lines up to and including the next one that begins with `mark`; raise ReferenceFileError without one."""
         while line := self.line():
             if line.startswith(mark):
                 return
-        self.refuse(f"the file is cut off: '{mark.decode().strip()}' is wanted at the end of a block")
+        self.refuse(f"the file is cut off: '{mark.decode().strip()}' is expected at the end of a block")
 
     def values(self, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
         """Return the next binary values, shape (count,)."""
@@ -71,18 +71,18 @@ class Scan:
         data = self._stream.read(dtype.itemsize * count)
         self._tell()
         if len(data) < dtype.itemsize * count:
-            self.refuse(f"the file is cut off: {dtype.itemsize * count} bytes are wanted, {len(data)} are there")
+            self.refuse(f"the file is cut off: {dtype.itemsize * count} bytes are expected, {len(data)} were found")
         return np.frombuffer(data, dtype)
 
     def is_at(self, *beginnings: bytes) -> bool:
-        """Tell whether one of these follows, or nothing does."""
+        """Return whether one of `beginnings` or the end of the file follows."""
         place = self._stream.tell()
         following = self._stream.read(max(map(len, beginnings)))
         self._stream.seek(place)
         return not following or following.startswith(beginnings)
 
     def done(self) -> None:
-        """Say that all is read that is wanted."""
+        """Report that reading is complete."""
         if self._reading:
             self._reading(1.0)
 
@@ -91,16 +91,17 @@ class Scan:
             self._reading(min(self._stream.tell() / max(self._size, 1), 1.0))
 
     def columns(self, lines: list[bytes], begins: int, *blocks: tuple[int, int, str]) -> list[NDArray[Any]]:
-        """Return the numbers of lines that were read last.
+        """Return the numbers in the last lines read, in columns of fixed width.
 
-        Columns may be glued ("-1.00000E+00-2.00000E+00"): they are told apart by their width alone.
+        Columns need no separator ("-1.00000E+00-2.00000E+00").
 
         Args:
-            lines: of one length.
-            begins: where the first column begins.
+            lines: the last lines read, of equal length.
+            begins: position of the first column.
             blocks: number of columns, width of each, and "int" or "float".
 
-        Returns an array of shape (n_lines, columns) of each block; refuses where a line is wrong.
+        Returns an array of shape (n_lines, columns) for each block. Raises ReferenceFileError, with the line, if a line
+        is not such a row.
         """
         first = self.line_number - len(lines) + 1
         self._refuse_ragged(lines, first)
@@ -118,17 +119,18 @@ class Scan:
         return found
 
     def glued(self, lines: list[bytes], begins: int, id_width: int, count: int) -> tuple[Ints, Floats]:
-        """Return number and values of lines that were read last, told apart by how numbers are written.
+        """Return node numbers and values in the last lines read, whose values may exceed their columns.
 
-        Programs of Windows, and very small numbers everywhere, have exponents of three digits: such a number is longer
-        than its column where it is negative. One of two digits has a blank or a sign in front, so nothing is ambiguous.
+        On Windows, and for very small numbers, exponents have three digits: negative numbers then exceed their column.
+        Numbers with two digits have a leading blank or sign, so that the result is unambiguous.
 
         Args:
-            lines: of any length.
-            begins, id_width: where the number of a node begins, and its width.
-            count: how many values stand behind it.
+            lines: the last lines read, of any length.
+            begins, id_width: position and width of the node number.
+            count: number of values that follow it.
 
-        Returns shapes (n,) and (n, count); refuses where a line is wrong.
+        Returns arrays of shapes (n,) and (n, count). Raises ReferenceFileError, with the line, if a line is not such a
+        row.
         """
         first = self.line_number - len(lines) + 1
         numbers, values = np.empty(len(lines), dtype=np.int64), np.empty((len(lines), count))
@@ -140,7 +142,7 @@ class Scan:
                 self.refuse(f"{self.shown(line)} has no line end: the file is cut off", first + place)
             if not number.isdigit() or len(found) != count or b"".join(found) != text:
                 self.refuse(
-                    f"{self.shown(line)} is no row of this block: a node and {count} numbers are wanted, with "
+                    f"{self.shown(line)} is no row of this block: a node and {count} numbers are expected, with "
                     "exponents of two or three digits; write the results again, in CalculiX also by *NODE OUTPUT",
                     first + place,
                 )
@@ -158,7 +160,7 @@ class Scan:
             return fields.astype(np.int64 if kind == "int" else np.float64)
         except (ValueError, OverflowError):
             pass
-        numbers = np.empty(fields.shape)  # slower, but it knows where; and Fortran drops the E of a long exponent
+        numbers = np.empty(fields.shape)  # slower, but finds the row; Fortran omits the E of a long exponent
         for (row, column), field in np.ndenumerate(fields):
             number = _number(field, kind)
             if number is None:
@@ -168,7 +170,7 @@ class Scan:
 
     @staticmethod
     def shown(text: bytes) -> str:
-        """Return a piece of the file as it fits into a message."""
+        """Return a piece of the file for a message, shortened, without unprintable characters."""
         read = text.decode("ascii", errors="replace").strip()
         shown = "".join(letter if letter.isprintable() else "?" for letter in read)
         return f"'{shown}'" if len(shown) <= 60 else f"'{shown[:60]}...'"
@@ -194,7 +196,7 @@ def _exponent(text: str) -> tuple[str, str]:
 
 @contextmanager
 def scanning(file: Path, reading: Reading | None) -> Iterator[Scan]:
-    """Open a file that `refuse_unreadable` has let pass."""
+    """Open a file that passed `refuse_unreadable`."""
     try:
         with open_file(file, ReferenceFileError) as stream:
             yield Scan(file, stream, reading)

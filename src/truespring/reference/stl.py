@@ -1,4 +1,4 @@
-"""Deformed bodies that another program wrote as STL: triangles without connectivity and without a unit."""
+"""Read deformed bodies from STL files: triangles without connectivity and without a unit."""
 
 from pathlib import Path
 
@@ -41,21 +41,21 @@ def read_stl(
     The body lies in a plane of constant z, or is a solid that is thin along z, of which the upper face is taken.
 
     Args:
-        problem: what the other program solved; its mesh may be another one.
+        problem: the problem that the other program solved, possibly on another mesh.
         file: the deformed body.
-        load_factor: the load level that it belongs to, above 0, at most 1.
-        undeformed: the body at rest, the same triangles in the same order; it tells which vertex went
-            where, and so the displacement at the problem's nodes: linear between the vertices.
+        load_factor: its load level, above 0, at most 1.
+        undeformed: the undeformed body, the same triangles in the same order; it gives the displacement at the nodes
+            of the problem, linear between vertices.
         unit: the unit of length of both files, such as "mm".
-        axes, shift: the files' axes along ours, and what is added to their places then [m]; see Placing.
+        axes, shift: axes of the files, and translation after that [m]; see Placing.
 
-    Returns a path of kind "stl" with a surface, and with one state where `undeformed` is given.
-    Raises ReferenceFileError where a file cannot be read, is no such body, or does not fit the problem.
+    Returns a solution of kind "stl" with a surface, and with one state if `undeformed` is given. Raises
+    ReferenceFileError if a file cannot be read, is not such a body, or does not match the problem.
     """
     file = Path(file)
     mesh = problem.mesh
     if mesh.dim != 2 or mesh.kind.dim != 2:
-        raise ReferenceFileError(f"{file}: an STL file stands beside a plane body of elements, not beside this mesh")
+        raise ReferenceFileError(f"{file}: an STL file is compared with a plane body of elements, not with this mesh")
     try:
         placing = Placing(unit, axes, shift, load_factor)
     except ReferenceFileError as error:
@@ -85,10 +85,10 @@ def read_stl(
 
 
 def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution:
-    """Read a deformed surface in space from an STL file, ASCII or binary, beside a body or alone.
+    """Read a deformed surface in space from an STL file, ASCII or binary.
 
-    Returns a path of kind "stl" with a shell and no states; of the problem `beside`, else of a mesh of its edges.
-    Raises ReferenceFileError where the file cannot be read.
+    Returns a solution of kind "stl" with a shell and no states, for the problem `beside`, or without one for a mesh of
+    the edges. Raises ReferenceFileError if the file cannot be read.
     """
     facets = read_facets(file, placing)
     first, numbers = distinct_vertices(facets.reshape(-1, 3))
@@ -165,7 +165,7 @@ def _face(facets: Floats, file: Path) -> Bools:
 
 
 def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: Path) -> None:
-    """Raise where upper and lower face do not lie over each other: a tilted or warped sheet, a solid not closed."""
+    """Raise ReferenceFileError if upper and lower face do not match: a tilted or warped sheet, an open solid."""
     if top.any() and bottom.any():
         boxes = [(facets[side, :, :2].min(axis=(0, 1)), facets[side, :, :2].max(axis=(0, 1))) for side in (top, bottom)]
         if np.ptp(boxes, axis=0).max() <= 0.1 * np.linalg.norm(np.ptp(facets, axis=(0, 1))):
@@ -177,7 +177,7 @@ def _refuse_no_solid(facets: Floats, top: Bools, bottom: Bools, file: Path) -> N
 
 
 def _surface(facets: Floats, load_factor: float, file: Path) -> Surface:
-    """Join the facets, shape (n_facets, 3, 2), at their common vertices."""
+    """Return the surface of facets [m], shape (n_facets, 3, 2), joined at their common vertices."""
     first, numbers = distinct_vertices(facets.reshape(-1, 2))
     return _triangulated(facets.reshape(-1, 2)[first], numbers.reshape(-1, 3), load_factor, file)
 
@@ -185,7 +185,7 @@ def _surface(facets: Floats, load_factor: float, file: Path) -> Surface:
 def _matched(
     rest: Floats, deformed: Floats, load_factor: float, rest_file: Path, file: Path
 ) -> tuple[Surface, Surface]:
-    """Return the body at rest and deformed, point for point and triangle for triangle."""
+    """Return the undeformed and the deformed surface, with the same numbering of points and triangles."""
     if len(rest) != len(deformed):
         raise ReferenceFileError(
             f"{file} has {len(deformed)} facets, {rest_file} has {len(rest)}: export both from one mesh, "
@@ -212,12 +212,12 @@ def _matched(
 
 
 def distinct_vertices(places: Floats) -> tuple[Ints, Ints]:
-    """Number the distinct places, nearly equal ones once; return a row of each, and the number of each row."""
+    """Number distinct places, nearly equal ones as one; return the first row of each, and the number of each row."""
     return distinct_points(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
 
 
 def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: Path) -> Surface:
-    """Return the surface without the triangles that merging closed; raise where nothing or no outline is left."""
+    """Return the surface without collapsed triangles; raise ReferenceFileError if it is empty or has no outline."""
     a, b, c = triangles.T
     try:
         return Surface(points, triangles[(a != b) & (b != c) & (c != a)], load_factor)
@@ -229,7 +229,7 @@ def _triangulated(points: Floats, triangles: Ints, load_factor: float, file: Pat
 
 
 def _state(problem: Problem, rest: Surface, surface: Surface, file: Path, unit: str) -> State:
-    """Return the state at the nodes, by linear interpolation of the vertices' displacement."""
+    """Return the state at the nodes, by linear interpolation of the displacement of the vertices."""
     mesh = problem.mesh
     ratio = rest.diameter / mesh.diameter
     if not 1 / _WRONG_UNIT <= ratio <= _WRONG_UNIT:
@@ -275,7 +275,7 @@ def _state_warnings(problem: Problem, rest: Surface, state: State, file: Path) -
 
 
 def _boxes(surface: Surface, mesh: Mesh) -> str:
-    """Say where both lie."""
+    """Return the bounding boxes of surface and mesh in words."""
     return (
         f"lies between {_box(surface.lower)} and {_box(surface.upper)} m, "
         f"the mesh between {_box(mesh.lower)} and {_box(mesh.upper)} m"

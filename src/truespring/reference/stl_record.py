@@ -1,4 +1,4 @@
-"""Two STL files of one body, at rest and deformed, as a record: its surface and where each of its points went."""
+"""Read the undeformed and the deformed surface of a body from two STL files as a record."""
 
 import re
 from pathlib import Path
@@ -11,30 +11,29 @@ from truespring.reference.placing import Placing
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.stl import distinct_vertices, read_facets
 
-# A share of the body's diameter: facets that meet at rest still meet when deformed.
+# Tolerance of common vertices in the deformed body as a fraction of its diameter.
 _APART = 1e-5
 
 
 def is_stl(head: bytes) -> bool:
-    """Whether a file begins as STL's texts do; binary ones have no mark."""
+    """Return whether the beginning of a file is that of an ASCII STL file; binary ones have no mark."""
     return bool(re.match(rb"\s*solid\b[^\n]*\n\s*facet\s+normal\b", head, re.IGNORECASE))
 
 
 def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path | None = None) -> Record:
-    """Read the surface of a body in space from two STL files, which list the same triangles in the same order.
+    """Read the surface of a body from two STL files with the same triangles in the same order.
 
     Args:
         file: the deformed body.
-        reading: is called with the share that is read.
-        undeformed: the body at rest.
+        reading: called with the fraction that has been read.
+        undeformed: the undeformed body.
 
-    Returns a record of kind "stl" of triangles and one level of time 1. Raises ReferenceFileError where a file cannot
-    be read, `undeformed` is missing, or the files do not belong together.
+    Returns a record of kind "stl" of triangles and one level of time 1. Raises ReferenceFileError if a file cannot be
+    read, `undeformed` is missing, or the files do not match.
     """
     if undeformed is None:
         raise ReferenceFileError(
-            f"{file}: a deformed STL file alone does not tell which point went where: give the body at rest, too "
-            "(undeformed)"
+            f"{file}: a deformed STL file alone has no displacement: give the undeformed body, too (undeformed)"
         )
     for one in (file, undeformed):
         refuse_unreadable(one)

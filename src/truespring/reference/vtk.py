@@ -1,4 +1,4 @@
-"""Results in VTK's files: grids and faces of any of its formats, in pieces or not, and .pvd, a series of them."""
+"""Read results in VTK files: grids and surfaces of all formats, in one or several pieces, and .pvd series."""
 
 import itertools
 import math
@@ -21,14 +21,14 @@ from truespring.reference.components import DISPLACEMENTS, components
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import named, refuse_unknown
 
-# Three numbers by these names are a displacement, as Elmer writes it.
+# Scalars of these names are the components of a displacement, as Elmer writes them.
 _ALONE = "uvw"
 
 _KINDS = {**VTK_FORMATS, ".pvd": is_vtk_xml("Collection")}
 
 
 class _Part(NamedTuple):
-    """A file of a series: its time, and what part of the body it holds."""
+    """A file of a series: time, part of the body, path."""
 
     time: float
     part: str
@@ -36,21 +36,21 @@ class _Part(NamedTuple):
 
 
 def read_vtk_result(file: Path, reading: Reading | None = None, field: str | None = None) -> Record:
-    """Read the displacement in a file of VTK's, one level of time 1, or in the series of a .pvd file.
+    """Read the displacement in a VTK file, one level of time 1, or in the series of a .pvd file.
 
-    Points must stand where they were at rest. `strain_energy` of the cells of a file that truespring wrote for
-    elements (J a cell) is summed to the level's energy; what other programs call so may be a density, and what
-    springs have lacks that of volume terms.
+    Points must be at their undeformed positions. The cell array `strain_energy` [J] of finite elements written by
+    truespring is summed to the energy of the level; in files of other programs it may be a density, and that of springs
+    does not include volume terms.
 
     Args:
         file: the result.
-        reading: is called with the share that is read, after each file of a series.
-        field: name of the displacement among the points' arrays; by default the only one that is called
-            displacement, displacements, u, disp or deformation in any spelling, or numbers by its name and that of an
-            axis ("displacement 1", "disp:0", "u_x"), or u, v and w.
+        reading: called with the fraction that has been read, after each file of a series.
+        field: name of the displacement among the point arrays; by default the only one called displacement,
+            displacements, u, disp or deformation in upper or lower case, else scalars by such a name and an axis
+            ("displacement 1", "disp:0", "u_x"), or u, v and w.
 
-    Returns a record whose kind is the file's suffix. Raises ReferenceFileError where a file is damaged, the
-    displacement is not found, or the files of a series do not share points and cells.
+    Returns a record whose kind is the file's suffix. Raises ReferenceFileError if a file is damaged, the displacement
+    is not found, or points or cells differ between files of a series.
     """
     refuse_unreadable(file)
     kind = _kind(file)
@@ -76,21 +76,21 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
 
 
 def _kind(file: Path) -> str:
-    """The format of a file without the point: by its content, else its suffix."""
+    """Return the format of a file, such as "vtu": by its content, else by its suffix."""
     with open_file(file, ReferenceFileError) as stream:
         head = stream.read(HEAD)
     return (format_by_head(file.suffix, head, _KINDS) or ".vtu").lstrip(".")
 
 
 def _series(file: Path) -> tuple[list[_Part], list[str]]:
-    """Return the files of a .pvd file in the order of their times, and what should be known of it."""
+    """Return the files of a .pvd file by ascending time, and notes."""
     try:
         root = root_of(read_file(file, ReferenceFileError))
     except MeshError as error:
         raise ReferenceFileError(f"{file} is no .pvd file, or not a whole one: {error}") from None
     entries = root.findall("Collection/DataSet")
     if not entries:
-        raise ReferenceFileError(f"{file} names no file: a VTKFile of type Collection with DataSets is wanted")
+        raise ReferenceFileError(f"{file} names no file: a VTKFile of type Collection with DataSets is expected")
     parts: list[_Part] = []
     known: set[tuple[float, str]] = set()
     for number, entry in enumerate(entries, 1):
@@ -104,7 +104,7 @@ def _series(file: Path) -> tuple[list[_Part], list[str]]:
         if (time, part) in known:
             raise ReferenceFileError(
                 f"{file}: time {time:g} is there twice: merge the parts of the body into one grid, or give each "
-                "a part of its own (part=)"
+                "a different part (part=)"
             )
         known.add((time, part))
         parts.append(_Part(time, part, one))
@@ -147,7 +147,7 @@ def _cells(grid: Grid, file: Path) -> dict[str, Ints]:
 
 
 def _displacement(grid: Grid, field: str | None, file: Path) -> tuple[Floats, list[str]]:
-    """Return the displacement, shape (n_points, 3), and a word on it where it is told by its parts."""
+    """Return the displacement in the file's unit, shape (n_points, 3), and a note if it was read by components."""
     vectors = {
         name: values for name, values in grid.point_arrays.items() if values.ndim == 2 and values.shape[1] in (2, 3)
     }
@@ -170,7 +170,7 @@ def _displacement(grid: Grid, field: str | None, file: Path) -> tuple[Floats, li
 
 
 def _parts(grid: Grid, field: str | None) -> dict[str, str]:
-    """Return the names of the displacement's parts by axis, of the vector that is asked for; nothing without them."""
+    """Return the names of scalar displacement components by axis, of `field` if given; empty without them."""
     numbers = [name for name, values in grid.point_arrays.items() if values.ndim == 1 and values.dtype.kind == "f"]
     if field is not None:
         return components(numbers, (field.lower(),))
@@ -184,7 +184,7 @@ def _energy(grid: Grid) -> float | None:
 
 
 def _refuse_other_mesh(record: Record, first: Record) -> None:
-    """Raise where a file of a series has other points or cells than its first."""
+    """Raise ReferenceFileError if points or cells differ from those of the first file of a series."""
     if record is first:
         return
     if not np.array_equal(record.points, first.points):

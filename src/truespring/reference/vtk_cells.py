@@ -1,4 +1,4 @@
-"""Names of cells: of VTK's numbers, and of what mesh files hold."""
+"""Names of cells by VTK type, and by kind and number of nodes."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -11,25 +11,25 @@ from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.files.contents import Cells
 from truespring.mesh.kinds import ELEMENT_KINDS
 
-#: The key in CELL_SHAPES by VTK's number of the type. Pixels and voxels (8, 11) are cells in another order of nodes.
+#: Key in CELL_SHAPES by VTK type. Pixels (8) and voxels (11) are cells with another node order.
 VTK_NAMES: Mapping[int, str] = {
     **{shape.vtk_type: name for name, shape in CELL_SHAPES.items()},
     **{8: "quad", 11: "hexahedron"},
 }
-#: Vertices: points alone.
+#: VTK types of vertices.
 VTK_POINTS = (1, 2)
-#: No cell: what Ansys' reader makes of elements that no body has, such as those of contact.
+#: VTK type of no cell: Ansys' reader assigns it to elements without volume, such as contact elements.
 VTK_EMPTY = 0
 
 _CORNERS = {name: len(shape.corners) for name, shape in CELL_SHAPES.items() if name == shape.base}
 
 _KINDS = {kind.vtk: name for name, kind in ELEMENT_KINDS.items()}
-# The key in CELL_SHAPES by kind and number of nodes.
+# Key in CELL_SHAPES by element kind and number of nodes.
 _NAMES = {(_KINDS[shape.base], len(shape.places)): name for name, shape in CELL_SHAPES.items()}
 
 
 def named(blocks: Iterable[Cells], file: Path) -> dict[str, Ints]:
-    """Return the nodes of the cells by a key of CELL_SHAPES, without vertices; raise where a kind is not read."""
+    """Return the nodes of cells by key of CELL_SHAPES, without vertices; raise if a kind is not supported."""
     found: dict[str, list[Ints]] = {}
     for block in blocks:
         if block.kind == "vertex":
@@ -44,7 +44,7 @@ def named(blocks: Iterable[Cells], file: Path) -> dict[str, Ints]:
 
 
 def refuse_unknown(types: Ints, file: Path) -> None:
-    """Raise ReferenceFileError where a cell is of a type that is not read."""
+    """Raise ReferenceFileError if the VTK type of a cell is not supported."""
     for number in np.unique(types).tolist():
         if number not in VTK_NAMES and number not in VTK_POINTS:
             raise ReferenceFileError(
@@ -53,15 +53,15 @@ def refuse_unknown(types: Ints, file: Path) -> None:
 
 
 def sized(types: Ints, offsets: Ints, connectivity: Ints, is_made: Bools, file: Path) -> tuple[dict[str, Ints], int]:
-    """Return cells whose order is told by their number of nodes alone, as Ansys' reader gives them to VTK.
+    """Return cells whose order follows from their number of nodes, as Ansys' reader passes them to VTK.
 
     Args:
-        types: VTK's numbers, of a first order whatever the cells have, shape (n_cells,).
-        offsets, connectivity: of the cells, shape (n_cells + 1,) and their points.
-        is_made: of the points, whether the reader made them up: cells with such a middle become their corners.
-        file: for messages.
+        types: VTK types of first-order cells, also for second-order ones, shape (n_cells,).
+        offsets, connectivity: points of the cells as in VTK; offsets of shape (n_cells + 1,).
+        is_made: whether the reader invented a point, shape (n_points,): cells with such points become first order.
+        file: file for messages.
 
-    Returns the points of the cells by a key of CELL_SHAPES, and how many lost their middles.
+    Returns the points of the cells by key of CELL_SHAPES, and the number of cells that became first order.
     """
     refuse_unknown(types[types != VTK_EMPTY], file)
     n_lost = 0
