@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, along_axes
 from truespring.comparison import most_moved
 from truespring.errors import ProblemError
 from truespring.misfit import Misfit, displacement_misfit, find_misfit
@@ -249,8 +249,7 @@ def test_a_surface_in_space_is_as_far_from_the_body_as_it_was_moved(solid: ts.So
 def turned(path: ts.Solution, axes: tuple[str, ...], factor: float = 1.0, shift: Floats | None = None) -> ts.Solution:
     """A solid as a file with other axes, unit and origin tells it."""
     mesh = path.problem.mesh
-    placing = Placing(axes=axes)
-    back = np.linalg.inv(placing.turned(np.eye(3)).T)  # from our axes to the file's
+    back = np.linalg.inv(along_axes(np.eye(3), axes).T)  # from our axes to the file's
     levels = tuple(Level(s.load_factor, s.displacement @ back.T / factor) for s in path.states if s.load_factor)
     away = np.zeros(3) if shift is None else shift
     record = Record(FILE, "frd", (mesh.nodes - away) @ back.T / factor, {"hexahedron": mesh.elements}, levels)

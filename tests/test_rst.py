@@ -41,7 +41,8 @@ def test_all_sets_are_read_at_their_nodes(sample: Path) -> None:
     for number, level in enumerate(record.levels):
         nodes, values = result.nodal_solution(number)
         np.testing.assert_array_equal(level.displacement[nodes - 1], values)
-    assert record.notes == ("all levels are mode shapes, whose size is arbitrary: they are no displacement",)
+    (note,) = record.notes
+    assert "all levels are mode shapes" in note
 
 
 def test_its_cells_are_those_of_vtk(record: Record) -> None:

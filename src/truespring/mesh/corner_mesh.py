@@ -7,7 +7,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh.cells import CELL_SHAPES
-from truespring.mesh.facets import fanned
+from truespring.mesh.facets import divided
 from truespring.mesh.grid import Grid
 from truespring.mesh.kinds import ELEMENT_KINDS, MIXED
 from truespring.mesh.merged import kinds_in, mirrored, mixed_table, repeats
@@ -108,7 +108,7 @@ def _simplices(kind: str, cells: Ints) -> Iterator[Ints]:
         for facet in shape.facets:
             if corner in facet or not len(here):
                 continue
-            for part in fanned(here[:, list(facet)]):
+            for part in divided(here[:, list(facet)]):
                 yield np.concatenate([here[:, [corner]], part], axis=1)
 
 

@@ -188,10 +188,15 @@ def fanned(facets: Ints) -> list[Ints]:
 
     Neighbouring elements thus divide a shared facet alike. A facet with its last corner repeated is a triangle.
     """
+    if facets.shape[1] == _QUADRILATERAL and (twice := facets[:, 2] == facets[:, 3]).any():
+        return [facets[twice][:, :3], *(divided(facets[~twice]) if not twice.all() else [])]
+    return divided(facets)
+
+
+def divided(facets: Ints) -> list[Ints]:
+    """Divide facets as `fanned`, but each facet alike, shape (n, 3) or (n, 2) each: triangles may be degenerate."""
     if facets.shape[1] < _QUADRILATERAL:
         return [facets]
-    if (twice := facets[:, 2] == facets[:, 3]).any():
-        return [facets[twice][:, :3], *(fanned(facets[~twice]) if not twice.all() else [])]
     around = (facets.argmin(axis=1)[:, None] + np.arange(_QUADRILATERAL)) % _QUADRILATERAL
     turned = np.take_along_axis(facets, around, axis=1)
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
