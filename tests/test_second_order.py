@@ -133,7 +133,7 @@ def test_curved_edges_count() -> None:
     assert abs(errors[1]) < 0.005 < 0.02 < abs(errors[0])
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [name for name, entry in LAWS.items() if entry.trace])
 def test_a_law_is_a_part_of_mu_and_one_of_lambda(law: str) -> None:
     """Which the elements of mean dilatation take apart: lambda's is of the volume ratio or of the strain's trace."""
     generator = np.random.default_rng(3)
@@ -143,9 +143,8 @@ def test_a_law_is_a_part_of_mu_and_one_of_lambda(law: str) -> None:
     whole, shear = (entry.respond(tensor, Constants(one, mu, False)).energy for one in (lam, 0.0))
     xx, yy, zz, yz, xz, xy = tensor
     det = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    measure = (
-        np.log(det) / 2 if entry.trace == "logarithmic" else (trace(tensor) - 3) / 2 if entry.finite else trace(tensor)
-    )
+    traces = {"small": trace(tensor), "green": (trace(tensor) - 3) / 2, "logarithmic": np.log(det) / 2}
+    measure = traces[entry.trace or ""]
     assert whole - shear == pytest.approx(lam / 2 * measure**2, rel=1e-9)
     assert np.abs(whole - shear).min() > 1e-4
 
