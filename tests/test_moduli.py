@@ -482,7 +482,7 @@ ALIKE = [
     for rule, entry in ts.RULES.items()
     for sharing in ("summed", "single")
     if mesh.element in entry.elements and not (entry.coupled and sharing == "single")
-    if (name, rule) != ("rectangles", "lloyd")
+    if not (name == "rectangles" and entry.shapes.get(mesh.element) == "square")
 ]
 
 
