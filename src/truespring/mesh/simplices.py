@@ -4,7 +4,7 @@ import numpy as np
 
 from truespring.arrays import Ints
 from truespring.errors import MeshError
-from truespring.mesh.facets import divided, fanned, find_facets, halved
+from truespring.mesh.facets import fanned, find_facets, halved
 from truespring.mesh.kinds import ELEMENT_KINDS, MIXED
 from truespring.mesh.mesh import Mesh
 
@@ -51,7 +51,7 @@ def _cones(element: str, elements: Ints) -> tuple[Ints, Ints]:
         for facet in kind.facets:
             if top in facet:
                 continue
-            for base in divided(corners[:, facet]):
+            for base in fanned(corners[:, facet]):
                 # A facet is anticlockwise seen from outside, clockwise seen from the top of the cone.
                 parts = (base[:, ::-1], corners[:, [top]]) if kind.dim == 3 else (corners[:, [top]], base)
                 found.append(np.concatenate(parts, axis=1))
