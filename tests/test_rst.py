@@ -108,7 +108,7 @@ def test_a_file_that_is_cut_is_refused(sample: Path, tmp_path: Path) -> None:
     data = sample.read_bytes()
     file = tmp_path / "cut.rst"
     messages = {0: "is empty", 3: "is no .rst file", 100: "cut off in its header", 700: "cut off in its header"}
-    messages |= dict.fromkeys((1000, 50_000, 300_000, 907_900), "says 907,920 bytes, it has ")
+    messages |= dict.fromkeys((1000, 50_000, 300_000, 907_900), "907,920 bytes.* has [0-9,]+: ")
     for end, message in messages.items():
         file.write_bytes(data[:end])
         with pytest.raises(ReferenceFileError, match=f"cut.rst.*{message}"):
