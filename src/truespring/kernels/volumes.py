@@ -52,7 +52,7 @@ def _add(rows: Any, i: int, factor: float, v: Any) -> None:
 
 
 @kernel
-def _slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero: Any) -> None:
+def slopes(x: Any, nodes: Any, simplices: Any, weight: float, slope: Any, zero: Any) -> None:
     """Write the derivative of an element's volume by its nodes, shape (k, 3)."""
     slope[:] = 0.0
     for simplex in simplices:
@@ -95,7 +95,7 @@ def growths(
     dim, k = len(zero), elements.shape[1]
     slope = np.empty((k, 3))
     for e in range(first, last):
-        _slopes(x, elements[e], simplices, weight, slope, zero)
+        slopes(x, elements[e], simplices, weight, slope, zero)
         growth[e] = 0.0
         for a in range(k):
             for c in range(dim):
@@ -114,14 +114,14 @@ def forces(
     dim, k = len(zero), elements.shape[1]
     slope = np.empty((k, 3))
     for e in range(first, last):
-        _slopes(x, elements[e], simplices, weight, slope, zero)
+        slopes(x, elements[e], simplices, weight, slope, zero)
         for a in range(k):
             for c in range(dim):
                 force[e, a * dim + c] = pressure[e] * slope[a, c]
 
 
 @kernel
-def _turns(x: Any, nodes: Any, simplices: Any, weight: float, turn: Any, zero: Any) -> None:
+def turns(x: Any, nodes: Any, simplices: Any, weight: float, turn: Any, zero: Any) -> None:
     """Write the vector w of each pair of an element's nodes, shape (k, k, 3)."""
     turn[:] = 0.0
     for simplex in simplices:
@@ -157,8 +157,8 @@ def stiffnesses(
     dim, k = len(zero), elements.shape[1]
     slope, turn = np.empty((k, 3)), np.empty((k, k, 3))
     for e in range(first, last):
-        _slopes(x, elements[e], simplices, weight, slope, zero)
-        _turns(x, elements[e], simplices, weight * pressure[e], turn, zero)
+        slopes(x, elements[e], simplices, weight, slope, zero)
+        turns(x, elements[e], simplices, weight * pressure[e], turn, zero)
         for a in range(k):
             for b in range(k):
                 for i in range(dim):

@@ -107,7 +107,7 @@ class FemPotential:
     def _voigt(self) -> Ints:
         return voigt_places(self.mesh.dim)
 
-    def _slices(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
+    def slices(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
         """Divide a range of elements, by default all, into slices; return the first and last element of each."""
         end = len(self.elements) if last is None else last
         step = max(1, _SLICE_POINTS // len(self._reference.weights))
@@ -169,7 +169,7 @@ class FemPotential:
         """Return the stored energy [J]; infinite if an element is inverted and the law has a barrier."""
         total = 0.0
         with np.errstate(over="ignore", invalid="ignore"):
-            for first, last in self._slices():
+            for first, last in self.slices():
                 at = self._points(positions, first, last)
                 density = self._respond(at).energy
                 if self._inverted(at) or not np.isfinite(density).all():
@@ -204,7 +204,7 @@ class FemPotential:
         """Return the results of `stress` for all slices [Pa], axes (component, element, point)."""
         n_components, n_points = len(voigt_pairs(self.mesh.dim)), len(self._reference.weights)
         result = np.empty((n_components, len(self.elements), n_points))
-        for first, last in self._slices():
+        for first, last in self.slices():
             result[:, first:last] = stress(first, last)
         return result
 
@@ -218,7 +218,7 @@ class FemPotential:
     def gradient(self, positions: Floats) -> Floats:
         """Return the internal force [N], shape (n_nodes, dim)."""
         forces = np.empty((len(self.elements), self.elements.shape[1] * self.mesh.dim))
-        for first, last in self._slices():
+        for first, last in self.slices():
             at = self._points(positions, first, last)
             forces[first:last] = self._forces(at, self._working_stress(at))
         return self._pattern.vector(forces)
@@ -256,7 +256,7 @@ class FemPotential:
     ) -> Floats:
         """Return the tangent stiffness of elements, by default all [N/m], shape (n, n_dof, n_dof), node by node."""
         parts = []
-        for begin, end in self._slices(first, last):
+        for begin, end in self.slices(first, last):
             geometric = None if stress is None else stress[:, begin:end]
             parts.append(self._tangent(self._points(positions, begin, end), geometric))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
@@ -287,7 +287,7 @@ class FemPotential:
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,)."""
         energy = np.empty(len(self.elements))
-        for first, last in self._slices():
+        for first, last in self.slices():
             at = self._points(positions, first, last)
             energy[first:last] = (self._respond(at).energy * at.volumes).sum(axis=1)
         return {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy}
@@ -298,7 +298,7 @@ class FemPotential:
         F S F^T over the volume ratio, which includes the change of thickness; for the linear law, its stress.
         """
         stress = np.empty((len(self.elements), 3, 3))
-        for first, last in self._slices():
+        for first, last in self.slices():
             at = self._points(positions, first, last)
             by_point = self._true_stress(self._law_gradient(at), self._respond(at))
             stress[first:last] = np.moveaxis(by_point.mean(axis=-1), -1, 0)

@@ -3,13 +3,16 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.material import Lame
 from truespring.units import SI_UNITS, Dimension
+
+if TYPE_CHECKING:
+    from truespring.models.invariants import InvariantLaw
 
 
 def _none() -> Mapping[str, Any]:
@@ -68,6 +71,19 @@ class Constants:
         """
         return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
 
+    @property
+    def raveled(self) -> "Constants":
+        """The same constants, as arrays of shape (n_elements,) for several materials."""
+        if np.ndim(self.lam) == 0:
+            return self
+        values = {name: np.ravel(value) for name, value in self.values.items()}
+        return Constants(np.ravel(self.lam), np.ravel(self.mu), self.plane_stress, values)
+
+    @property
+    def bulk(self) -> float | Floats:
+        """The bulk modulus lam + 2/3 mu [Pa]."""
+        return self.lam + 2 / 3 * self.mu
+
     def part(self, first: int, last: int) -> "Constants":
         """Return the constants of the elements `first` to `last` - 1."""
         if np.ndim(self.lam) == 0:
@@ -116,6 +132,11 @@ class Law:
         trace: the strain e for which the part of lam in the energy is lam/2 (tr e)^2, in 3D and plane strain: "small",
             "green", or "logarithmic", whose trace is ln J; None if the energy has another form. Required by elements
             of second order with mean dilatation.
+        volumetric: the modulus in that part: "lam", or "bulk" for a law with separate energies of shape and volume.
+        invariants: the law as a function of I1 and ln J, which Gaussian springs require; None if it is no such
+            function.
+        constant_springs: whether `invariants` is linear in I1 with a factor that does not depend on ln J, so that the
+            springs of `rule = "gaussian"` have a constant stiffness.
         domain: smallest and largest stretch of a bar between which its force increases with its length; beyond them a
             bar under a dead load snaps.
         constants: the constants by name, without lam and mu.
@@ -131,6 +152,9 @@ class Law:
     barrier: bool
     quadratic: bool
     trace: Literal["small", "green", "logarithmic"] | None
+    volumetric: Literal["lam", "bulk"] = "lam"
+    invariants: "InvariantLaw | None" = None
+    constant_springs: bool = False
     domain: tuple[float, float] = (0.0, np.inf)
     constants: Mapping[str, Constant] = field(default_factory=_none)
     lame: Callable[[Mapping[str, float]], Lame] | None = None

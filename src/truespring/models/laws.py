@@ -6,6 +6,7 @@ strain, its stress is zero in plane stress. A law consists of two functions, the
 principal stretches that tests compare it with, and one entry of LAWS.
 """
 
+from collections.abc import Callable
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +15,9 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
+from truespring.models.invariants import by_invariants
 from truespring.models.law import Constant, Constants, Law, Response
+from truespring.models.rubber import arruda_boyce, gent, neo_hookean, yeoh
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import (
     contracted,
@@ -70,49 +73,6 @@ def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
     if not constants.plane_stress:
         return np.zeros(strain.shape[1:])
     return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * trace(strain))
-
-
-def neo_hookean(C: Floats, constants: Constants) -> Response:
-    """Return the response of W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2, J the volume ratio (Simo and Pister 1984).
-
-    In plane stress C_33 solves mu (C_33 - 1) + lam ln J = 0 at every point; eliminating it replaces lam by
-    lam 2 mu C_33 / (2 mu C_33 + lam) in the elasticity.
-    """
-    lam, mu = constants.lam, constants.mu
-    det = determinant(C)
-    valid = det > 0
-    det = np.where(valid, det, 1.0)
-    C_33 = _free_thickness(np.log(det), lam / mu) if constants.plane_stress else np.ones_like(det)
-    valid &= np.isfinite(C_33)
-    C_33 = np.where(valid, C_33, 1.0)
-    log_J = (np.log(det) + np.log(C_33)) / 2
-    inverse = inverted(np.where(valid, C, identity(C)))
-    stress = mu * identity(C) + (lam * log_J - mu) * inverse
-
-    def elasticity() -> Floats:
-        eliminated = lam * 2 * mu * C_33 / (2 * mu * C_33 + lam) if constants.plane_stress else lam
-        return eliminated * outer(inverse, inverse) + (mu - lam * log_J) * swapped(inverse)
-
-    stretch = trace(C) - dimensions(C) + (C_33 - 1)
-    energy = np.where(valid, mu / 2 * stretch - mu * log_J + lam / 2 * log_J**2, np.inf)
-    return Response(energy, stress, elasticity, np.sqrt(C_33), mu * (C_33 - 1) + lam * log_J)
-
-
-def _free_thickness(log_det: Floats, ratio: float | Floats) -> Floats:
-    """Solve C_33 - 1 + ratio/2 (log_det + ln C_33) = 0 for C_33 > 0, by Newton in y = ln C_33.
-
-    For ratio > 0, e^y + ratio/2 y is convex and increasing: Newton's method converges monotonically from the second
-    step on. For ratio in (-2/3, 0) there is no solution under strong compression; NaN is returned there.
-    """
-    half = ratio / 2
-    y = np.clip(-half * log_det / (1 + half), -50.0, 50.0)
-    for _ in range(100):
-        step = (np.expm1(y) + half * (log_det + y)) / (np.exp(y) + half)
-        y = y - np.clip(step, -2.0, 2.0)
-        if np.abs(step).max() <= 1e-15 * max(1.0, float(np.abs(y).max())):
-            break
-    solved = np.abs(np.expm1(y) + half * (log_det + y)) <= 1e-12 * (1 + np.abs(half * log_det))
-    return np.where(solved & (np.exp(y) + half > 0), np.exp(y), np.nan)
 
 
 def hencky(C: Floats, constants: Constants) -> Response:
@@ -192,6 +152,38 @@ def _neo_hookean_density(stretch: Any, constants: Constants) -> Any:
     return constants.mu * (((stretch**2).sum() - 3) / 2 - log_J) + constants.lam / 2 * log_J**2
 
 
+def _shape_density(psi: Callable[[Any], Any], stretch: Any, constants: Constants) -> Any:
+    """Return psi(I1b) + bulk/2 (ln J)^2 of the principal stretches [J/m^3], I1b of the stretches over J^(1/3)."""
+    J = stretch.prod()
+    return psi((stretch**2).sum() / J ** (2 / 3)) + constants.bulk / 2 * np.log(J) ** 2
+
+
+def _yeoh_density(stretch: Any, constants: Constants) -> Any:
+    c10, c20, c30 = constants.mu / 2, constants["c20"], constants["c30"]
+    return _shape_density(lambda I: c10 * (I - 3) + c20 * (I - 3) ** 2 + c30 * (I - 3) ** 3, stretch, constants)
+
+
+def _gent_density(stretch: Any, constants: Constants) -> Any:
+    jm = constants["jm"]
+    return _shape_density(lambda I: -constants.mu * jm / 2 * np.log((jm - I + 3) / jm), stretch, constants)
+
+
+def _arruda_boyce_density(stretch: Any, constants: Constants) -> Any:
+    N = constants["locking_stretch"] ** 2
+    m = constants.mu / (1 + 3 / (5 * N) + 99 / (175 * N**2) + 513 / (875 * N**3) + 42039 / (67375 * N**4))
+
+    def psi(I: Any) -> Any:
+        return m * (
+            (I - 3) / 2
+            + (I**2 - 9) / (20 * N)
+            + 11 * (I**3 - 27) / (1050 * N**2)
+            + 19 * (I**4 - 81) / (7000 * N**3)
+            + 519 * (I**5 - 243) / (673750 * N**4)
+        )
+
+    return _shape_density(psi, stretch, constants)
+
+
 LAWS: MappingProxyType[str, Law] = MappingProxyType(
     {
         "linear": Law(
@@ -216,7 +208,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             domain=(1 / np.sqrt(3), np.inf),
         ),
         "neo-hookean": Law(
-            neo_hookean,
+            by_invariants(neo_hookean),
             _neo_hookean_density,
             label="neo-Hookean",
             source="Simo and Pister 1984; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4.3",
@@ -224,6 +216,8 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
+            invariants=neo_hookean,
+            constant_springs=True,
         ),
         "hencky": Law(
             hencky,
@@ -235,6 +229,54 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             quadratic=False,
             trace="logarithmic",
             domain=(0.0, np.e),
+        ),
+        "yeoh": Law(
+            by_invariants(yeoh),
+            _yeoh_density,
+            label="Yeoh",
+            source="Yeoh, Rubber Chemistry and Technology 66, 1993",
+            finite=True,
+            barrier=True,
+            quadratic=False,
+            trace="logarithmic",
+            volumetric="bulk",
+            invariants=yeoh,
+            constants=MappingProxyType(
+                {
+                    "c20": Constant("stress", "second coefficient of Yeoh's law", 200.0),
+                    "c30": Constant("stress", "third coefficient of Yeoh's law", 50.0),
+                }
+            ),
+        ),
+        "gent": Law(
+            by_invariants(gent),
+            _gent_density,
+            label="Gent",
+            source="Gent, Rubber Chemistry and Technology 69, 1996",
+            finite=True,
+            barrier=True,
+            quadratic=False,
+            trace="logarithmic",
+            volumetric="bulk",
+            invariants=gent,
+            constants=MappingProxyType(
+                {"jm": Constant(None, "limit of I1 - 3 in Gent's law, at constant volume", 30.0, smallest=1e-6)}
+            ),
+        ),
+        "arruda-boyce": Law(
+            by_invariants(arruda_boyce),
+            _arruda_boyce_density,
+            label="Arruda-Boyce",
+            source="Arruda and Boyce, Journal of the Mechanics and Physics of Solids 41, 1993; series of five terms",
+            finite=True,
+            barrier=True,
+            quadratic=False,
+            trace="logarithmic",
+            volumetric="bulk",
+            invariants=arruda_boyce,
+            constants=MappingProxyType(
+                {"locking_stretch": Constant(None, "stretch at which chains are extended", 2.8, smallest=1.0)}
+            ),
         ),
     }
 )

@@ -34,7 +34,7 @@ class _Volume(NamedTuple):
 
 
 class QuadraticMeanPotential(QuadraticPotential):
-    """Elements of second order with the part of lam at the mean of each element, the part of mu at every Gauss point.
+    """Elements of second order with the part of lam (or bulk) at the mean of each element, the part of mu at every Gauss point.
 
     An element has one incompressibility constraint instead of one at every Gauss point, so that it does not lock near
     Poisson's ratio 1/2: selective integration (Malkus and Hughes, CMAME 15, 1978). With the volumetric part of mu at
@@ -44,7 +44,7 @@ class QuadraticMeanPotential(QuadraticPotential):
     interpolation = "quadratic-mean-dilatation"
 
     def _volume(self, at: Points) -> _Volume:
-        strain, lam = self._strain(at), at.constants.lam
+        strain, lam = self._strain(at), self._modulus(at)
         eye = np.broadcast_to(identity(strain), strain.shape)
         if self.law.trace != "logarithmic":
             own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
@@ -65,8 +65,13 @@ class QuadraticMeanPotential(QuadraticPotential):
             J,
         )
 
+    def _modulus(self, at: Points) -> float | Floats:
+        """Return the modulus of the part at the mean [Pa]: lam, or the bulk modulus."""
+        return at.constants.lam if self.law.volumetric == "lam" else at.constants.bulk
+
     def _respond(self, at: Points) -> Response:
-        shear = self.law.respond(self._strain(at), replace(at.constants, lam=0 * at.constants.lam))
+        without = replace(at.constants, lam=at.constants.lam - self._modulus(at))
+        shear = self.law.respond(self._strain(at), without)
         volume = self._volume(at)
         return Response(
             shear.energy + volume.energy,

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +21,14 @@ from truespring.material import Material, Section
 from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
+from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.fem_potential import fem_of_one_kind
+from truespring.models.gaussian_rule import gaussian_potential, gaussian_stiffness
+from truespring.models.interpolation import SIMPLICES
+from truespring.models.linked import LinkedElements
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
+from truespring.models.summed import SummedLinks, summed_links
+from truespring.potential import Stressed
 from truespring.problem import Problem, sample
 
 #: Default stiffness of each body diagonal of a cube in the rule `isotropic`, in E h: the member of the family whose
@@ -79,8 +86,11 @@ class Rule:
         source: publication.
         shapes: required shape, by kind of element: "square", "rectangle" or "brick"; no entry for any shape.
         parameters: optional parameters, attributes of Springs.
-        coupled: whether the force of a spring depends also on the lengths of other springs of the element; `stiffness`
-            is then that of a spring while the others keep their lengths.
+        potential: returns the potential of a problem and `parameters` by name, if a spring's force depends on other
+            nodes of the element, too; None for plain springs. `stiffness` is then that of a spring while the other
+            lengths are constant, of all kinds of elements of a problem.
+        locks_on: kinds of elements on which such a potential locks near Poisson's ratio 1/2.
+        remark: a sentence on cost and law of such a potential, without a full stop.
     """
 
     stiffness: Callable[..., Floats]
@@ -90,7 +100,14 @@ class Rule:
     source: str
     shapes: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     parameters: tuple[str, ...] = ()
-    coupled: bool = False
+    potential: Callable[..., Stressed] | None = None
+    locks_on: tuple[str, ...] = ()
+    remark: str = ""
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the force of a spring depends also on other nodes of the element; moduli are then exact."""
+        return self.potential is not None
 
     def takes(self, mesh: Mesh) -> bool:
         """Return whether the rule supports all kinds of elements of a mesh."""
@@ -128,16 +145,18 @@ def require_body(problem: Problem) -> tuple[Material, Section]:
     return problem.material, problem.section
 
 
-def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
+def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, Any]) -> Floats:
     """Return the stiffness of each element's links by a rule of RULES [N/m], shape (n_elements, links).
 
     If the mesh has several kinds of elements, rows are padded with zeros.
     """
     check_rule(problem, rule, parameters)
+    if RULES[rule].coupled:
+        return RULES[rule].stiffness(problem, **parameters)
     return by_kind(problem, lambda part: _of_one_kind(part, rule, parameters))
 
 
-def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, float]) -> Floats:
+def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, Any]) -> Floats:
     """Return the stiffness of links [N/m] on a mesh of one kind of elements, shape (n_elements, links)."""
     recipe = partial(RULES[rule].stiffness, **parameters)
     forms = problem.mesh.forms
@@ -150,7 +169,7 @@ def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, float]) -> F
         return recipe(problem)  # raises the error with the element numbers of the whole body
 
 
-def check_rule(problem: Problem, rule: str, parameters: dict[str, float]) -> None:
+def check_rule(problem: Problem, rule: str, parameters: dict[str, Any]) -> None:
     """Raise ModelError if a rule does not support the elements of the problem or the parameters."""
     require_body(problem)
     entry = RULES[rule]
@@ -350,8 +369,17 @@ def biquadratic(problem: Problem) -> Floats:
     They equal St. Venant-Kirchhoff finite elements: Delingette (2008) on triangles, Goulette and Chen (2015) on
     tetrahedra, the same formula between all pairs of nodes of other elements. See `link_coupling`.
     """
-    length_squared = (link_vectors(problem.mesh) ** 2).sum(axis=2)
-    return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(problem)))
+
+    def of_one_kind(part: Problem) -> Floats:
+        length_squared = (link_vectors(part.mesh) ** 2).sum(axis=2)
+        return np.asarray(8 * length_squared * np.einsum("ess->es", link_coupling(part)))
+
+    return by_kind(problem, of_one_kind)
+
+
+def _biquadratic_potential(problem: Problem) -> LinkedElements | SummedLinks:
+    """Return the potential of biquadratic springs."""
+    return summed_links(problem, BiquadraticSprings)
 
 
 def _fitted(problem: Problem, fit: Callable[[Floats, Floats], Floats]) -> Floats:
@@ -441,7 +469,22 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             "springs in squared lengths, coupled within an element: equal to St. Venant-Kirchhoff finite elements",
             (LatticeModuli(ANY_MESH),),
             "Delingette 2008 (triangles), Goulette and Chen 2015 (tetrahedra)",
-            coupled=True,
+            potential=_biquadratic_potential,
+            locks_on=_ALL,
+            remark=(
+                "coupled springs cost more than plain ones; their law is St. Venant-Kirchhoff, which softens in "
+                "compression and differs from other laws, such as neo-Hookean, above strains of a few percent"
+            ),
+        ),
+        "gaussian": Rule(
+            gaussian_stiffness,
+            _ALL,
+            "springs of zero rest length and a pressure in each element: the neo-Hookean law",
+            (LatticeModuli(ANY_MESH),),
+            "James and Guth 1943 (Gaussian chains); Pinkall and Polthier 1993 (weights on triangles)",
+            parameters=("hourglass", "element", "law"),
+            potential=gaussian_potential,
+            locks_on=SIMPLICES,
         ),
     }
 )

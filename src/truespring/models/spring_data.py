@@ -7,8 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 from truespring.arrays import Floats, Ints
 from truespring.potential import Potential
 
-#: Features beyond plain springs: a modulus for the area or volume of each element, or a coupling of lengths.
-VOLUME_TERM, COUPLING = "volume term", "coupling"
+#: Features beyond plain springs: a modulus for the area or volume of each element, a coupling of lengths, or a pressure
+#: in each element that keeps springs of zero rest length apart.
+VOLUME_TERM, COUPLING, PRESSURE = "volume term", "coupling", "pressure"
 
 
 class PlainSprings(Potential, Protocol):
@@ -45,7 +46,7 @@ class SpringData:
     Attributes:
         network: the plain springs, without the feature `beyond`; None if they are not defined without it.
         arrays: all arrays by name [SI], with springs of shape (n_springs, 2); see docs/export/arrays.md.
-        beyond: VOLUME_TERM or COUPLING; empty for plain springs.
+        beyond: VOLUME_TERM, COUPLING or PRESSURE; empty for plain springs.
     """
 
     network: PlainSprings | None

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -9,18 +10,17 @@ from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.mesh import Mesh
-from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.findings import springs_warnings
-from truespring.models.linked import LinkedElements
+from truespring.models.gaussian_rule import check_law
 from truespring.models.links import in_a_row
 from truespring.models.model import Model
 from truespring.models.moduli import Moduli, moduli
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
-from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.volume import VolumeTerm
 from truespring.models.volume_springs import VolumeSprings
+from truespring.potential import Stressed
 from truespring.problem import Problem
 
 # Largest relative deviation of a lattice from isotropy for which a volume term is allowed.
@@ -40,6 +40,11 @@ class Springs(Model):
         volume: add the area or volume term that gives an isotropic lattice the Young's modulus and the Poisson's ratio
             of the material, from 0 to 0.5; the springs are rescaled.
         k_body: stiffness of each body diagonal of a cube in E h, for the rule isotropic.
+        hourglass: stiffness of the hourglass modes over that of finite elements, for the rule gaussian; by default,
+            None, 1 in the plane, and in space a function of Poisson's ratio (see docs/models.md).
+        element: "quadratic" for springs between all nodes of triangles or tetrahedra of second order, for the rule
+            gaussian.
+        law: the constitutive law of the rule gaussian, one of GAUSSIAN_LAWS; by default, None, neo-hookean.
     """
 
     rule: str | None = None
@@ -48,6 +53,9 @@ class Springs(Model):
     allow_negative: bool = False
     volume: bool = False
     k_body: float | None = None
+    hourglass: float | None = None
+    element: str | None = None
+    law: str | None = None
 
     def __post_init__(self) -> None:
         if (self.rule is None) == (self.stiffness is None):
@@ -62,6 +70,10 @@ class Springs(Model):
             raise ModelError(f"k_body = {self.k_body}: must be finite")
         if self.k_body is not None and self.rule is None:
             raise ModelError("k_body requires the rule isotropic; with stiffness, use its key body")
+        if self.rule is None and self._parameters:
+            name = next(iter(self._parameters))
+            owners = [rule for rule, entry in RULES.items() if name in entry.parameters]
+            raise ModelError(f"{name} requires a rule ({', '.join(owners)}), not stiffness")
         if self.sharing == "single" and (self.volume or self.coupled):
             what = "volume = true" if self.volume else f"rule = '{self.rule}'"
             raise ModelError(f"{what} requires sharing = 'summed', not sharing = 'single'")
@@ -69,6 +81,8 @@ class Springs(Model):
             raise ModelError(
                 f"rule = '{self.rule}' has the Poisson's ratio of the material without a volume term: remove volume"
             )
+        if self.law is not None:
+            check_law(self.law)
 
     kind = "springs"
     has_springs = True
@@ -82,7 +96,7 @@ class Springs(Model):
     def label(self) -> str:
         """Name in figures and tables."""
         words = [self.rule or "own stiffness"]
-        words += [f"k_body {self.k_body:g}"] if self.k_body is not None else []
+        words += [f"{name} {value}" for name, value in self._parameters.items()]
         words += ["single"] if self.sharing == "single" else []
         words += ["volume"] if self.volume else []
         return f"springs ({', '.join(words)})"
@@ -105,9 +119,10 @@ class Springs(Model):
         return rule_stiffness(problem, str(self.rule), self._parameters)
 
     @property
-    def _parameters(self) -> dict[str, float]:
+    def _parameters(self) -> dict[str, Any]:
         """Parameters of the rule that are set, by name."""
-        return {} if self.k_body is None else {"k_body": self.k_body}
+        names = dict.fromkeys(name for rule in RULES.values() for name in rule.parameters)
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     def kappa(self, problem: Problem) -> Floats:
         """Return the modulus of the area or volume term of each element [Pa], shape (n_elements,); zero without one."""
@@ -144,11 +159,12 @@ class Springs(Model):
         exact = section.lame_within(material)
         return exact.mu / mu, exact.lam - exact.mu
 
-    def potential(self, problem: Problem) -> SpringNetwork | LinkedElements | SummedLinks | VolumeSprings:
+    def potential(self, problem: Problem) -> Stressed:
         """Return the potential of the springs; raise ModelError if one has a negative stiffness, unless allowed."""
-        if self.coupled:
+        build = None if self.rule is None else RULES[self.rule].potential
+        if build is not None:
             check_rule(problem, str(self.rule), self._parameters)
-            return summed_links(problem, BiquadraticSprings)
+            return build(problem, **self._parameters)
         network = self.network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 

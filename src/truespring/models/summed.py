@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -14,10 +14,20 @@ from truespring.models.fem_potential import FemPotential
 from truespring.models.law import Law
 from truespring.models.linked import LinkedElements
 from truespring.models.spring_data import COUPLING, SpringData
-from truespring.potential import SparseMatrix
+from truespring.potential import Projectable, SparseMatrix, Stressed
 from truespring.problem import Problem
 
-Part = TypeVar("Part", FemPotential, LinkedElements)
+
+
+class SummablePart(Stressed, Projectable, Protocol):
+    """A potential of elements of one kind."""
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Return values on the cells in SI units, by name, each of shape (n_cells, ...)."""
+        ...
+
+
+Part = TypeVar("Part", bound=SummablePart)
 
 
 class _Blocks(NamedTuple):
@@ -29,7 +39,7 @@ class _Blocks(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Summed(Generic[Part]):
+class Summed(Generic[Part]):
     """The sum of potentials on the nodes of one problem.
 
     Attributes:
@@ -116,7 +126,7 @@ def summed_links(problem: Problem, make: Callable[[Problem], LinkedElements]) ->
     return SummedLinks(tuple(make(part) for _, part in problem.blocks), problem)
 
 
-class SummedElements(_Summed[FemPotential]):
+class SummedElements(Summed[FemPotential]):
     """Finite elements of several kinds, conforming at common facets."""
 
     @property
@@ -139,7 +149,7 @@ class SummedElements(_Summed[FemPotential]):
         return self._by_part(lambda part: part.cell_fields(positions))
 
 
-class SummedLinks(_Summed[Any]):
+class SummedLinks(Summed[Any]):
     """Elements of several kinds whose energy is a function of the squared lengths of links."""
 
     @cached_property

@@ -1,0 +1,457 @@
+"""Gaussian springs: springs of zero rest length between the nodes of an element, and a pressure in each element."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import factorial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.assembly import Pattern
+from truespring.models.gaussian_weights import Laplacians
+from truespring.models.invariants import Condensed, condensed
+from truespring.models.law import Constants, Law
+from truespring.models.spring_data import PRESSURE, SpringData
+from truespring.models.summed import Summed
+from truespring.potential import SparseMatrix
+from truespring.problem import Problem
+
+# Smallest number of elements, or of nodes, for which threads share the work.
+_SMALLEST_PIECE = 64
+# Weight below which a link has no spring, over the largest: rounding.
+_ROUNDING = 1e-12
+
+
+class _State(NamedTuple):
+    """The elements in a deformed state.
+
+    Attributes:
+        sums: quadratic forms [m^3], shape (n_forms, n_elements).
+        ratio: volume over undeformed volume [-], shape (n_elements,).
+        law: energy density and derivatives.
+        fibres: energy density of each family of fibres and its first and second derivative [Pa], shape (n_families,
+            n_elements) each.
+    """
+
+    sums: Floats
+    ratio: Floats
+    law: Condensed
+    fibres: tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianElements:
+    """The potential of Gaussian springs on elements of one kind.
+
+    With F the deformation gradient of the shape functions, the mean of tr F^T F over an element is a quadratic form of
+    the positions of its nodes, Q / V0 with Q = sum of w |x_a - x_b|^2 and w_ab = - integral of grad N_a . grad N_b:
+    springs of zero rest length. The energy is V0 W(I1, ln J) of that mean and of the ratio J = V / V0. The neo-Hookean
+    law is linear in I1, so that the springs have the constant stiffness mu w; other laws change the stiffness of all
+    springs of an element together. The square of a fibre's stretch is a quadratic form, too.
+
+    Sources: James and Guth 1943 (Gaussian chains and a pressure); Pinkall and Polthier 1993 (w on triangles).
+
+    Attributes:
+        problem: mesh, material and section.
+        law: the constitutive law, with `invariants`.
+        constants: its constants.
+        laplacians: the matrices of the quadratic form of each element.
+    """
+
+    problem: Problem
+    law: Law
+    constants: Constants
+    laplacians: Laplacians
+
+    @property
+    def nodes(self) -> Floats:
+        """Undeformed positions [m], shape (n_nodes, dim)."""
+        return self.problem.mesh.nodes
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return Pattern(self.problem.mesh.elements, *self.nodes.shape)
+
+    @cached_property
+    def _volumes(self) -> Floats:
+        """Undeformed volume of each element [m^3], area times thickness in 2D, shape (n_elements,)."""
+        return self._volume(self.nodes)
+
+    @cached_property
+    def _form(self) -> tuple[Ints, float]:
+        """The simplices of an element, and the factor of the sum of their determinants [-] or [m]."""
+        section, kind = self.problem.section, self.problem.mesh.kind
+        assert section is not None  # see require_body
+        return np.array(kind.simplices), section.thickness * kind.simplex_weight / factorial(kind.dim)
+
+    @cached_property
+    def _numbers(self) -> Ints:
+        """Number of the link between each two nodes of an element, shape (k, k)."""
+        kind = self.problem.mesh.kind
+        numbers = np.zeros((kind.n_nodes, kind.n_nodes), dtype=np.int64)
+        for link, (a, b) in enumerate(kind.links):
+            numbers[a, b] = numbers[b, a] = link
+        return numbers
+
+    @property
+    def _forms(self) -> tuple[Floats, Ints]:
+        """Arguments of kernels: matrices of the quadratic forms and the class of each element."""
+        return self.laplacians.matrices, self.laplacians.of
+
+    def _run(self, kernel: Any, *arguments: Any) -> None:
+        """Run a kernel on all elements in parallel."""
+        from truespring.kernels.threads import run
+
+        run(kernel, len(self._pattern.elements), *arguments, self._pattern.zero, smallest=_SMALLEST_PIECE)
+
+    def _volume(self, positions: Floats) -> Floats:
+        """Return the signed volume of each element [m^3], shape (n_elements,)."""
+        from truespring.kernels import volumes
+        from truespring.kernels.threads import writable
+
+        volume = np.empty(len(self._pattern.elements))
+        self._run(volumes.volumes, writable(positions), self._pattern.elements, *self._form, volume)
+        return volume
+
+    def _state(self, positions: Floats) -> _State:
+        """Return the elements in a deformed state; NaN in inverted elements."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import writable
+
+        sums = np.empty((len(self.laplacians.matrices), len(self._pattern.elements)))
+        self._run(gaussian.sums, writable(positions), self._pattern.elements, *self._forms, sums)
+        ratio = self._volume(positions) / self._volumes
+        ratio = np.where(ratio > 0, ratio, np.nan)
+        squares = sums / self._volumes
+        law = self._respond(squares[0], np.log(ratio))
+        return _State(sums, ratio, law, self._stretched(squares[1:]))
+
+    def _respond(self, trace: Floats, y: Floats) -> Condensed:
+        """Return the law at the mean trace of C and ln J of each element, shape (n_elements,)."""
+        invariants = self.law.invariants
+        assert invariants is not None  # see Springs
+        with np.errstate(over="ignore", invalid="ignore"):
+            return condensed(invariants, trace, y, self.nodes.shape[1], self._by_element)
+
+    @cached_property
+    def _by_element(self) -> Constants:
+        """The constants, arrays of shape (n_elements,) for several materials."""
+        return self.constants.raveled
+
+    def _stretched(self, squares: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return energy density and derivatives of fibres whose stretch has the given square."""
+        return squares, squares, squares
+
+    def energy(self, positions: Floats) -> float:
+        """Return the stored energy [J]; infinite if an element is inverted."""
+        state = self._state(positions)
+        density = state.law.at.energy + state.fibres[0].sum(axis=0)
+        total = float((density * self._volumes).sum())
+        return total if np.isfinite(total) else float("inf")
+
+    def stress(self, positions: Floats) -> Floats:
+        """Return the derivatives of the energy density by I1, by fibres and by ln J [Pa], shape (n, n_elements).
+
+        The last is the Kirchhoff pressure J dW/dJ: extrapolated along a step, it keeps the iteration stable at large
+        rotations, which the pressure dW/dJ does not.
+        """
+        return self._stress(self._state(positions))
+
+    @staticmethod
+    def _stress(state: _State) -> Floats:
+        return np.concatenate([state.law.at.by_I1[None], state.fibres[1], state.law.at.by_y[None]])
+
+    def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
+        """Return the stress extrapolated linearly along `step` [m], in Pa, shape (n, n_elements)."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import writable
+
+        state, slope = self._state(positions), self._slopes(positions)[0]
+        growth = np.empty((slope.shape[1], len(slope)))
+        self._run(gaussian.growths, writable(step), self._pattern.elements, slope, growth)
+        growth /= self._volumes
+        growth[-1] /= state.ratio
+        second = self._second(state)
+        return self._stress(state) + np.einsum("emn,ne->me", second, growth)
+
+    @staticmethod
+    def _second(state: _State) -> Floats:
+        """Return second derivatives of the energy density by I1, fibres and ln J [Pa], shape (n_elements, n, n)."""
+        at, curvature = state.law.at, state.fibres[2]
+        n = len(curvature) + 2
+        second = np.zeros((len(state.ratio), n, n))
+        second[:, 0, 0], second[:, -1, -1] = at.by_I1_I1, at.by_y_y
+        second[:, 0, -1] = second[:, -1, 0] = at.by_I1_y
+        for family, values in enumerate(curvature, start=1):
+            second[:, family, family] = values
+        return second
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Return the internal force [N], shape (n_nodes, dim)."""
+        from truespring.kernels import gaussian, volumes
+        from truespring.kernels.threads import run, writable
+
+        x, pattern, state = writable(positions), self._pattern, self._state(positions)
+        force = np.empty((len(pattern.elements), pattern.elements.shape[1] * pattern.dim))
+        self._run(volumes.forces, x, pattern.elements, *self._form, state.law.at.by_y / state.ratio, force)
+        if self._weights is None:
+            factors = self._stress(state)[:-1]
+            self._run(gaussian.forces, x, pattern.elements, *self._forms, np.ascontiguousarray(factors), force)
+            return pattern.vector(force)
+        pull = np.empty(self.nodes.shape)
+        known = (x, pattern.starts, pattern.columns, self._weights)
+        run(gaussian.pulls, len(pull), *known, pull, pattern.zero, smallest=_SMALLEST_PIECE)
+        return pull + pattern.vector(force)
+
+    @cached_property
+    def _weights(self) -> Floats | None:
+        """The stiffness between each node and its neighbours [N/m], shape (n_blocks,), if it is constant, else None."""
+        if not self.constant:
+            return None
+        return self._scattered(-self._at_rest.law.at.by_I1)
+
+    @property
+    def constant(self) -> bool:
+        """Whether the springs have a constant stiffness: the law is linear in I1, and there are no fibres."""
+        return self.law.constant_springs and len(self.laplacians.matrices) == 1
+
+    @cached_property
+    def _at_rest(self) -> _State:
+        return self._state(self.nodes)
+
+    def _scattered(self, factors: Floats) -> Floats:
+        """Return twice the sum of `factors` [Pa] times the matrices of I1, shape (n_blocks,), for pairs of nodes."""
+        matrices, of = self._forms
+        values = (2 * factors)[:, None, None] * matrices[0][of]
+        found = np.bincount(self._pattern.slots.ravel(), values.ravel(), len(self._pattern.columns))
+        return found.astype(np.float64, copy=False)
+
+    def _slopes(self, positions: Floats, forms: bool = True) -> tuple[Floats, Floats]:
+        """Return first derivatives of forms and volume, and the second ones of the volume; see the kernel."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import writable
+
+        matrices, of = self._forms
+        known = matrices if forms else matrices[:0]
+        n, (k, dim) = len(self._pattern.elements), (self._pattern.elements.shape[1], self._pattern.dim)
+        slope = np.empty((n, len(known) + 1, k, dim))
+        turn = np.empty((n, len(self.problem.mesh.kind.links), 3))
+        rest = (*self._form, self._numbers, slope, turn)
+        self._run(gaussian.slopes_and_turns, writable(positions), self._pattern.elements, known, of, *rest)
+        return slope, turn
+
+    def _curvature(self, positions: Floats, stress: Floats | None, forms: bool = True) -> tuple[Any, ...]:
+        """Return the arguments of the kernels that add second derivatives, without the forms if these are constant."""
+        state = self._state(positions)
+        stress = self._stress(state) if stress is None else stress
+        second = self._second(state)
+        second[:, -1, -1] -= stress[-1]
+        second /= self._volumes[:, None, None]
+        second[:, -1] /= state.ratio[:, None]  # by the volume instead of ln J
+        second[:, :, -1] /= state.ratio[:, None]
+        matrices, of = self._forms
+        if not forms:
+            second, matrices = np.ascontiguousarray(second[:, -1:, -1:]), matrices[:0]
+        slope, turn = self._slopes(positions, forms)
+        factors = np.ascontiguousarray(stress[:-1] if forms else stress[:0])
+        return slope, second, matrices, of, factors, turn, stress[-1] / state.ratio, self._numbers
+
+    def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
+        """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import run
+
+        pattern, values = self._pattern, self._pattern.values()
+        values[:] = 0.0
+        if self._weights is not None:
+            for axis in range(pattern.dim):
+                values[:, axis, axis] = -self._weights
+        known = self._curvature(positions, stress, self._weights is None)
+        rows = (pattern.at_starts, pattern.at, pattern.slots)
+        run(gaussian.add_rows, len(self.nodes), *rows, *known, values, pattern.zero, smallest=_SMALLEST_PIECE)
+        return pattern.matrix(values)
+
+    def projected_hessian(self, positions: Floats) -> SparseMatrix:
+        """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
+        matrices = self.element_hessians(positions)
+
+        def positive(first: int, last: int) -> Floats:
+            values, vectors = np.linalg.eigh(matrices[first:last])
+            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
+
+        return self._pattern.summed(positive)
+
+    def element_hessians(self, positions: Floats) -> Floats:
+        """Return the tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), node by node."""
+        from truespring.kernels import gaussian
+
+        n, n_dof = len(self._pattern.elements), self._pattern.elements.shape[1] * self._pattern.dim
+        blocks = np.zeros((n, n_dof, n_dof))
+        self._run(gaussian.add_matrices, *self._curvature(positions, None), blocks)
+        return blocks
+
+    def element_arrays(self) -> dict[str, Floats]:
+        """Return undeformed volumes [m^3] and constants of the volume function, arrays of shape (n_elements,)."""
+        constants = self._by_element
+        found = {"lam": constants.lam, "mu": constants.mu, **constants.values}
+        shape = len(self._volumes)
+        return {"volume": self._volumes, **{name: np.broadcast_to(value, shape) for name, value in found.items()}}
+
+    @cached_property
+    def _shared(self) -> tuple[Ints, Ints, Ints]:
+        """Springs, each pair of nodes once, the number of the spring of each link, and the links of nonzero weight."""
+        from truespring.kernels.sparsity import unique_pairs
+        from truespring.kernels.threads import writable
+
+        mesh = self.problem.mesh
+        weights = np.abs(self._link_weights(np.ones(len(mesh.elements))))
+        present = np.flatnonzero(weights.ravel() > _ROUNDING * weights.max())
+        pairs = mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2)[present]
+        return (*unique_pairs(writable(pairs), mesh.n_nodes), present)
+
+    def _link_weights(self, factors: Floats) -> Floats:
+        """Return twice `factors` [Pa] times the weight of each link [N/m], shape (n_elements, links)."""
+        links = np.array(self.problem.mesh.kind.links)
+        own = -self.laplacians.matrices[0][:, links[:, 0], links[:, 1]]
+        return np.asarray(2 * factors[:, None] * own[self.laplacians.of])
+
+    @property
+    def springs(self) -> Ints:
+        """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
+        return self._shared[0]
+
+    def _summed(self, values: Floats) -> Floats:
+        """Return the sum over elements of values of links, shape (n_elements, links), for springs, (n_springs,)."""
+        springs, place, present = self._shared
+        return np.bincount(place, values.ravel()[present], len(springs)).astype(np.float64, copy=False)
+
+    @property
+    def stiffness(self) -> Floats:
+        """Stiffness of the undeformed springs [N/m], shape (n_springs,); negative across obtuse angles of simplices."""
+        return self._stiffness(self._at_rest)
+
+    def _stiffness(self, state: _State) -> Floats:
+        return self._summed(self._link_weights(state.law.at.by_I1))
+
+    def _lengths(self, positions: Floats) -> Floats:
+        across = positions[self.springs[:, 1]] - positions[self.springs[:, 0]]
+        return np.asarray(np.linalg.norm(across, axis=1))
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Return length over undeformed length of each spring [-], shape (n_springs,)."""
+        return self._lengths(positions) / self._lengths(self.nodes)
+
+    def spring_data(self) -> SpringData:
+        """Return springs, elements and constants of the volume function as arrays; see docs/export/arrays.md."""
+        return gaussian_data((self,), self.problem, self.springs, self.stiffness)
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """Springs as lines, shape (n_springs, 2), and the elements, shape (n_elements, nodes)."""
+        return {"line": self.springs, **self.problem.mesh.cells}
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Return fields of springs, then of elements, NaN where a field is not defined, shape (n_cells, ...).
+
+        Springs: change of tension from the undeformed body [N], stretch [-] and stiffness [N/m]. Elements: true stress
+        [Pa], shape (n_cells, 9), and strain energy [J].
+        """
+        state, n = self._state(positions), len(self.springs)
+        stiffness = self._stiffness(state)
+        change = stiffness * self._lengths(positions) - self.stiffness * self._lengths(self.nodes)
+        lines = {"tension_change": change, "stretch": self.stretch(positions), "stiffness": stiffness}
+        energy = self._volumes * (state.law.at.energy + state.fibres[0].sum(axis=0))
+        whole = {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy}
+        empty = np.full(len(energy), np.nan)
+        found = {name: np.concatenate([values, empty]) for name, values in lines.items()}
+        for name, values in whole.items():
+            found[name] = np.concatenate([np.full((n, *values.shape[1:]), np.nan), values])
+        return found
+
+    def cauchy_stress(self, positions: Floats) -> Floats:
+        """Return the true stress of the mean deformation of each element [Pa], shape (n_elements, 3, 3).
+
+        (2 W_I1 <F F^T> + W_lnJ I) / J, <F F^T> the mean over the element, and the stress of the third direction.
+        """
+        state, dim = self._state(positions), self.nodes.shape[1]
+        at, C_33 = state.law.at, state.law.C_33
+        stress = np.zeros((len(state.ratio), 3, 3))
+        for form, factor in enumerate(self._stress(state)[:-1]):
+            matrices = self.laplacians.matrices[form][self.laplacians.of]
+            places = positions[self._pattern.elements]
+            mean = np.einsum("eai,eab,ebj->eij", places, matrices, places) / self._volumes[:, None, None]
+            stress[:, :dim, :dim] += 2 * factor[:, None, None] * mean
+        stress[:, range(dim), range(dim)] += at.by_y[:, None]
+        if dim == 2:
+            stress[:, 2, 2] = state.law.across
+        return np.asarray(stress / (state.ratio * np.sqrt(C_33))[:, None, None])
+
+
+class SummedGaussian(Summed[GaussianElements]):
+    """Gaussian springs on elements of several kinds."""
+
+    @cached_property
+    def _shared(self) -> tuple[Ints, Ints]:
+        """Springs, each pair of nodes once, and the number of the spring of each line of the parts."""
+        lines = np.sort(np.concatenate([part.springs for part in self.parts]), axis=1)
+        springs, of = np.unique(lines, axis=0, return_inverse=True)
+        return springs, of.ravel()
+
+    @property
+    def springs(self) -> Ints:
+        """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
+        return self._shared[0]
+
+    @property
+    def stiffness(self) -> Floats:
+        """Stiffness of the undeformed springs [N/m], shape (n_springs,)."""
+        own = np.concatenate([part.stiffness for part in self.parts])
+        return np.bincount(self._shared[1], own, len(self.springs)).astype(np.float64, copy=False)
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Return length over undeformed length of each part's springs [-], kind by kind, shape (n,)."""
+        return np.concatenate([part.stretch(positions) for part in self.parts])
+
+    def spring_data(self) -> SpringData:
+        """Return springs, elements and constants of the volume function as arrays; see docs/export/arrays.md."""
+        return gaussian_data(self.parts, self.problem, self.springs, self.stiffness)
+
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """Springs as lines, shape (n_springs, 2), and the elements by kind, shape (n, nodes)."""
+        return {"line": self.springs, **self.problem.mesh.cells}
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Return fields of springs, then of elements, as GaussianElements does; sums over the parts of springs."""
+        springs, of = self._shared
+        split = [len(part.springs) for part in self.parts]
+        by_part = [part.cell_fields(positions) for part in self.parts]
+        found = {}
+        for name in by_part[0]:
+            pairs = list(zip(by_part, split, strict=True))
+            lines = np.concatenate([fields[name][:n] for fields, n in pairs])
+            rest = np.concatenate([fields[name][n:] for fields, n in pairs])
+            whole = np.full((len(springs), *lines.shape[1:]), np.nan)
+            if name == "stretch":
+                whole[of] = lines
+            elif lines.ndim == 1:
+                whole = np.bincount(of, lines, len(springs)).astype(np.float64)
+            found[name] = np.concatenate([whole, rest])
+        return found
+
+
+def gaussian_data(
+    parts: tuple[GaussianElements, ...], problem: Problem, springs: Ints, stiffness: Floats
+) -> SpringData:
+    """Return Gaussian springs as arrays: springs and, for each kind of element, numbers, volumes and constants.
+
+    Shapes: springs (n_springs, 2), stiffness (n_springs,) [N/m].
+    """
+    arrays: dict[str, Any] = {"springs": springs, "stiffness": stiffness, "rest_length": np.zeros(len(springs))}
+    for (numbers, block), part in zip(problem.mesh.blocks, parts, strict=True):
+        suffix = f"_{block.element}" if len(parts) > 1 else ""
+        arrays |= {f"{name}{suffix}": values for name, values in part.element_arrays().items()}
+        if suffix:
+            arrays[f"elements{suffix}"] = numbers
+    return SpringData(None, arrays, PRESSURE)

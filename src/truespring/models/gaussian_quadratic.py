@@ -1,0 +1,142 @@
+"""Gaussian springs between all nodes of triangles and tetrahedra of second order."""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.models.fem_potential import FemPotential, of_one_kind
+from truespring.models.gaussian_weights import integrated
+from truespring.models.law import Constants, Response
+from truespring.models.laws import LAWS, law_constants
+from truespring.models.quadratic import QuadraticPotential
+from truespring.models.quadratic_mean import QuadraticMeanPotential
+from truespring.models.spring_data import PRESSURE, SpringData
+from truespring.models.symmetric import identity, trace
+from truespring.problem import Problem
+
+
+def _without_springs(C: Floats, constants: Constants) -> Response:
+    """Return the response of the neo-Hookean law without mu/2 tr C, the part of the springs."""
+    whole = LAWS["neo-hookean"].respond(C, constants)
+    return replace(
+        whole,
+        energy=whole.energy - constants.mu / 2 * trace(C),
+        stress=whole.stress - constants.mu * identity(C),
+    )
+
+
+class _BetweenAllNodes(QuadraticPotential):
+    """Springs of zero rest length between all nodes of an element, and a function of the volume.
+
+    The springs have the weights mu w, w_ab = - integral of grad N_a . grad N_b, a constant; `law` is the rest of the
+    neo-Hookean law at the Gauss points: - mu ln J, and the part of lam, which a subclass may take at the mean volume.
+    """
+
+    #: The finite elements that the springs equal.
+    of_whole_law: ClassVar[type[FemPotential]] = QuadraticPotential
+
+    @cached_property
+    def _twin(self) -> FemPotential:
+        """Finite elements of the whole law, the same function of the positions."""
+        return of_one_kind(self.problem, "neo-hookean", self.of_whole_law)
+
+    @cached_property
+    def _laplacians(self) -> Floats:
+        """The quadratic form of each element, times mu [N/m], shape (n_elements, nodes, nodes)."""
+        mu = self.problem.of_elements(lambda material: material.lame.mu)
+        return np.asarray(mu[:, None, None] * integrated(self, lambda gradients: gradients))
+
+    @cached_property
+    def _weights(self) -> Floats:
+        """The stiffness between each node and its neighbours [N/m], shape (n_blocks,)."""
+        found = np.bincount(self._pattern.slots.ravel(), -self._laplacians.ravel(), len(self._pattern.columns))
+        return found.astype(np.float64, copy=False)
+
+    def _pulls(self, positions: Floats) -> Floats:
+        """Return the forces of the springs [N], shape (n_nodes, dim)."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import run, writable
+
+        pattern, force = self._pattern, np.empty(positions.shape)
+        known = (writable(positions), pattern.starts, pattern.columns, self._weights)
+        run(gaussian.pulls, len(force), *known, force, pattern.zero)
+        return force
+
+    def energy(self, positions: Floats) -> float:
+        """Return the stored energy [J]; infinite if an element is inverted."""
+        return super().energy(positions) + float((self._pulls(positions) * positions).sum()) / 2
+
+    def gradient(self, positions: Floats) -> Floats:
+        """Return the internal force [N], shape (n_nodes, dim)."""
+        return super().gradient(positions) + self._pulls(positions)
+
+    def element_hessians(
+        self, positions: Floats, stress: Floats | None = None, first: int = 0, last: int | None = None
+    ) -> Floats:
+        """Return the tangent stiffness of elements, by default all [N/m], shape (n, n_dof, n_dof), node by node."""
+        blocks, dim = super().element_hessians(positions, stress, first, last), self.mesh.dim
+        for axis in range(dim):
+            blocks[:, axis::dim, axis::dim] += self._laplacians[first:last]
+        return blocks
+
+    @cached_property
+    def _pairs(self) -> tuple[Ints, Floats]:
+        """Pairs of nodes joined by springs, shape (n, 2), and their stiffness [N/m], shape (n,)."""
+        rows = np.repeat(np.arange(len(self.nodes)), np.diff(self._pattern.starts))
+        columns = self._pattern.columns
+        chosen = (rows < columns) & (np.abs(self._weights) > 1e-12 * np.abs(self._weights).max())
+        return np.stack([rows, columns], axis=1)[chosen], self._weights[chosen]
+
+    @property
+    def stiffness(self) -> Floats:
+        """Stiffness of each spring [N/m], shape (n_springs,)."""
+        return self._pairs[1]
+
+    def spring_data(self) -> SpringData:
+        """Return springs, nodes and elements as arrays; node numbers go on after those of the mesh with midpoints."""
+        springs, stiffness = self._pairs
+        lame = {
+            "lam": self.problem.of_elements(lambda material: material.lame.lam),
+            "mu": self.problem.of_elements(lambda material: material.lame.mu),
+        }
+        arrays: dict[str, Any] = {
+            "springs": springs,
+            "stiffness": stiffness,
+            "rest_length": np.zeros(len(springs)),
+            "all_nodes": self.nodes,
+            "all_elements": self.elements,
+        }
+        return SpringData(None, arrays | lame, PRESSURE)
+
+    def cell_fields(self, positions: Floats) -> dict[str, Floats]:
+        """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,)."""
+        return self._twin.cell_fields(positions)
+
+    def cauchy_stress(self, positions: Floats) -> Floats:
+        """Return the true stress of each element [Pa], shape (n_elements, 3, 3)."""
+        return self._twin.cauchy_stress(positions)
+
+
+class _AtPoints(_BetweenAllNodes):
+    """The whole volume function at the Gauss points: plane stress, where nothing locks."""
+
+
+class _AtMean(_BetweenAllNodes, QuadraticMeanPotential):
+    """The part of lam at the mean volume of an element, so that it does not lock."""
+
+    of_whole_law = QuadraticMeanPotential
+
+
+#: Potentials of Gaussian springs of second order.
+GaussianQuadratic = _AtPoints | _AtMean
+
+
+def gaussian_quadratic(problem: Problem) -> GaussianQuadratic:
+    """Return neo-Hookean Gaussian springs between all nodes of second-order triangles or tetrahedra."""
+    section = problem.section
+    kind = _AtPoints if section is not None and section.free_thickness else _AtMean
+    law = replace(LAWS["neo-hookean"], respond=_without_springs)
+    return kind(problem, law, law_constants(problem, "neo-hookean"))

@@ -1,0 +1,87 @@
+"""The rule `gaussian`: its potential, and the stiffness of its springs."""
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.errors import ModelError, nearest
+from truespring.models.gaussian import GaussianElements, SummedGaussian
+from truespring.models.gaussian_quadratic import GaussianQuadratic, gaussian_quadratic
+from truespring.models.gaussian_weights import check_hourglass, hourglass_values, laplacians
+from truespring.models.interpolation import SIMPLICES
+from truespring.models.laws import LAWS, law_constants
+from truespring.models.links import n_links
+from truespring.problem import Problem
+
+#: Laws of Gaussian springs: functions of the trace of C and of the volume ratio.
+GAUSSIAN_LAWS = tuple(name for name, law in LAWS.items() if law.invariants is not None)
+
+DEFAULT_LAW = "neo-hookean"
+
+
+def gaussian_potential(
+    problem: Problem, hourglass: float | None = None, element: str | None = None, law: str = DEFAULT_LAW
+) -> GaussianElements | SummedGaussian | GaussianQuadratic:
+    """Return Gaussian springs on the mesh of a problem.
+
+    Raises ModelError for a law that is no function of I1 and J, for hourglass modes without stiffness, and for springs
+    of second order on other meshes than triangles or tetrahedra, or of other laws than the neo-Hookean.
+    """
+    check_law(law)
+    if element is not None:
+        _check_quadratic(problem, hourglass, element, law)
+        return gaussian_quadratic(problem)
+    check_hourglass(problem.mesh, hourglass)
+    values = hourglass_values(problem, hourglass)
+    parts = tuple(
+        GaussianElements(part, LAWS[law], law_constants(part, law), laplacians(part, values[numbers]))
+        for numbers, part in problem.blocks
+    )
+    return parts[0] if len(parts) == 1 else SummedGaussian(parts, problem)
+
+
+def gaussian_stiffness(
+    problem: Problem, hourglass: float | None = None, element: str | None = None, law: str = DEFAULT_LAW
+) -> Floats:
+    """Return w = - mu integral of grad N_a . grad N_b [N/m], shape (n_elements, links), by the rule `gaussian`.
+
+    The springs have zero rest length. Squares with c = hourglass/6, in mu t: edges c, diagonals 1/2 - c. Cubes with s =
+    hourglass/12, in mu h, up to hourglass = 1: face diagonals s, body diagonals 1/4 - 2 s; above, with c = (5/6 - 6 s)
+    / 4: body diagonals c, edges a = 2 s - 1/4 + c, face diagonals s - a. Triangles: mu t cot(opposite angle) / 2.
+    If the mesh has several kinds of elements, rows are padded with zeros.
+    """
+    check_law(law)
+    check_hourglass(problem.mesh, hourglass)
+    values, found = hourglass_values(problem, hourglass), np.zeros((len(problem.mesh.elements), n_links(problem.mesh)))
+    for numbers, part in problem.blocks:
+        links = np.array(part.mesh.kind.links)
+        own = laplacians(part, values[numbers])
+        mu = part.of_elements(lambda material: material.lame.mu)
+        found[numbers, : len(links)] = mu[:, None] * -own.matrices[0][own.of][:, links[:, 0], links[:, 1]]
+    return found
+
+
+def check_law(law: str) -> None:
+    """Raise ModelError for a law that is no function of I1 and J."""
+    if law not in GAUSSIAN_LAWS:
+        raise ModelError(
+            f"law = '{law}' is not available with rule = 'gaussian', whose laws are functions of I1 and J"
+            f"{nearest(law, GAUSSIAN_LAWS)}; allowed: {', '.join(GAUSSIAN_LAWS)}"
+        )
+
+
+def _check_quadratic(problem: Problem, hourglass: float | None, element: str, law: str) -> None:
+    """Raise ModelError unless springs of second order are available."""
+    if element != "quadratic":
+        raise ModelError(f"element = '{element}' is unknown; allowed with rule = 'gaussian': quadratic")
+    if problem.mesh.element not in SIMPLICES:
+        raise ModelError(
+            f"element = 'quadratic' requires a mesh of {' or '.join(SIMPLICES)} elements, this one has "
+            f"{problem.mesh.kinds} elements: remove element; springs on these do not lock"
+        )
+    if hourglass is not None:
+        raise ModelError(f"hourglass = {hourglass:g}: {problem.mesh.kinds} elements have no hourglass modes: remove it")
+    if law != DEFAULT_LAW:
+        raise ModelError(
+            f"law = '{law}' is not available with element = 'quadratic' of rule = 'gaussian'; allowed: {DEFAULT_LAW}; "
+            f"use kind = 'fem' with this law, or remove element"
+        )

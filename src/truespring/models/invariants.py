@@ -1,0 +1,153 @@
+"""Laws as functions W(I1, ln J) of the trace of C and of the volume ratio, for finite elements and Gaussian springs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.arrays import Floats
+from truespring.models.law import Constants, Response
+from truespring.models.symmetric import determinant, identity, inverted, outer, swapped, trace
+
+# Iterations of Newton's method for the free thickness, largest change of ln C_33 in one, and the accepted residual
+# relative to the terms of the equation.
+_MAX_ITERATIONS, _LARGEST_CHANGE, _SOLVED = 100, 2.0, 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Derivatives:
+    """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J, all of one shape."""
+
+    energy: Floats
+    by_I1: Floats
+    by_y: Floats
+    by_I1_I1: Floats
+    by_I1_y: Floats
+    by_y_y: Floats
+
+    @property
+    def linear(self) -> bool:
+        """Whether the energy is linear in I1, with a factor that does not depend on ln J."""
+        return not (np.any(self.by_I1_I1) or np.any(self.by_I1_y))
+
+
+#: A law: returns the derivatives at I1 [-] and y = ln J [-], with the constants of the elements.
+InvariantLaw = Callable[[Floats, Floats, Constants], Derivatives]
+
+
+@dataclass(frozen=True, slots=True)
+class Condensed:
+    """A law in the space of the mesh: derivatives by I1 and y of the plane, without the third direction.
+
+    Attributes:
+        at: energy density and derivatives; energy and derivatives are NaN outside the domain of the law.
+        C_33: square of the stretch of the third direction [-]; 1 in plane strain and in 3D.
+        across: Kirchhoff stress of the third direction [Pa]; zero in plane stress.
+    """
+
+    at: Derivatives
+    C_33: Floats
+    across: Floats
+
+
+def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants: Constants) -> Condensed:
+    """Return a law at the trace of C and ln J of a body of dimension `dim`, in 2D of the plane.
+
+    In plane strain and in 3D, C_33 is 1. In plane stress, C_33 minimises the energy: Newton's method in z = ln C_33 on
+    C_33 W_I1 + W_y / 2 = 0; the second derivatives are those of the minimum.
+    """
+    if dim == 3:
+        found = law(trace_C, y, constants)
+        return Condensed(found, np.ones_like(y), 2 * found.by_I1 + found.by_y)
+    if not constants.plane_stress:
+        found = law(trace_C + 1, y, constants)
+        return Condensed(found, np.ones_like(y), 2 * found.by_I1 + found.by_y)
+    z = _free_thickness(law, trace_C, y, constants)
+    C_33 = np.exp(z)
+    found = law(trace_C + C_33, y + z / 2, constants)
+    by_z_I1 = C_33 * found.by_I1_I1 + found.by_I1_y / 2
+    by_z_y = C_33 * found.by_I1_y + found.by_y_y / 2
+    by_z_z = C_33 * found.by_I1 + C_33 * by_z_I1 + by_z_y / 2
+    minimum = Derivatives(
+        found.energy,
+        found.by_I1,
+        found.by_y,
+        found.by_I1_I1 - by_z_I1**2 / by_z_z,
+        found.by_I1_y - by_z_I1 * by_z_y / by_z_z,
+        found.by_y_y - by_z_y**2 / by_z_z,
+    )
+    return Condensed(minimum, C_33, 2 * C_33 * found.by_I1 + found.by_y)
+
+
+def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:
+    """Return ln C_33 at which the stress of the third direction is zero; NaN where there is no stable one."""
+    lam, mu = constants.lam, constants.mu
+    z = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
+    for _ in range(_MAX_ITERATIONS):
+        slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
+        step = slope / np.where(curvature > 0, curvature, scale)
+        z = z - np.clip(np.where(np.isfinite(step), step, 0.0), -_LARGEST_CHANGE, _LARGEST_CHANGE)
+        if np.abs(step).max(initial=0.0) <= 1e-15 * max(1.0, float(np.abs(z).max(initial=0.0))):
+            break
+    slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
+    return np.where((np.abs(slope) <= _SOLVED * scale) & (curvature > 0), z, np.nan)
+
+
+def _thickness_slope(
+    law: InvariantLaw, trace_C: Floats, y: Floats, z: Floats, constants: Constants
+) -> tuple[Floats, Floats, Floats]:
+    """Return first and second derivative of the energy by z = ln C_33 [J/m^3], and the size of their terms."""
+    C_33 = np.exp(z)
+    found = law(trace_C + C_33, y + z / 2, constants)
+    pull, push = C_33 * found.by_I1, found.by_y / 2
+    curvature = pull + C_33**2 * found.by_I1_I1 + C_33 * found.by_I1_y + found.by_y_y / 4
+    return pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu
+
+
+def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
+    """Return the response of a law as a function of C, axes (component, ...), and constants, for LAWS.
+
+    S = 2 W_I1 I + W_y C^-1, and its derivative by E = (C - I) / 2.
+    """
+
+    def respond(C: Floats, constants: Constants) -> Response:
+        dim = {3: 2, 6: 3}[len(C)]
+        det = determinant(C)
+        valid = det > 0
+        inverse = inverted(np.where(valid, C, identity(C)))
+        found = condensed(law, trace(C), np.log(np.where(valid, det, 1.0)) / 2, dim, constants)
+        at = found.at
+        valid &= np.isfinite(at.energy)
+        stress = 2 * at.by_I1 * identity(C) + at.by_y * inverse
+
+        def elasticity() -> Floats:
+            found = at.by_y_y * outer(inverse, inverse) - at.by_y * swapped(inverse)
+            if at.linear:
+                return np.asarray(found)
+            eye = np.broadcast_to(identity(C), C.shape)
+            mixed = outer(eye, inverse)
+            found += 4 * at.by_I1_I1 * outer(eye, eye) + 2 * at.by_I1_y * (mixed + mixed.swapaxes(0, 1))
+            return np.asarray(found)
+
+        return Response(np.where(valid, at.energy, np.inf), stress, elasticity, np.sqrt(found.C_33), found.across)
+
+    return respond
+
+
+#: The energy of a change of shape: returns psi [J/m^3] and its first and second derivative at I1b [-].
+ShapeEnergy = Callable[[Floats], tuple[Floats, Floats, Floats]]
+
+
+def isochoric(I1: Floats, y: Floats, psi: ShapeEnergy, bulk: float | Floats) -> Derivatives:
+    """Return the derivatives of psi(I1b) + bulk/2 y^2, I1b = I1 exp(-2 y / 3) the trace of C without dilatation."""
+    shrunk = np.exp(-2 * y / 3)
+    I1b = I1 * shrunk
+    energy, first, second = psi(I1b)
+    return Derivatives(
+        energy + bulk / 2 * y**2,
+        first * shrunk,
+        -2 / 3 * I1b * first + bulk * y,
+        second * shrunk**2,
+        -2 / 3 * shrunk * (first + I1b * second),
+        4 / 9 * I1b * (first + I1b * second) + bulk,
+    )
