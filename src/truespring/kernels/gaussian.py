@@ -126,9 +126,7 @@ def slopes_and_turns(
 
 
 @kernel
-def growths(
-    first: int, last: int, step: Any, elements: Any, slope: Any, growth: Any, zero: Any
-) -> None:
+def growths(first: int, last: int, step: Any, elements: Any, slope: Any, growth: Any, zero: Any) -> None:
     """Write the change of the quadratic forms and of the volume that is linear in a step.
 
     Shapes: step (n_nodes, dim), elements (n_elements, k), slope (n_elements, n, k, dim), growth (n, n_elements).

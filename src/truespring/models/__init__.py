@@ -12,6 +12,7 @@ from truespring.models.findings import moduli_findings as moduli_findings
 from truespring.models.fitness import Fitness as Fitness
 from truespring.models.fitness import follows_poisson as follows_poisson
 from truespring.models.fitness import judge as judge
+from truespring.models.gaussian_rule import GAUSSIAN_LAWS as GAUSSIAN_LAWS
 from truespring.models.heml import Heml as Heml
 from truespring.models.interpolation import ELEMENTS as ELEMENTS
 from truespring.models.law import Constant as Constant

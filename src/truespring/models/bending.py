@@ -123,7 +123,7 @@ def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tup
 
 
 def _element_matrix(problem: Problem, springs: SpringsByRule | None, share: Floats | None = None) -> Floats:
-    """Return the linear stiffness matrix of the first element [N/m], shape (n_dof, n_dof).
+    """Return the linear stiffness matrix of the only element [N/m], shape (n_dof, n_dof).
 
     `share` is a factor for the stiffness of each spring.
     """
@@ -131,8 +131,8 @@ def _element_matrix(problem: Problem, springs: SpringsByRule | None, share: Floa
         elements = fem_potential(problem, "linear", chosen_interpolation(problem, "linear"))
         assert isinstance(elements, FemPotential)  # `cell_counts` is None for several kinds
         return np.asarray(elements.element_hessians(problem.mesh.nodes)[0])
-    if springs.coupled:  # equal to FEM
-        return np.asarray(element_matrices(problem)[0])
+    if springs.coupled:
+        return np.asarray(springs.potential(problem).hessian(problem.mesh.nodes).toarray())
     mesh = problem.mesh
     links, across = np.array(mesh.kind.links), link_vectors(mesh)[0]
     direction = across / np.linalg.norm(across, axis=1)[:, None]

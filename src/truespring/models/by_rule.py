@@ -1,10 +1,18 @@
 """Protocol of springs by rule, for effective moduli and findings."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from truespring.arrays import Floats
 from truespring.potential import Potential
 from truespring.problem import Problem
+
+
+class SpringCounts(NamedTuple):
+    """Number of springs of a mesh, and of springs with negative and with zero stiffness."""
+
+    n_springs: int
+    n_negative: int
+    n_zero: int
 
 
 class SpringsByRule(Protocol):
@@ -27,7 +35,21 @@ class SpringsByRule(Protocol):
 
     @property
     def coupled(self) -> bool:
-        """Whether the springs of an element are coupled, as by the rule biquadratic."""
+        """Whether the force of a spring depends on other nodes of its element, so that the moduli are exact."""
+        ...
+
+    @property
+    def locks_on(self) -> tuple[str, ...]:
+        """Kinds of elements on which the springs lock near Poisson's ratio 1/2."""
+        ...
+
+    @property
+    def remark(self) -> str:
+        """A sentence on cost and law of coupled springs, without a full stop."""
+        ...
+
+    def counts(self, problem: Problem) -> SpringCounts:
+        """Return the numbers of springs on the problem's mesh."""
         ...
 
     def element_stiffness(self, problem: Problem) -> Floats:

@@ -55,6 +55,7 @@ CODES: MappingProxyType[str, Code] = MappingProxyType(
         "young": Code("Young's modulus is not the material's in every direction", True, 0.01),
         "poisson": Code("Poisson's ratio is not the material's in every direction", True, 0.01),
         "negative": Code("springs have a negative stiffness", True),
+        "negative-weights": Code("Gaussian springs across obtuse angles have a negative stiffness", False, math.inf),
         "unstable": Code("the springs are not stable at rest", True),
         "patch-score": Code("nodal forces of a uniform strain are not in balance on an irregular mesh", False),
         "patch-test": Code("a uniform stress does not cause a uniform strain", True, math.inf),
@@ -116,9 +117,10 @@ def _found(problem: Problem, springs: SpringsByRule) -> Iterator[Finding]:
     yield from moduli_findings(problem, effective)
     if effective.n_negative:
         yield Finding(
-            "negative",
+            "negative-weights" if springs.coupled else "negative",
             {"n_negative": effective.n_negative, "n_springs": effective.n_springs},
-            f"{effective.n_negative} of {effective.n_springs} springs have a negative stiffness",
+            f"{effective.n_negative} of {effective.n_springs} springs have a negative stiffness"
+            + (", across obtuse angles; the sum over each element is not negative" if springs.coupled else ""),
         )
     if not effective.stable:
         yield Finding("unstable", {}, "the undeformed springs are unstable: inner nodes have no positive stiffness")
@@ -132,13 +134,8 @@ def _found(problem: Problem, springs: SpringsByRule) -> Iterator[Finding]:
             {"poisson": material.poisson},
             f"at a Poisson's ratio of {material.poisson:g} {what} on {problem.mesh.kinds} elements: too stiff",
         )
-    if springs.coupled:
-        yield Finding(
-            "coupled",
-            {},
-            "coupled springs cost more than plain ones; their law is St. Venant-Kirchhoff, which softens in "
-            "compression and differs from other laws, such as neo-Hookean, above strains of a few percent",
-        )
+    if springs.coupled and springs.remark:
+        yield Finding("coupled", {}, springs.remark)
     kappa = float(springs.kappa(problem)[0])
     if kappa < -1e-9 * material.young:  # above rounding
         yield Finding(
@@ -173,7 +170,7 @@ def _scored(problem: Problem, effective: Moduli) -> Iterator[Finding]:
 def _tested(problem: Problem, springs: SpringsByRule) -> Iterator[Finding]:
     """Yield the findings that need a linear solve: bending of coupled simplices, and the patch test."""
     effective, kind = moduli(problem, springs), problem.mesh.element
-    if springs.coupled and kind in SIMPLICES and not springs_lock(problem, springs):
+    if springs.coupled and kind in springs.locks_on and kind in SIMPLICES and not springs_lock(problem, springs):
         excess = bending_excess(problem)
         yield Finding(
             "simplices",
@@ -243,5 +240,5 @@ def _rounded(value: float) -> str:
 
 
 def springs_lock(twin: Problem, springs: SpringsByRule) -> bool:
-    """Return whether springs lock: coupled springs as linear finite elements do, and volume terms of simplices."""
-    return locks(twin) and (springs.coupled or (springs.volume and twin.mesh.element in SIMPLICES))
+    """Return whether springs lock on an element of the mesh at the Poisson's ratio of the material."""
+    return locks(twin) and not set(springs.locks_on).isdisjoint(twin.mesh.element_kinds)

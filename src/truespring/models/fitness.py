@@ -10,10 +10,9 @@ from truespring.loading import Fixed
 from truespring.material import Material, PlaneStress
 from truespring.mesh import box, rectangle
 from truespring.models.elasticity import lattice_classes
-from truespring.models.findings import CODES, Finding, all_findings, by_material, springs_lock
+from truespring.models.findings import CODES, Finding, all_findings, by_material
 from truespring.models.interpolation import SIMPLICES
-from truespring.models.moduli import moduli, spring_counts
-from truespring.models.response import Response, response
+from truespring.models.moduli import moduli
 from truespring.models.rules import RULES
 from truespring.models.springs import Springs
 from truespring.problem import Problem
@@ -36,9 +35,7 @@ class Fitness:
     Attributes:
         fit: whether no finding is a fault, for all materials of the body.
         reasons: sentences of the findings that are faults; empty if the springs are fit.
-        better: springs to use instead; None if these are fit or no others are better. Plain springs are preferred to
-            springs with a volume term, and these to coupled ones; if coupled springs lock, the springs with the
-            smallest error of the response.
+        better: the recommended springs if these are not fit and are others.
         sentence: the result in words.
         findings: all findings, material by material.
     """
@@ -60,10 +57,8 @@ def judge(problem: Problem, springs: Springs, tolerance: float = 0.05) -> Fitnes
     strain by less than `tolerance` (relative root mean square, worst stress). The displacement is compared rather than
     the unbalanced force, since variations from element to element average out, but stiff or soft regions do not.
 
-    Coupled springs, which are finite elements of first order, are also unfit if they lock at the Poisson's ratio, and
-    on triangles and tetrahedra if they are more than `tolerance` too stiff in bending of the whole body. They are
-    better than springs with wrong moduli, unless they lock: then the springs with the smallest error of the response to
-    stretch and bending are better.
+    Coupled springs that equal finite elements of first order are also unfit if they lock at the Poisson's ratio, and on
+    triangles and tetrahedra if they are more than `tolerance` too stiff in bending of the whole body.
 
     The bending factor on a lattice, and a patch test that fails only at outer elements that are cut from the lattice,
     are not faults, since both errors vanish on finer meshes.
@@ -90,24 +85,23 @@ class _Judge:
         return [one for one in all_findings(twin, springs) if CODES[one.code].fault and one.excess > self.tolerance]
 
     def better(self, than: Springs) -> Springs | None:
-        """Return better springs: the nearest fit plain ones, else the first others with the right moduli.
+        """Return the recommended springs; None if these are `than`."""
+        found = recommended(self.problem)
+        return None if found == than else found
 
-        If the latter are coupled and lock on simplices, return those with the smallest error of the response.
-        """
-        rules = [name for name, rule in RULES.items() if rule.takes(self.problem.mesh)]
-        plain = [Springs(name) for name in rules if not RULES[name].coupled]
+    def plain(self) -> Springs | None:
+        """Return the nearest fit springs of pair forces, else the first with a volume term; None if none is fit."""
+        rules = [name for name, rule in RULES.items() if rule.takes(self.problem.mesh) and not rule.coupled]
+        plain = [Springs(name) for name in rules]
         # Nearly isotropic plain springs have nearly Cauchy's ratio: for other materials none is fit.
         near = max(abs(above) for above in self._above_cauchy()) <= 2 * self.tolerance
         fit = [springs for springs in plain if near and self._is_right(springs)]
         if fit:
             return min(fit, key=self._deviation)
-        lattice = lattice_classes(self.problem.mesh) is not None  # a volume term requires a lattice
-        others = [Springs(one.rule, volume=True) for one in plain if lattice]
-        others += [Springs(name) for name in rules if RULES[name].coupled]
-        found = next((springs for springs in others if self._is_right(springs)), None)
-        if found is not None and found.coupled and self._locks(found) and self.problem.mesh.element in SIMPLICES:
-            found = self._nearest([found, *plain, than])
-        return None if found == than else found
+        if lattice_classes(self.problem.mesh) is None:  # a volume term requires a lattice
+            return None
+        with_volume = (Springs(name, volume=True) for name in rules)
+        return next((springs for springs in with_volume if self._is_right(springs)), None)
 
     def _above_cauchy(self) -> list[float]:
         """Return the Poisson's ratio of each material minus that of an isotropic lattice of plain springs."""
@@ -117,37 +111,16 @@ class _Judge:
         return [poisson - _CAUCHY[self.problem.mesh.dim] for poisson in ratios]
 
     def _is_right(self, springs: Springs) -> bool:
-        """Return whether springs have no faults except those of linear elements: locking and stiffness in bending."""
-        codes = {"locking", "simplices"}
+        """Return whether plain springs have no faults and no negative volume term."""
         try:
-            mesh, stiffness = self.problem.mesh, springs.element_stiffness(self.problem)
-            if not springs.coupled and spring_counts(mesh, stiffness).n_negative:
+            if springs.counts(self.problem).n_negative:
                 return False  # cheaper than the findings
             for twin in self.problem.homogeneous:
-                wrong = {one.code for one in self.faults(twin, springs)} - codes
-                if wrong or any(one.code == "unbounded" for one in all_findings(twin, springs)):
+                if self.faults(twin, springs) or any(one.code == "unbounded" for one in all_findings(twin, springs)):
                     return False
         except ModelError:
             return False
         return True
-
-    def _locks(self, springs: Springs) -> bool:
-        """Return whether springs lock for a material of the body."""
-        return any(springs_lock(twin, springs) for twin in self.problem.homogeneous)
-
-    def _nearest(self, several: list[Springs]) -> Springs | None:
-        """Return the springs with the smallest error of the response to stretch and bending, the first if equal."""
-        known = [(found.worst, springs) for springs in several if (found := self._response(springs)) is not None]
-        return min(known, key=lambda one: round(one[0], 9))[1] if known else None
-
-    def _response(self, springs: Springs) -> Response | None:
-        """Return the response for the worst material; None if unknown."""
-        try:
-            found = [response(twin, springs) for twin in self.problem.homogeneous]
-        except ModelError:
-            return None
-        known = [one for one in found if one is not None]
-        return max(known, key=lambda one: one.worst) if len(known) == len(found) else None
 
     def _deviation(self, springs: Springs) -> float:
         """Return the deviation of the moduli for the worst material, rounded so that equal rules keep their order."""
@@ -168,34 +141,29 @@ class _Judge:
         found = "; ".join(by_material(self.problem, reasons))
         yield f"Not fit for {self._materials()} within {100 * self.tolerance:.6g} %: {found}."
         if better is None:
-            other = " Finite elements of second order and finer meshes are better." if springs.coupled else ""
-            yield f"No other rule is better on this mesh.{other}"
-            yield from self._remarks(springs) if springs.coupled else ()
+            yield "No other rule is better on this mesh. Finite elements of second order and finer meshes are better."
+            yield from self._remarks(springs)
             yield from self._bending(springs)
             return
-        key = f'rule = "{better.rule}"' + (", volume = true" if better.volume else "")
-        yield f"Better: {key}: {self._moduli(better)}."
+        yield f"Better: {_keys(better)}: {self._moduli(better)}."
         yield from self._but(better)
         yield from self._remarks(better)
-        simpler = min(self._above_cauchy()) >= -self.tolerance  # else the volume term is negative on any mesh
-        if better.coupled and simpler and self.problem.mesh.element in _ISOTROPIC_MESH:
-            yield f"Plain springs require another mesh: {_ISOTROPIC_MESH[self.problem.mesh.element]}."
+        yield from self._alternative()
         yield from self._bending(springs, better)
+
+    def _alternative(self) -> Iterator[str]:
+        """Yield a sentence on springs for programs that support pair forces only."""
+        plain, element = self.plain(), self.problem.mesh.element
+        if plain is not None:
+            yield f"For programs that support pair forces only: {_keys(plain)}."
+        elif min(self._above_cauchy()) >= -self.tolerance and element in _ISOTROPIC_MESH:  # else on no mesh
+            yield f"Springs of pair forces only require another mesh: {_ISOTROPIC_MESH[element]}."
 
     def _but(self, better: Springs) -> Iterator[str]:
         """Yield a sentence on the faults of the better springs, if any."""
         faults = by_material(self.problem, lambda twin: (one.sentence for one in self.faults(twin, better)))
-        if not faults:
-            return
-        nearest = self._response(better) if self._locks(Springs("biquadratic")) else None
-        if nearest is None:
+        if faults:
             yield f"But {'; '.join(faults)}: use them for estimates only, or use finite elements of second order."
-            return
-        yield (
-            f"But they are not fit either: the whole body deforms {_signed(nearest.stretch)} in stretch and "
-            f"{_signed(nearest.bending)} in bending. Other rules have larger errors, and some lock; use these springs "
-            "for estimates only, or use finite elements that do not lock."
-        )
 
     def _materials(self) -> str:
         """Return the subject of a sentence on the materials of the body."""
@@ -211,7 +179,7 @@ class _Judge:
 
     def _remarks(self, springs: Springs) -> Iterator[str]:
         """Yield sentences on findings that are not faults."""
-        codes = ("outer-test", "locking-term", "coupled", "unbounded")
+        codes = ("negative-weights", "outer-test", "locking-term", "coupled", "unbounded")
 
         def remarks(twin: Problem) -> list[str]:
             return [
@@ -232,9 +200,17 @@ class _Judge:
         yield f"{text[0].upper()}{text[1:]}{other}."
 
 
-def _signed(error: float) -> str:
-    """Return the error of a deformation in words: 12 % too little."""
-    return f"{100 * abs(error):.0f} % too {'little' if error < 0 else 'much'}"
+def recommended(problem: Problem) -> Springs:
+    """Return the recommended springs for the mesh of a problem: Gaussian, of second order on simplices."""
+    return Springs("gaussian", element="quadratic" if problem.mesh.element in SIMPLICES else None)
+
+
+def _keys(springs: Springs) -> str:
+    """Return springs as keys of a study."""
+    keys = [f'rule = "{springs.rule}"']
+    keys += [f'element = "{springs.element}"'] if springs.element else []
+    keys += ["volume = true"] if springs.volume else []
+    return ", ".join(keys)
 
 
 def follows_poisson(rule: str) -> bool:

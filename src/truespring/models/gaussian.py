@@ -160,7 +160,7 @@ class GaussianElements:
 
     @staticmethod
     def _stress(state: _State) -> Floats:
-        return np.concatenate([state.law.at.by_I1[None], state.fibres[1], state.law.at.by_y[None]])
+        return np.concatenate([state.law.at.by_trace[None], state.fibres[1], state.law.at.by_y[None]])
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
         """Return the stress extrapolated linearly along `step` [m], in Pa, shape (n, n_elements)."""
@@ -173,7 +173,7 @@ class GaussianElements:
         growth /= self._volumes
         growth[-1] /= state.ratio
         second = self._second(state)
-        return self._stress(state) + np.einsum("emn,ne->me", second, growth)
+        return np.asarray(self._stress(state) + np.einsum("emn,ne->me", second, growth))
 
     @staticmethod
     def _second(state: _State) -> Floats:
@@ -181,8 +181,8 @@ class GaussianElements:
         at, curvature = state.law.at, state.fibres[2]
         n = len(curvature) + 2
         second = np.zeros((len(state.ratio), n, n))
-        second[:, 0, 0], second[:, -1, -1] = at.by_I1_I1, at.by_y_y
-        second[:, 0, -1] = second[:, -1, 0] = at.by_I1_y
+        second[:, 0, 0], second[:, -1, -1] = at.by_trace_trace, at.by_y_y
+        second[:, 0, -1] = second[:, -1, 0] = at.by_trace_y
         for family, values in enumerate(curvature, start=1):
             second[:, family, family] = values
         return second
@@ -202,14 +202,14 @@ class GaussianElements:
         pull = np.empty(self.nodes.shape)
         known = (x, pattern.starts, pattern.columns, self._weights)
         run(gaussian.pulls, len(pull), *known, pull, pattern.zero, smallest=_SMALLEST_PIECE)
-        return pull + pattern.vector(force)
+        return np.asarray(pull + pattern.vector(force))
 
     @cached_property
     def _weights(self) -> Floats | None:
         """The stiffness between each node and its neighbours [N/m], shape (n_blocks,), if it is constant, else None."""
         if not self.constant:
             return None
-        return self._scattered(-self._at_rest.law.at.by_I1)
+        return self._scattered(-self._at_rest.law.at.by_trace)
 
     @property
     def constant(self) -> bool:
@@ -332,7 +332,7 @@ class GaussianElements:
         return self._stiffness(self._at_rest)
 
     def _stiffness(self, state: _State) -> Floats:
-        return self._summed(self._link_weights(state.law.at.by_I1))
+        return self._summed(self._link_weights(state.law.at.by_trace))
 
     def _lengths(self, positions: Floats) -> Floats:
         across = positions[self.springs[:, 1]] - positions[self.springs[:, 0]]

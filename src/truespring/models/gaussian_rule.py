@@ -50,6 +50,8 @@ def gaussian_stiffness(
     If the mesh has several kinds of elements, rows are padded with zeros.
     """
     check_law(law)
+    if element is not None:
+        raise ModelError("element = 'quadratic' joins more nodes than the links of the mesh: see its potential")
     check_hourglass(problem.mesh, hourglass)
     values, found = hourglass_values(problem, hourglass), np.zeros((len(problem.mesh.elements), n_links(problem.mesh)))
     for numbers, part in problem.blocks:

@@ -19,16 +19,16 @@ class Derivatives:
     """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J, all of one shape."""
 
     energy: Floats
-    by_I1: Floats
+    by_trace: Floats
     by_y: Floats
-    by_I1_I1: Floats
-    by_I1_y: Floats
+    by_trace_trace: Floats
+    by_trace_y: Floats
     by_y_y: Floats
 
     @property
     def linear(self) -> bool:
         """Whether the energy is linear in I1, with a factor that does not depend on ln J."""
-        return not (np.any(self.by_I1_I1) or np.any(self.by_I1_y))
+        return not (np.any(self.by_trace_trace) or np.any(self.by_trace_y))
 
 
 #: A law: returns the derivatives at I1 [-] and y = ln J [-], with the constants of the elements.
@@ -58,25 +58,25 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
     """
     if dim == 3:
         found = law(trace_C, y, constants)
-        return Condensed(found, np.ones_like(y), 2 * found.by_I1 + found.by_y)
+        return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     if not constants.plane_stress:
         found = law(trace_C + 1, y, constants)
-        return Condensed(found, np.ones_like(y), 2 * found.by_I1 + found.by_y)
+        return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     z = _free_thickness(law, trace_C, y, constants)
     C_33 = np.exp(z)
     found = law(trace_C + C_33, y + z / 2, constants)
-    by_z_I1 = C_33 * found.by_I1_I1 + found.by_I1_y / 2
-    by_z_y = C_33 * found.by_I1_y + found.by_y_y / 2
-    by_z_z = C_33 * found.by_I1 + C_33 * by_z_I1 + by_z_y / 2
+    by_z_trace = C_33 * found.by_trace_trace + found.by_trace_y / 2
+    by_z_y = C_33 * found.by_trace_y + found.by_y_y / 2
+    by_z_z = C_33 * found.by_trace + C_33 * by_z_trace + by_z_y / 2
     minimum = Derivatives(
         found.energy,
-        found.by_I1,
+        found.by_trace,
         found.by_y,
-        found.by_I1_I1 - by_z_I1**2 / by_z_z,
-        found.by_I1_y - by_z_I1 * by_z_y / by_z_z,
+        found.by_trace_trace - by_z_trace**2 / by_z_z,
+        found.by_trace_y - by_z_trace * by_z_y / by_z_z,
         found.by_y_y - by_z_y**2 / by_z_z,
     )
-    return Condensed(minimum, C_33, 2 * C_33 * found.by_I1 + found.by_y)
+    return Condensed(minimum, C_33, 2 * C_33 * found.by_trace + found.by_y)
 
 
 def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:
@@ -99,8 +99,8 @@ def _thickness_slope(
     """Return first and second derivative of the energy by z = ln C_33 [J/m^3], and the size of their terms."""
     C_33 = np.exp(z)
     found = law(trace_C + C_33, y + z / 2, constants)
-    pull, push = C_33 * found.by_I1, found.by_y / 2
-    curvature = pull + C_33**2 * found.by_I1_I1 + C_33 * found.by_I1_y + found.by_y_y / 4
+    pull, push = C_33 * found.by_trace, found.by_y / 2
+    curvature = pull + C_33**2 * found.by_trace_trace + C_33 * found.by_trace_y + found.by_y_y / 4
     return pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu
 
 
@@ -118,7 +118,7 @@ def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
         found = condensed(law, trace(C), np.log(np.where(valid, det, 1.0)) / 2, dim, constants)
         at = found.at
         valid &= np.isfinite(at.energy)
-        stress = 2 * at.by_I1 * identity(C) + at.by_y * inverse
+        stress = 2 * at.by_trace * identity(C) + at.by_y * inverse
 
         def elasticity() -> Floats:
             found = at.by_y_y * outer(inverse, inverse) - at.by_y * swapped(inverse)
@@ -126,7 +126,7 @@ def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
                 return np.asarray(found)
             eye = np.broadcast_to(identity(C), C.shape)
             mixed = outer(eye, inverse)
-            found += 4 * at.by_I1_I1 * outer(eye, eye) + 2 * at.by_I1_y * (mixed + mixed.swapaxes(0, 1))
+            found += 4 * at.by_trace_trace * outer(eye, eye) + 2 * at.by_trace_y * (mixed + mixed.swapaxes(0, 1))
             return np.asarray(found)
 
         return Response(np.where(valid, at.energy, np.inf), stress, elasticity, np.sqrt(found.C_33), found.across)

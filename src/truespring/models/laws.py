@@ -21,13 +21,10 @@ from truespring.models.rubber import arruda_boyce, gent, neo_hookean, yeoh
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import (
     contracted,
-    determinant,
     dimensions,
     dyad,
     identity,
-    inverted,
     outer,
-    swapped,
     trace,
 )
 from truespring.problem import Problem
@@ -160,25 +157,27 @@ def _shape_density(psi: Callable[[Any], Any], stretch: Any, constants: Constants
 
 def _yeoh_density(stretch: Any, constants: Constants) -> Any:
     c10, c20, c30 = constants.mu / 2, constants["c20"], constants["c30"]
-    return _shape_density(lambda I: c10 * (I - 3) + c20 * (I - 3) ** 2 + c30 * (I - 3) ** 3, stretch, constants)
+    return _shape_density(
+        lambda trace: c10 * (trace - 3) + c20 * (trace - 3) ** 2 + c30 * (trace - 3) ** 3, stretch, constants
+    )
 
 
 def _gent_density(stretch: Any, constants: Constants) -> Any:
     jm = constants["jm"]
-    return _shape_density(lambda I: -constants.mu * jm / 2 * np.log((jm - I + 3) / jm), stretch, constants)
+    return _shape_density(lambda trace: -constants.mu * jm / 2 * np.log((jm - trace + 3) / jm), stretch, constants)
 
 
 def _arruda_boyce_density(stretch: Any, constants: Constants) -> Any:
     N = constants["locking_stretch"] ** 2
     m = constants.mu / (1 + 3 / (5 * N) + 99 / (175 * N**2) + 513 / (875 * N**3) + 42039 / (67375 * N**4))
 
-    def psi(I: Any) -> Any:
+    def psi(trace: Any) -> Any:
         return m * (
-            (I - 3) / 2
-            + (I**2 - 9) / (20 * N)
-            + 11 * (I**3 - 27) / (1050 * N**2)
-            + 19 * (I**4 - 81) / (7000 * N**3)
-            + 519 * (I**5 - 243) / (673750 * N**4)
+            (trace - 3) / 2
+            + (trace**2 - 9) / (20 * N)
+            + 11 * (trace**3 - 27) / (1050 * N**2)
+            + 19 * (trace**4 - 81) / (7000 * N**3)
+            + 519 * (trace**5 - 243) / (673750 * N**4)
         )
 
     return _shape_density(psi, stretch, constants)

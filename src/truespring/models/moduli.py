@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from truespring.errors import ModelError
 from truespring.mesh import MIXED, Mesh
 from truespring.mesh.rows import distinct_rows
 from truespring.models.bending import bending_factors, cell_counts, fem_bending_factors
-from truespring.models.by_rule import SpringsByRule
+from truespring.models.by_rule import SpringCounts, SpringsByRule
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.links import in_a_row, n_links
 from truespring.models.relaxation import relaxed_elasticity
@@ -236,16 +235,16 @@ def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     alone = replace(problem, regions=()) if problem.regions else problem
     mesh = alone.mesh
     classes = lattice_classes(mesh)
-    stiffness = springs.element_stiffness(alone)
     if springs.coupled:
         lame = section.lame_within(material)
         elasticity = hooke(lame.lam, lame.mu, mesh.dim)
     else:
+        stiffness = springs.element_stiffness(alone)
         shared = stiffness / _sharing(mesh) if springs.sharing == "single" else stiffness
         elasticity = lattice_elasticity(alone, shared, classes)
         elasticity[: mesh.dim, : mesh.dim] += springs.kappa(alone)[0]
     _require_resistance(elasticity)
-    counts = spring_counts(mesh, stiffness)
+    counts = springs.counts(alone)
     whole, patch_score, stable = elasticity, 0.0, True
     if not springs.coupled:
         found, patch_score = relaxed_elasticity(alone, springs, shared, counts.n_negative > 0)
@@ -307,14 +306,6 @@ def _link_keys(mesh: Mesh) -> Ints:
     """Return a key of the two nodes of each element's links, link by link, kind by kind, shape (n,)."""
     keys = [part.pair_keys(part.kind.links).ravel() for _, part in mesh.blocks]
     return keys[0] if len(keys) == 1 else np.concatenate(keys)
-
-
-class SpringCounts(NamedTuple):
-    """Number of springs of a mesh, and of springs with negative and with zero stiffness."""
-
-    n_springs: int
-    n_negative: int
-    n_zero: int
 
 
 def spring_counts(mesh: Mesh, stiffness: Floats) -> SpringCounts:

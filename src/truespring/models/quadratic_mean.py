@@ -34,7 +34,9 @@ class _Volume(NamedTuple):
 
 
 class QuadraticMeanPotential(QuadraticPotential):
-    """Elements of second order with the part of lam (or bulk) at the mean of each element, the part of mu at every Gauss point.
+    """Elements of second order with the part of lam at the mean of each element, the rest at every Gauss point.
+
+    A law with separate energies of shape and volume has the part of its bulk modulus at the mean.
 
     An element has one incompressibility constraint instead of one at every Gauss point, so that it does not lock near
     Poisson's ratio 1/2: selective integration (Malkus and Hughes, CMAME 15, 1978). With the volumetric part of mu at

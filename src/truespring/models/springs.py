@@ -10,12 +10,15 @@ from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
 from truespring.mesh import Mesh
+from truespring.models.by_rule import SpringCounts
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.findings import springs_warnings
+from truespring.models.gaussian_quadratic import gaussian_quadratic
 from truespring.models.gaussian_rule import check_law
+from truespring.models.interpolation import SIMPLICES
 from truespring.models.links import in_a_row
 from truespring.models.model import Model
-from truespring.models.moduli import Moduli, moduli
+from truespring.models.moduli import Moduli, moduli, spring_counts
 from truespring.models.network import SpringNetwork
 from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
 from truespring.models.volume import VolumeTerm
@@ -93,6 +96,18 @@ class Springs(Model):
         return self.rule is not None and RULES[self.rule].coupled
 
     @property
+    def locks_on(self) -> tuple[str, ...]:
+        """Kinds of elements on which the springs lock near Poisson's ratio 1/2."""
+        if self.coupled:
+            return RULES[str(self.rule)].locks_on if self.element is None else ()
+        return SIMPLICES if self.volume else ()
+
+    @property
+    def remark(self) -> str:
+        """A sentence on cost and law of coupled springs, without a full stop."""
+        return RULES[self.rule].remark if self.rule is not None else ""
+
+    @property
     def label(self) -> str:
         """Name in figures and tables."""
         words = [self.rule or "own stiffness"]
@@ -111,6 +126,13 @@ class Springs(Model):
             return unscaled
         scale = {material: self._correction(problem, material)[0] for material in problem.materials}
         return unscaled * problem.of_elements(lambda material: scale[material])[:, None]
+
+    def counts(self, problem: Problem) -> SpringCounts:
+        """Return the number of springs on the mesh of a problem, and of those with negative and zero stiffness."""
+        if self.element is None:
+            return spring_counts(problem.mesh, self.element_stiffness(problem))
+        stiffness = gaussian_quadratic(problem).stiffness
+        return SpringCounts(len(stiffness), int((stiffness < 0).sum()), 0)
 
     def _unscaled_stiffness(self, problem: Problem) -> Floats:
         """Return the stiffness of links [N/m], shape (n_elements, links), before scaling for a volume term."""

@@ -18,7 +18,6 @@ from truespring.potential import Projectable, SparseMatrix, Stressed
 from truespring.problem import Problem
 
 
-
 class SummablePart(Stressed, Projectable, Protocol):
     """A potential of elements of one kind."""
 

@@ -13,6 +13,7 @@ from pydantic import Discriminator, Field, model_validator
 from truespring.errors import StudyError, nearest
 from truespring.models import (
     ELEMENTS,
+    GAUSSIAN_LAWS,
     LAWS,
     RULES,
     BemSprings,
@@ -128,11 +129,29 @@ class SpringsKeys(ModelKeys):
         default=None,
         description="stiffness of the body diagonals of a cube, in Young's modulus times edge; rule isotropic only",
     )
+    hourglass: Number | None = Field(
+        default=None,
+        description="stiffness of the hourglass modes over that of finite elements; rule gaussian only; default: 1 in "
+        "the plane, a function of Poisson's ratio in space",
+    )
+    element: Literal["quadratic"] | None = Field(
+        default=None,
+        description="springs between all nodes of triangles or tetrahedra of second order; rule gaussian only",
+    )
+    law: LawName | None = Field(
+        default=None,
+        description=f"constitutive law of the rule gaussian: {', '.join(GAUSSIAN_LAWS)}; default: neo-hookean",
+    )
+
+    @property
+    def _parameters(self) -> dict[str, Any]:
+        """Parameters of the rule, by name."""
+        return {name: getattr(self, name) for rule in RULES.values() for name in rule.parameters}
 
     @model_validator(mode="after")
     def _stiffness_read(self) -> Self:
         if self.stiffness is not None and self.stiffness.file is not None:
-            named = sorted({"rule", "sharing", "volume", "k_body"} & self.model_fields_set)
+            named = sorted({"rule", "sharing", "volume", *self._parameters} & self.model_fields_set)
             if named:
                 raise ValueError(f"stiffness is read from a file, so leave {' and '.join(named)} out")
         return self
@@ -144,7 +163,7 @@ class SpringsKeys(ModelKeys):
             volume = None if keys.volume is None else scope.places.beside(keys.volume)
             return read_spring_files(scope.problem, scope.places.beside(keys.file), volume, self.allow_negative)
         numbers = None if keys is None or keys.edge is None else UserStiffness(keys.edge, keys.diagonal, keys.body)
-        return Springs(self.rule, numbers, self.sharing, self.allow_negative, self.volume, self.k_body)
+        return Springs(self.rule, numbers, self.sharing, self.allow_negative, self.volume, **self._parameters)
 
 
 class FemKeys(ModelKeys):
