@@ -7,10 +7,14 @@ of a matrix of the element whose rows sum to zero. Elements of one class have th
 from typing import Any
 
 import numpy as np
+from numba.extending import overload
 
-from truespring.kernels.small import minus, row
+from truespring.kernels.small import line, minus, plus, row, scaled, unsigned
 from truespring.kernels.threads import kernel
 from truespring.kernels.volumes import slopes, turns
+
+# A tuple of three zeros: vectors in space.
+_SPACE = (0.0, 0.0, 0.0)
 
 
 @kernel
@@ -99,20 +103,21 @@ def slopes_and_turns(
     """Write the derivatives of the quadratic forms, then of the volume, and the second derivatives of the volume.
 
     Shapes: x (n_nodes, dim), elements (n_elements, k), matrices (n_forms, n_classes, k, k), of (n_elements,), simplices
-    (n_simplices, dim + 1), numbers (k, k): of each pair; slope (n_elements, n_forms + 1, k, dim), turn (n_elements,
+    (n_simplices, dim + 1), numbers (k, k): of each pair; slope (n_elements * (n_forms + 1), k, dim), turn (n_elements,
     pairs, 3): the vector w of the pair a < b, see `volumes`.
     """
     dim, k, n_forms = len(zero), elements.shape[1], len(matrices)
+    n = n_forms + 1
     own, around = np.empty((k, 3)), np.empty((k, k, 3))
     for e in range(first, last):
         slopes(x, elements[e], simplices, weight, own, zero)
         turns(x, elements[e], simplices, weight, around, zero)
         for a in range(k):
             for c in range(dim):
-                slope[e, n_forms, a, c] = own[a, c]
+                slope[e * n + n_forms, a, c] = own[a, c]
             for f in range(n_forms):
                 for c in range(dim):
-                    slope[e, f, a, c] = 0.0
+                    slope[e * n + f, a, c] = 0.0
             for b in range(a + 1, k):
                 for c in range(3):
                     turn[e, numbers[a, b], c] = around[a, b, c]
@@ -121,82 +126,91 @@ def slopes_and_turns(
                 for f in range(n_forms):
                     for c in range(dim):
                         part = -2 * matrices[f, of[e], a, b] * (x[elements[e, a], c] - x[elements[e, b], c])
-                        slope[e, f, a, c] += part
-                        slope[e, f, b, c] -= part
+                        slope[e * n + f, a, c] += part
+                        slope[e * n + f, b, c] -= part
 
 
 @kernel
 def growths(first: int, last: int, step: Any, elements: Any, slope: Any, growth: Any, zero: Any) -> None:
     """Write the change of the quadratic forms and of the volume that is linear in a step.
 
-    Shapes: step (n_nodes, dim), elements (n_elements, k), slope (n_elements, n, k, dim), growth (n, n_elements).
+    Shapes: step (n_nodes, dim), elements (n_elements, k), slope (n_elements * n, k, dim), growth (n, n_elements).
     """
-    dim, k = len(zero), elements.shape[1]
+    dim, k, n = len(zero), elements.shape[1], len(growth)
     for e in range(first, last):
-        for m in range(slope.shape[1]):
+        for m in range(n):
             total = 0.0
             for a in range(k):
                 for c in range(dim):
-                    total += slope[e, m, a, c] * step[elements[e, a], c]
+                    total += slope[e * n + m, a, c] * step[elements[e, a], c]
             growth[m, e] = total
 
 
+def add_turn(blocks, p, i, j, factor, w, zero):
+    """Add factor times the matrix that maps v to v x w to block p, from row i and column j on, of len(zero) rows."""
+
+
+@overload(add_turn)
+def _add_turn(blocks, p, i, j, factor, w, zero):
+    def two(blocks, p, i, j, factor, w, zero):
+        blocks[p, i, j + 1] += factor * w[2]
+        blocks[p, i + 1, j] -= factor * w[2]
+
+    def three(blocks, p, i, j, factor, w, zero):
+        x, y, z = factor * w[0], factor * w[1], factor * w[2]
+        blocks[p, i, j + 1] += z
+        blocks[p, i + 1, j] -= z
+        blocks[p, i + 1, j + 2] += x
+        blocks[p, i + 2, j + 1] -= x
+        blocks[p, i + 2, j] += y
+        blocks[p, i, j + 2] -= y
+
+    return {2: two, 3: three}[len(zero)]
+
+
+def add_dyad(blocks, p, i, j, a, b):
+    """Add a b^T to block p, from row i and column j on."""
+
+
+@overload(add_dyad)
+def _add_dyad(blocks, p, i, j, a, b):
+    def two(blocks, p, i, j, a, b):
+        blocks[p, i, j] += a[0] * b[0]
+        blocks[p, i, j + 1] += a[0] * b[1]
+        blocks[p, i + 1, j] += a[1] * b[0]
+        blocks[p, i + 1, j + 1] += a[1] * b[1]
+
+    def three(blocks, p, i, j, a, b):
+        blocks[p, i, j] += a[0] * b[0]
+        blocks[p, i, j + 1] += a[0] * b[1]
+        blocks[p, i, j + 2] += a[0] * b[2]
+        blocks[p, i + 1, j] += a[1] * b[0]
+        blocks[p, i + 1, j + 1] += a[1] * b[1]
+        blocks[p, i + 1, j + 2] += a[1] * b[2]
+        blocks[p, i + 2, j] += a[2] * b[0]
+        blocks[p, i + 2, j + 1] += a[2] * b[1]
+        blocks[p, i + 2, j + 2] += a[2] * b[2]
+
+    return {2: two, 3: three}[len(a)]
+
+
 @kernel
-def _add_block(
-    e: int,
-    a: int,
-    b: int,
-    slope: Any,
-    second: Any,
-    matrices: Any,
-    of: Any,
-    factors: Any,
-    turn: Any,
-    pressure: Any,
-    numbers: Any,
-    by: Any,
-    values: Any,
-    p: int,
-    top: int,
-    left: int,
-    zero: Any,
-) -> None:
-    """Add the second derivative of an element's energy by its nodes a and b to values[p, top:, left:].
-
-    `by` is the product of the slopes at node a and the matrix `second`, shape (n_forms + 1, dim).
-    """
-    dim, n = len(zero), slope.shape[1]
-    for i in range(dim):
-        for j in range(dim):
-            total = 0.0
-            for m in range(n):
-                total += by[m, i] * slope[e, m, b, j]
-            values[p, top + i, left + j] += total
-    if n > 1:
-        spring = 0.0
-        for f in range(n - 1):
-            spring += 2 * factors[f, e] * matrices[f, of[e], a, b]
-        for i in range(dim):
-            values[p, top + i, left + i] += spring
-    if a != b:
-        sign = pressure[e] if a < b else -pressure[e]
-        pair = numbers[a, b]
-        for c in range(3):
-            i, j = (c + 1) % 3, (c + 2) % 3
-            if i < dim and j < dim:
-                values[p, top + i, left + j] += sign * turn[e, pair, c]
-                values[p, top + j, left + i] -= sign * turn[e, pair, c]
+def _weighed(e: int, a: int, m: int, slope: Any, second: Any, zero: Any) -> Any:
+    """Return column m of the product of the slopes at node a and the matrix `second` of an element."""
+    n = second.shape[1]
+    total = zero
+    for other in range(n):
+        total = plus(total, scaled(second[e, other, m], line(slope, e * n + other, a, zero)))
+    return total
 
 
 @kernel
-def _weigh(e: int, a: int, slope: Any, second: Any, by: Any, zero: Any) -> None:
-    """Write the product of the slopes at node a and the matrix `second` of an element."""
-    for m in range(slope.shape[1]):
-        for i in range(len(zero)):
-            total = 0.0
-            for n in range(slope.shape[1]):
-                total += slope[e, n, a, i] * second[e, n, m]
-            by[m, i] = total
+def _stiffness(e: int, a: int, b: int, matrices: Any, of: Any, factors: Any) -> float:
+    """Return entry a, b of the sum of the matrices of an element, times twice their factors."""
+    total = 0.0
+    for f in range(len(matrices)):
+        total += 2 * factors[f, e] * matrices[f, of[e], a, b]
+    return total
 
 
 @kernel
@@ -223,22 +237,30 @@ def add_rows(
     `factors` the first derivatives by the forms, `pressure` that by the volume. With n_forms = 0 the forms have no
     part in the result.
 
-    Shapes: at_starts (n_nodes + 1,), at (n_elements * k,), slots (n_elements, k, k), slope (n_elements, n_forms + 1, k,
-    dim), second (n_elements, n_forms + 1, n_forms + 1), matrices (n_forms, n_classes, k, k), of (n_elements,), factors
-    (n_forms, n_elements), turn (n_elements, pairs, 3), pressure (n_elements,), numbers (k, k), values (n_blocks, dim,
-    dim).
+    Shapes: at_starts (n_nodes + 1,), at (n_elements * k,), slots (n_elements, k, k), slope (n_elements * (n_forms + 1),
+    k, dim), second (n_elements, n_forms + 1, n_forms + 1), matrices (n_forms, n_classes, k, k), of (n_elements,),
+    factors (n_forms, n_elements), turn (n_elements, pairs, 3), pressure (n_elements,), numbers (k, k), values
+    (n_blocks, dim, dim).
     """
-    k, n = slots.shape[1], slope.shape[1]
-    by = np.empty((n, len(zero)))
+    k, n = unsigned(slots.shape[1]), second.shape[1]
     for i in range(first, last):
         for q in range(at_starts[i], at_starts[i + 1]):
-            e, a = at[q] // k, at[q] % k
-            _weigh(e, a, slope, second, by, zero)
+            place = unsigned(at[unsigned(q)])
+            e = place // k
+            a = place - e * k
+            for m in range(n):
+                by = _weighed(e, a, m, slope, second, zero)
+                for b in range(k):
+                    add_dyad(values, unsigned(slots[e, a, b]), 0, 0, by, line(slope, e * n + m, b, zero))
             for b in range(k):
-                p = slots[e, a, b]
-                _add_block(
-                    e, a, b, slope, second, matrices, of, factors, turn, pressure, numbers, by, values, p, 0, 0, zero
-                )
+                p = unsigned(slots[e, a, b])
+                if n > 1:
+                    spring = _stiffness(e, a, b, matrices, of, factors)
+                    for c in range(len(zero)):
+                        values[p, c, c] += spring
+                if a != b:
+                    sign = pressure[e] if a < b else -pressure[e]
+                    add_turn(values, p, 0, 0, sign, line(turn, e, numbers[a, b], _SPACE), zero)
 
 
 @kernel
@@ -260,29 +282,18 @@ def add_matrices(
 
     Other shapes as in `add_rows`.
     """
-    dim, k, n = len(zero), slope.shape[2], slope.shape[1]
-    by = np.empty((n, dim))
+    dim, k, n = len(zero), slope.shape[1], second.shape[1]
     for e in range(first, last):
         for a in range(k):
-            _weigh(e, a, slope, second, by, zero)
+            for m in range(n):
+                by = _weighed(e, a, m, slope, second, zero)
+                for b in range(k):
+                    add_dyad(blocks, e, a * dim, b * dim, by, line(slope, e * n + m, b, zero))
             for b in range(k):
-                top, left = a * dim, b * dim
-                _add_block(
-                    e,
-                    a,
-                    b,
-                    slope,
-                    second,
-                    matrices,
-                    of,
-                    factors,
-                    turn,
-                    pressure,
-                    numbers,
-                    by,
-                    blocks,
-                    e,
-                    top,
-                    left,
-                    zero,
-                )
+                if n > 1:
+                    spring = _stiffness(e, a, b, matrices, of, factors)
+                    for c in range(dim):
+                        blocks[e, a * dim + c, b * dim + c] += spring
+                if a != b:
+                    sign = pressure[e] if a < b else -pressure[e]
+                    add_turn(blocks, e, a * dim, b * dim, sign, line(turn, e, numbers[a, b], _SPACE), zero)

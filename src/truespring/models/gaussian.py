@@ -114,13 +114,18 @@ class GaussianElements:
         self._run(volumes.volumes, writable(positions), self._pattern.elements, *self._form, volume)
         return volume
 
-    def _state(self, positions: Floats) -> _State:
-        """Return the elements in a deformed state; NaN in inverted elements."""
+    def _state(self, positions: Floats, energy: bool = True) -> _State:
+        """Return the elements in a deformed state; NaN in inverted elements.
+
+        Without `energy`, the quadratic forms and the energy density are undefined where the derivatives do not depend
+        on them.
+        """
         from truespring.kernels import gaussian
         from truespring.kernels.threads import writable
 
-        sums = np.empty((len(self.laplacians.matrices), len(self._pattern.elements)))
-        self._run(gaussian.sums, writable(positions), self._pattern.elements, *self._forms, sums)
+        sums = np.zeros((len(self.laplacians.matrices), len(self._pattern.elements)))
+        if energy or not self.constant:
+            self._run(gaussian.sums, writable(positions), self._pattern.elements, *self._forms, sums)
         ratio = self._volume(positions) / self._volumes
         ratio = np.where(ratio > 0, ratio, np.nan)
         squares = sums / self._volumes
@@ -156,7 +161,7 @@ class GaussianElements:
         The last is the Kirchhoff pressure J dW/dJ: extrapolated along a step, it keeps the iteration stable at large
         rotations, which the pressure dW/dJ does not.
         """
-        return self._stress(self._state(positions))
+        return self._stress(self._state(positions, energy=False))
 
     @staticmethod
     def _stress(state: _State) -> Floats:
@@ -167,8 +172,8 @@ class GaussianElements:
         from truespring.kernels import gaussian
         from truespring.kernels.threads import writable
 
-        state, slope = self._state(positions), self._slopes(positions)[0]
-        growth = np.empty((slope.shape[1], len(slope)))
+        state, slope = self._state(positions, energy=False), self._slopes(positions)[0]
+        growth = np.empty((len(self.laplacians.matrices) + 1, len(self._volumes)))
         self._run(gaussian.growths, writable(step), self._pattern.elements, slope, growth)
         growth /= self._volumes
         growth[-1] /= state.ratio
@@ -192,7 +197,7 @@ class GaussianElements:
         from truespring.kernels import gaussian, volumes
         from truespring.kernels.threads import run, writable
 
-        x, pattern, state = writable(positions), self._pattern, self._state(positions)
+        x, pattern, state = writable(positions), self._pattern, self._state(positions, energy=False)
         force = np.empty((len(pattern.elements), pattern.elements.shape[1] * pattern.dim))
         self._run(volumes.forces, x, pattern.elements, *self._form, state.law.at.by_y / state.ratio, force)
         if self._weights is None:
@@ -235,7 +240,7 @@ class GaussianElements:
         matrices, of = self._forms
         known = matrices if forms else matrices[:0]
         n, (k, dim) = len(self._pattern.elements), (self._pattern.elements.shape[1], self._pattern.dim)
-        slope = np.empty((n, len(known) + 1, k, dim))
+        slope = np.empty((n * (len(known) + 1), k, dim))
         turn = np.empty((n, len(self.problem.mesh.kind.links), 3))
         rest = (*self._form, self._numbers, slope, turn)
         self._run(gaussian.slopes_and_turns, writable(positions), self._pattern.elements, known, of, *rest)
@@ -243,7 +248,7 @@ class GaussianElements:
 
     def _curvature(self, positions: Floats, stress: Floats | None, forms: bool = True) -> tuple[Any, ...]:
         """Return the arguments of the kernels that add second derivatives, without the forms if these are constant."""
-        state = self._state(positions)
+        state = self._state(positions, energy=False)
         stress = self._stress(state) if stress is None else stress
         second = self._second(state)
         second[:, -1, -1] -= stress[-1]
