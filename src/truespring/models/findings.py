@@ -142,7 +142,7 @@ def _found(problem: Problem, springs: SpringsByRule) -> Iterator[Finding]:
             "unbounded",
             {"kappa": kappa},
             f"the volume term has a negative modulus ({kappa:.4g} Pa): the energy is unbounded below at large stretch; "
-            "the rule biquadratic does not have this limit",
+            "the rule gaussian does not have this limit",
         )
 
 
@@ -154,7 +154,7 @@ def _scored(problem: Problem, effective: Moduli) -> Iterator[Finding]:
             "patch-score",
             {"score": effective.patch_score},
             "on this irregular mesh a uniform strain is not an equilibrium of these springs (patch test: unbalanced "
-            f"force {effective.patch_score:.2g} {unit} at inner nodes); the rule biquadratic passes",
+            f"force {effective.patch_score:.2g} {unit} at inner nodes); the rule gaussian passes",
         )
         return
     apart = float(np.linalg.norm(effective.body - effective.elasticity) / np.linalg.norm(effective.elasticity))

@@ -162,7 +162,7 @@ class Springs(Model):
         _, section = require_body(problem)
         if material.poisson < 0:
             raise ModelError(
-                f"volume = true: poisson = {material.poisson:g} must be from 0 to 0.5; the rule biquadratic allows any"
+                f"volume = true: poisson = {material.poisson:g} must be from 0 to 0.5; the rule gaussian allows any"
             )
         alone = dict(zip(problem.materials, problem.homogeneous, strict=True))[material]
         classes = lattice_classes(problem.mesh)
@@ -176,7 +176,7 @@ class Springs(Model):
             }.get(problem.mesh.element, "rule isotropic")
             raise ModelError(
                 f"volume = true requires isotropic lattices, this mesh is {this}: use the {other}, or the rule "
-                "biquadratic, which has the Poisson's ratio of the material on any mesh"
+                "gaussian, which has the Poisson's ratio of the material on any mesh"
             )
         exact = section.lame_within(material)
         return exact.mu / mu, exact.lam - exact.mu
