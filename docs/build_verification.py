@@ -380,9 +380,9 @@ def against_the_truth() -> str:
         study = read_study(ROOT / "examples" / f"{name}.toml")
         problem, steps = study.problem, study.solver
         mesh = refined(refined(in_simplices(problem.mesh)[0]))
-        for law in LAWS:
+        for law in (name for name, entry in LAWS.items() if not entry.constants):
             truth = ts.solve(replace(problem, mesh=mesh), ts.Fem(law), steps)
-            models = {f"springs ({rule})": ts.Springs(rule) for rule in ("lloyd", "isotropic")}
+            models = {f"springs ({rule})": ts.Springs(rule) for rule in ("lloyd", "isotropic", "gaussian")}
             for who, model in {**models, "four-node elements": ts.Fem(law)}.items():
                 error = ts.compare(ts.solve(problem, model, steps), truth).error
                 shown = "no equilibrium of the truth" if error is None else f"{error:.1%}"
