@@ -8,10 +8,7 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.models.law import Constants, Response
 from truespring.models.symmetric import determinant, identity, inverted, outer, swapped, trace
-
-# Iterations of Newton's method for the free thickness, largest change of ln C_33 in one, and the accepted residual
-# relative to the terms of the equation.
-_MAX_ITERATIONS, _LARGEST_CHANGE, _SOLVED = 100, 2.0, 1e-12
+from truespring.models.thickness import Slope, free_thickness
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,27 +78,17 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
 
 def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:
     """Return ln C_33 at which the stress of the third direction is zero; NaN where there is no stable one."""
+
+    def slope(z: Floats) -> Slope:
+        C_33 = np.exp(z)
+        found = law(trace_C + C_33, y + z / 2, constants)
+        pull, push = C_33 * found.by_trace, found.by_y / 2
+        curvature = pull + C_33**2 * found.by_trace_trace + C_33 * found.by_trace_y + found.by_y_y / 4
+        return Slope(pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu)
+
     lam, mu = constants.lam, constants.mu
-    z = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
-    for _ in range(_MAX_ITERATIONS):
-        slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
-        step = slope / np.where(curvature > 0, curvature, scale)
-        z = z - np.clip(np.where(np.isfinite(step), step, 0.0), -_LARGEST_CHANGE, _LARGEST_CHANGE)
-        if np.abs(step).max(initial=0.0) <= 1e-15 * max(1.0, float(np.abs(z).max(initial=0.0))):
-            break
-    slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
-    return np.where((np.abs(slope) <= _SOLVED * scale) & (curvature > 0), z, np.nan)
-
-
-def _thickness_slope(
-    law: InvariantLaw, trace_C: Floats, y: Floats, z: Floats, constants: Constants
-) -> tuple[Floats, Floats, Floats]:
-    """Return first and second derivative of the energy by z = ln C_33 [J/m^3], and the size of their terms."""
-    C_33 = np.exp(z)
-    found = law(trace_C + C_33, y + z / 2, constants)
-    pull, push = C_33 * found.by_trace, found.by_y / 2
-    curvature = pull + C_33**2 * found.by_trace_trace + C_33 * found.by_trace_y + found.by_y_y / 4
-    return pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu
+    start = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
+    return free_thickness(slope, start, lambda: np.log(trace_C / 2))
 
 
 def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:

@@ -28,7 +28,8 @@ class Constant:
         meaning: description of the key, in a few words.
         example: an allowed value [SI], used by the contract tests.
         default: value for materials without the constant [SI]; None if the law requires it.
-        smallest, largest: allowed range, both included [SI].
+        smallest, largest: allowed range [SI].
+        exclusive: whether `smallest` itself is not allowed.
     """
 
     dimension: Dimension | None
@@ -37,6 +38,19 @@ class Constant:
     default: float | None = None
     smallest: float = -np.inf
     largest: float = np.inf
+    exclusive: bool = False
+
+    def allows(self, value: float) -> bool:
+        """Return whether a value [SI] is in the allowed range."""
+        return self.smallest <= value <= self.largest and not (self.exclusive and value == self.smallest)
+
+    @property
+    def range_words(self) -> str:
+        """The allowed range in words: "0 to 1", or "more than 0"."""
+        words = f"{self.smallest:g} to {self.largest:g}"
+        if not self.exclusive:
+            return words
+        return f"more than {self.smallest:g}" if np.isinf(self.largest) else f"{words}, without {self.smallest:g}"
 
     @property
     def unit(self) -> str:
@@ -142,6 +156,8 @@ class Law:
         constants: the constants by name, without lam and mu.
         lame: returns the Lamé constants [Pa] at small strain from the values of `constants` by name; None if they are
             those of the material for any values. A material with other young and poisson is an error.
+        fault: returns what is impossible in the values of `constants` by name for a material of the given Lamé
+            constants, or ""; None if the range of each constant says it all.
     """
 
     respond: Callable[[Floats, Constants], Response]
@@ -158,3 +174,4 @@ class Law:
     domain: tuple[float, float] = (0.0, np.inf)
     constants: Mapping[str, Constant] = field(default_factory=_none)
     lame: Callable[[Mapping[str, float]], Lame] | None = None
+    fault: Callable[[Lame, Mapping[str, float]], str] | None = None
