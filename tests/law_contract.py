@@ -307,7 +307,9 @@ def check_facts(law: Law) -> None:
         if law.volumetric == "bulk":
             shape = Body(law, Constants(-2 / 3 * mu, mu, False, body.constants.values), 3)
             assert close(shape.energy(shape.strain(np.full(3, 1.2))), 0.0, mu), "energy of shape of a swollen body"
-        check_domain(body)
+    for body in bodies(law, (0.3 if law.volumetric == "lam" else 0.49,)):
+        if body.dim == 3:
+            check_domain(body)
 
 
 def check_domain(body: Body) -> None:

@@ -11,15 +11,15 @@ import numpy as np
 from truespring.models.law import Constants
 
 
-def small(stretch: Any, constants: Constants) -> Any:
+def small_density(stretch: Any, constants: Constants) -> Any:
     return _quadratic(stretch - 1, constants)
 
 
-def green(stretch: Any, constants: Constants) -> Any:
+def green_density(stretch: Any, constants: Constants) -> Any:
     return _quadratic((stretch**2 - 1) / 2, constants)
 
 
-def hencky(stretch: Any, constants: Constants) -> Any:
+def hencky_density(stretch: Any, constants: Constants) -> Any:
     return _quadratic(np.log(stretch), constants)
 
 
@@ -28,7 +28,7 @@ def _quadratic(strain: Any, constants: Constants) -> Any:
     return constants.mu * (strain**2).sum() + constants.lam / 2 * strain.sum() ** 2
 
 
-def neo_hookean(stretch: Any, constants: Constants) -> Any:
+def neo_hookean_density(stretch: Any, constants: Constants) -> Any:
     log_J = np.log(stretch).sum()
     return constants.mu * (((stretch**2).sum() - 3) / 2 - log_J) + constants.lam / 2 * log_J**2
 
@@ -39,17 +39,17 @@ def _shape(psi: Callable[[Any], Any], stretch: Any, constants: Constants) -> Any
     return psi((stretch**2).sum() / J ** (2 / 3)) + constants.bulk / 2 * np.log(J) ** 2
 
 
-def yeoh(stretch: Any, constants: Constants) -> Any:
+def yeoh_density(stretch: Any, constants: Constants) -> Any:
     c10, c20, c30 = constants.mu / 2, constants["c20"], constants["c30"]
     return _shape(lambda trace: c10 * (trace - 3) + c20 * (trace - 3) ** 2 + c30 * (trace - 3) ** 3, stretch, constants)
 
 
-def gent(stretch: Any, constants: Constants) -> Any:
+def gent_density(stretch: Any, constants: Constants) -> Any:
     jm = constants["jm"]
     return _shape(lambda trace: -constants.mu * jm / 2 * np.log((jm - trace + 3) / jm), stretch, constants)
 
 
-def arruda_boyce(stretch: Any, constants: Constants) -> Any:
+def arruda_boyce_density(stretch: Any, constants: Constants) -> Any:
     N = constants["locking_stretch"] ** 2
     m = constants.mu / (1 + 3 / (5 * N) + 99 / (175 * N**2) + 513 / (875 * N**3) + 42039 / (67375 * N**4))
 
@@ -65,7 +65,7 @@ def arruda_boyce(stretch: Any, constants: Constants) -> Any:
     return _shape(psi, stretch, constants)
 
 
-def mooney_rivlin(stretch: Any, constants: Constants) -> Any:
+def mooney_rivlin_density(stretch: Any, constants: Constants) -> Any:
     """Return C10 (I1b - 3) + C01 (I2b - 3) + bulk/2 (ln J)^2 [J/m^3]."""
     J, squares, c01 = stretch.prod(), stretch**2, constants["c01"]
     I1b = squares.sum() / J ** (2 / 3)
@@ -73,7 +73,7 @@ def mooney_rivlin(stretch: Any, constants: Constants) -> Any:
     return (constants.mu / 2 - c01) * (I1b - 3) + c01 * (I2b - 3) + constants.bulk / 2 * np.log(J) ** 2
 
 
-def ogden(stretch: Any, constants: Constants) -> Any:
+def ogden_density(stretch: Any, constants: Constants) -> Any:
     """Return sum 2 mu_i / alpha_i^2 (sum of stretch^alpha_i - 3) without dilatation + bulk/2 (ln J)^2 [J/m^3]."""
     J = stretch.prod()
     shape, first = stretch / J ** (1 / 3), constants.mu - constants["mu2"] - constants["mu3"]

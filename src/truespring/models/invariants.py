@@ -13,7 +13,10 @@ from truespring.models.thickness import Slope, free_thickness
 
 @dataclass(frozen=True, slots=True)
 class Derivatives:
-    """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J, all of one shape."""
+    """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J.
+
+    All are of one shape, or of shapes that broadcast to that of the energy.
+    """
 
     energy: Floats
     by_trace: Floats
@@ -21,6 +24,12 @@ class Derivatives:
     by_trace_trace: Floats
     by_trace_y: Floats
     by_y_y: Floats
+
+    @property
+    def filled(self) -> "Derivatives":
+        """The same with all arrays of the shape of the energy, some of them read-only."""
+        parts = (self.by_trace, self.by_y, self.by_trace_trace, self.by_trace_y, self.by_y_y)
+        return Derivatives(self.energy, *(np.broadcast_to(part, self.energy.shape) for part in parts))
 
     @property
     def linear(self) -> bool:
@@ -53,11 +62,8 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
     In plane strain and in 3D, C_33 is 1. In plane stress, C_33 minimises the energy: Newton's method in z = ln C_33 on
     C_33 W_I1 + W_y / 2 = 0; the second derivatives are those of the minimum.
     """
-    if dim == 3:
-        found = law(trace_C, y, constants)
-        return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     if not constants.plane_stress:
-        found = law(trace_C + 1, y, constants)
+        found = law(trace_C if dim == 3 else trace_C + 1, y, constants).filled
         return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     z = _free_thickness(law, trace_C, y, constants)
     C_33 = np.exp(z)
@@ -73,7 +79,7 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
         found.by_trace_y - by_z_trace * by_z_y / by_z_z,
         found.by_y_y - by_z_y**2 / by_z_z,
     )
-    return Condensed(minimum, C_33, 2 * C_33 * found.by_trace + found.by_y)
+    return Condensed(minimum.filled, C_33, 2 * C_33 * found.by_trace + found.by_y)
 
 
 def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:
@@ -82,13 +88,15 @@ def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Co
     def slope(z: Floats) -> Slope:
         C_33 = np.exp(z)
         found = law(trace_C + C_33, y + z / 2, constants)
-        pull, push = C_33 * found.by_trace, found.by_y / 2
-        curvature = pull + C_33**2 * found.by_trace_trace + C_33 * found.by_trace_y + found.by_y_y / 4
-        return Slope(pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu)
+        pull = C_33 * found.by_trace
+        curvature = pull + found.by_y_y / 4
+        if not found.linear:
+            curvature += C_33 * (C_33 * found.by_trace_trace + found.by_trace_y)
+        return Slope(pull + found.by_y / 2, curvature)
 
     lam, mu = constants.lam, constants.mu
     start = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
-    return free_thickness(slope, start, lambda: np.log(trace_C / 2))
+    return free_thickness(slope, start, lambda: np.log(trace_C / 2), mu)
 
 
 def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
@@ -105,16 +113,20 @@ def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
         found = condensed(law, trace(C), np.log(np.where(valid, det, 1.0)) / 2, dim, constants)
         at = found.at
         valid &= np.isfinite(at.energy)
-        stress = 2 * at.by_trace * identity(C) + at.by_y * inverse
+        stress = at.by_y * inverse
+        stress[:dim] += 2 * at.by_trace
 
         def elasticity() -> Floats:
-            found = at.by_y_y * outer(inverse, inverse) - at.by_y * swapped(inverse)
+            found, turned = outer(inverse, inverse), swapped(inverse)
+            found *= at.by_y_y
+            turned *= at.by_y
+            found -= turned
             if at.linear:
-                return np.asarray(found)
+                return found
             eye = np.broadcast_to(identity(C), C.shape)
             mixed = outer(eye, inverse)
             found += 4 * at.by_trace_trace * outer(eye, eye) + 2 * at.by_trace_y * (mixed + mixed.swapaxes(0, 1))
-            return np.asarray(found)
+            return found
 
         return Response(np.where(valid, at.energy, np.inf), stress, elasticity, np.sqrt(found.C_33), found.across)
 

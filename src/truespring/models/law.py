@@ -152,7 +152,10 @@ class Law:
         constant_springs: whether `invariants` is linear in I1 with a factor that does not depend on ln J, so that the
             springs of `rule = "gaussian"` have a constant stiffness.
         domain: smallest and largest stretch of a bar between which its force increases with its length; beyond them a
-            bar under a dead load snaps.
+            bar under a dead load snaps. With `volumetric` "bulk", those of a nearly incompressible material, with
+            constants as in the examples.
+        limit: a sentence on a deformation that the law does not reach, because its energy is infinite there, without
+            a full stop; "" if there is none.
         constants: the constants by name, without lam and mu.
         lame: returns the Lamé constants [Pa] at small strain from the values of `constants` by name; None if they are
             those of the material for any values. A material with other young and poisson is an error.
@@ -172,6 +175,7 @@ class Law:
     invariants: "InvariantLaw | None" = None
     constant_springs: bool = False
     domain: tuple[float, float] = (0.0, np.inf)
+    limit: str = ""
     constants: Mapping[str, Constant] = field(default_factory=_none)
     lame: Callable[[Mapping[str, float]], Lame] | None = None
     fault: Callable[[Lame, Mapping[str, float]], str] | None = None

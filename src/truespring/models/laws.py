@@ -13,7 +13,17 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
-from truespring.models import densities
+from truespring.models.densities import (
+    arruda_boyce_density,
+    gent_density,
+    green_density,
+    hencky_density,
+    mooney_rivlin_density,
+    neo_hookean_density,
+    ogden_density,
+    small_density,
+    yeoh_density,
+)
 from truespring.models.invariants import by_invariants
 from truespring.models.law import Constant, Constants, Law, Response
 from truespring.models.ogden import hencky, mooney_rivlin, mooney_rivlin_fault, ogden, ogden_fault
@@ -69,7 +79,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
     {
         "linear": Law(
             linear,
-            densities.small,
+            small_density,
             label="linear",
             source="Hooke's law of the small strain",
             finite=False,
@@ -79,7 +89,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "saint-venant-kirchhoff": Law(
             saint_venant_kirchhoff,
-            densities.green,
+            green_density,
             label="St. Venant-Kirchhoff",
             source="Hooke's law of the Green strain; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4",
             finite=True,
@@ -90,7 +100,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "neo-hookean": Law(
             by_invariants(neo_hookean),
-            densities.neo_hookean,
+            neo_hookean_density,
             label="neo-Hookean",
             source="Simo and Pister 1984; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4.3",
             finite=True,
@@ -102,7 +112,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "hencky": Law(
             by_stretches(hencky),
-            densities.hencky,
+            hencky_density,
             label="Hencky",
             source="Hencky 1928: quadratic in ln U",
             finite=True,
@@ -113,7 +123,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "yeoh": Law(
             by_invariants(yeoh),
-            densities.yeoh,
+            yeoh_density,
             label="Yeoh",
             source="Yeoh, Rubber Chemistry and Technology 66, 1993",
             finite=True,
@@ -131,7 +141,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "gent": Law(
             by_invariants(gent),
-            densities.gent,
+            gent_density,
             label="Gent",
             source="Gent, Rubber Chemistry and Technology 69, 1996",
             finite=True,
@@ -140,6 +150,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             trace="logarithmic",
             volumetric="bulk",
             invariants=gent,
+            limit="Gent's law ends where I1 - 3 at constant volume reaches jm: the body cannot be stretched further",
             constants=MappingProxyType(
                 {
                     "jm": Constant(
@@ -150,7 +161,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "arruda-boyce": Law(
             by_invariants(arruda_boyce),
-            densities.arruda_boyce,
+            arruda_boyce_density,
             label="Arruda-Boyce",
             source="Arruda and Boyce, Journal of the Mechanics and Physics of Solids 41, 1993; series of five terms",
             finite=True,
@@ -169,7 +180,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "mooney-rivlin": Law(
             by_stretches(mooney_rivlin),
-            densities.mooney_rivlin,
+            mooney_rivlin_density,
             label="Mooney-Rivlin",
             source="Mooney, Journal of Applied Physics 11, 1940; Rivlin 1948",
             finite=True,
@@ -184,7 +195,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         ),
         "ogden": Law(
             by_stretches(ogden),
-            densities.ogden,
+            ogden_density,
             label="Ogden",
             source="Ogden, Proceedings of the Royal Society A 326, 1972",
             finite=True,

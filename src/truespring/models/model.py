@@ -5,6 +5,7 @@ from typing import Any
 from truespring.completing import completed
 from truespring.errors import ModelError
 from truespring.models.fem_potential import FiniteElements
+from truespring.models.laws import LAWS
 from truespring.models.moduli import Moduli
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -41,6 +42,11 @@ class Model:
     def finite(self) -> bool:
         """Whether strains are finite; false for a linear theory, in which loads act on the undeformed body."""
         return True
+
+    @property
+    def limit(self) -> str:
+        """A sentence on a deformation that the law does not reach, without a full stop; "" if there is none."""
+        return LAWS[self.law].limit if self.law is not None and self.law in LAWS else ""
 
     @property
     def element_is_open(self) -> bool:

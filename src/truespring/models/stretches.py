@@ -60,13 +60,13 @@ def _free(law: StretchLaw, plane: Floats, constants: Constants) -> Floats:
 
     def slope(z: Floats) -> Slope:
         found = law(np.stack([*plane, z / 2]), constants)
-        return Slope(found.first[2] / 2, found.second[2, 2] / 4, np.abs(found.first).sum(axis=0) + constants.mu)
+        return Slope(found.first[2] / 2, found.second[2, 2] / 4)
 
     def smallest_change() -> Floats:
         return np.asarray(np.log(np.exp(2 * plane).mean(axis=0)))
 
     lam, mu, growth = constants.lam, constants.mu, plane.sum(axis=0)
-    return free_thickness(slope, -2 * lam / (lam + 2 * mu) * growth, smallest_change) / 2
+    return free_thickness(slope, -2 * lam / (lam + 2 * mu) * growth, smallest_change, mu) / 2
 
 
 def by_stretches(law: StretchLaw) -> Callable[[Floats, Constants], Response]:

@@ -8,8 +8,8 @@ import numpy as np
 from truespring.arrays import Floats
 
 # Iterations of Newton's method, largest change of ln C_33 in one, halvings of a step that leaves the domain of the law,
-# and the accepted residual relative to the terms of the equation.
-_MAX_ITERATIONS, _LARGEST_CHANGE, _MAX_HALVINGS, _SOLVED = 100, 2.0, 40, 1e-12
+# and the step after which the error, of the order of its square, is below rounding.
+_MAX_ITERATIONS, _LARGEST_CHANGE, _MAX_HALVINGS, _LAST_STEP = 100, 2.0, 40, 3e-9
 
 
 class Slope(NamedTuple):
@@ -17,19 +17,19 @@ class Slope(NamedTuple):
 
     Attributes:
         first, second: first and second derivative.
-        scale: sum of the magnitudes of the terms of `first`, positive.
     """
 
     first: Floats
     second: Floats
-    scale: Floats
 
 
-def free_thickness(slope: Callable[[Floats], Slope], start: Floats, inside: Callable[[], Floats]) -> Floats:
+def free_thickness(
+    slope: Callable[[Floats], Slope], start: Floats, inside: Callable[[], Floats], mu: float | Floats
+) -> Floats:
     """Return z = ln C_33 at which the energy is smallest, so that the stress of the third direction is zero.
 
     Newton's method from `start`, or from `inside()` where `start` is outside the domain of the law. A step that leaves
-    the domain is halved. Returns NaN where there is no minimum.
+    the domain is halved. `mu` is the shear modulus [Pa]. Returns NaN where there is no minimum.
     """
     z, at = start, slope(start)
     outside = ~np.isfinite(at.first)
@@ -37,12 +37,14 @@ def free_thickness(slope: Callable[[Floats], Slope], start: Floats, inside: Call
         z = np.where(outside, inside(), z)
         at = slope(z)
     for _ in range(_MAX_ITERATIONS):
-        step = at.first / np.where(at.second > 0, at.second, at.scale)
+        stable = at.second > 0
+        step = at.first / (at.second if stable.all() else np.where(stable, at.second, np.abs(at.first) + mu))
         step = np.clip(np.where(np.isfinite(step), step, 0.0), -_LARGEST_CHANGE, _LARGEST_CHANGE)
-        if np.abs(step).max(initial=0.0) <= 1e-15 * max(1.0, float(np.abs(z).max(initial=0.0))):
+        solved = np.abs(step) <= _LAST_STEP * np.maximum(1.0, np.abs(z))
+        if solved.all():
             break
         z, at = _within(slope, z, step)
-    return np.where((np.abs(at.first) <= _SOLVED * at.scale) & (at.second > 0), z, np.nan)
+    return np.where(solved & np.isfinite(at.first) & stable, z - step, np.nan)
 
 
 def _within(slope: Callable[[Floats], Slope], z: Floats, step: Floats) -> tuple[Floats, Slope]:
