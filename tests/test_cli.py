@@ -16,6 +16,7 @@ import pytest
 import trimesh
 
 from tests.studies import changed, written
+from tests.wording import in_order
 from truespring.cli import main
 from truespring.study import read_study
 
@@ -168,6 +169,8 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     for text in ("8.824 to 11.05 kPa", "0.263 to 0.412"):
         assert text in " ".join(shown.split())
     assert "Zener" not in shown
+    brief = " ".join(shown.split())
+    assert in_order(brief, "8.824", "(material 10 kPa, 0.300)", "'springs'", "not fit", 'rule = "isotropic"', "-v")
     assert shown.splitlines()[-1] == f"picture: {out / 'study' / 'check.png'}"
     assert {one.name for one in (out / "study").iterdir()} == {"check.png", ".truespring.json"}
     assert (out / "study" / "check.png").read_bytes().startswith(b"\x89PNG")
@@ -178,6 +181,9 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     assert main(["check", str(file), "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
+    reasons = plan["models"]["springs"]["sentence"].split(". ")[0]
+    assert in_order(reasons, "0.882", "1.105", "0.263", "0.412", "0.300")
+    assert reasons in " ".join(shown.split()) and reasons not in brief
     assert plan["total_force"] == pytest.approx([0, -0.01])
     problem = read_study(file).problem
     stated = {"supports": [one.words(2) for one in problem.supports], "loads": [one.words() for one in problem.loads]}

@@ -11,7 +11,7 @@ import pytest
 import truespring as ts
 from truespring.errors import MeshError, ReferenceFileError
 from truespring.mesh.files import FORMATS, read_mesh
-from truespring.reference import READERS, read_record
+from truespring.reference import READERS, format_of, read_record
 
 DATA = Path(__file__).parent / "data"
 MESHES = {
@@ -78,6 +78,19 @@ def test_a_result_of_neither_form_is_refused_by_both(tmp_path: Path, key: str) -
     others = [other for other in READERS if other != key]
     with pytest.raises(ReferenceFileError, match=rf"it does not begin like {re.escape(others[0])}, .* either"):
         read_record(tmp_path / f"result{key}")
+
+
+@pytest.mark.parametrize("key", READERS)
+def test_a_suffix_stands_for_its_format_in_any_case_and_no_other_does(tmp_path: Path, key: str) -> None:
+    """Of files that no format recognises."""
+    for file in (tmp_path / f"result{key.upper()}", tmp_path / f"result{key}"):
+        assert format_of(file) == key
+        file.write_bytes(b"nothing of the kind\n")
+        assert format_of(file) == key
+    for name in ("none.out", f"none{key}s", "none"):
+        assert format_of(tmp_path / name) is None
+        (tmp_path / name).write_bytes(b"nothing of the kind\n")
+        assert format_of(tmp_path / name) is None
 
 
 @pytest.mark.parametrize("key", [".vtu", ".vtk", ".pvd"])
