@@ -286,7 +286,7 @@ def test_markers_in_the_body(folder: Path, tmp_path: Path, capsys: pytest.Captur
         ((BENDING, BENDING, "--unit", "other.frd=mm"), "'other.frd' matches none of"),
         ((BENDING, BENDING, "--axes", "x,y"), "x, y and z"),
         ((BENDING, BENDING, "--shift", "1,2,3,4"), "two or three lengths"),
-        ((BENDING, BENDING, "--load-factor", "2"), "not above 0 and at most 1"),
+        ((BENDING, BENDING, "--load-factor", "2"), "above 0 and at most 1"),
         ((BENDING, BENDING, "--probe", "left-middle-of"), "left-middle-of"),
         ((BENDING, BENDING, "--probe", "1 mm, 2 kg"), "--probe"),
         ((BENDING, BENDING, "--tolerance", "5"), "between 0 and 1"),

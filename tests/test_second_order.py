@@ -267,7 +267,7 @@ def test_files_keep_the_nodes_in_the_middle_of_edges(
     assert (found.elements == mesh.elements).all()
     assert found.middles == pytest.approx(2 * mesh.middles, abs=1e-12)
     (note,) = [note for note in found.notes if "second order" in note]
-    assert f"finite elements take the {len(mesh.edges)} nodes in the middle" in note
+    assert f"finite elements use their {len(mesh.edges)} mid-edge nodes" in note
 
 
 def as_written(mesh: ts.Mesh) -> meshio.Mesh:
@@ -327,10 +327,10 @@ def test_middles_that_do_not_fit_are_refused() -> None:
         replace(mesh, middles=mesh.middles[1:])
     folded = mesh.middles.copy()
     folded[0] = mesh.nodes[mesh.edges[0, 0]] + 3 * (mesh.nodes[mesh.edges[0, 1]] - mesh.nodes[mesh.edges[0, 0]])
-    with pytest.raises(MeshError, match="folded by the nodes in the middle"):
+    with pytest.raises(MeshError, match="folded by their mid-edge nodes"):
         replace(mesh, middles=folded)
     squares = quarter("quadrilateral")
-    with pytest.raises(MeshError, match="middles are for triangles and tetrahedra"):
+    with pytest.raises(MeshError, match="middles are supported for triangles and tetrahedra"):
         replace(squares, middles=squares.nodes[squares.edges].mean(axis=1))
 
 
