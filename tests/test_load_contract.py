@@ -17,7 +17,18 @@ from truespring.errors import ExportError, ProblemError
 from truespring.exports import TARGETS, Exported, check_targets, solve_springs
 from truespring.exports.calculix import fem_deck
 from truespring.exports.features import Feature
-from truespring.loading import LOADS, Body, DeadLoad, Load, LoadKind, Mark, Quantity, Spread, selection_words
+from truespring.loading import (
+    LOADS,
+    Body,
+    DeadLoad,
+    Load,
+    LoadKind,
+    Mark,
+    Quantity,
+    Spread,
+    selection_words,
+    vector_words,
+)
 from truespring.mesh import Selection, corner_measures, facets_within, loaded, refined, select
 from truespring.models import Springs
 from truespring.report.symbols import find_acting
@@ -28,37 +39,46 @@ from truespring.units import SI_UNITS
 
 @dataclass(frozen=True)
 class Wind(DeadLoad):
-    """A dead pressure [Pa] at an angle [rad] to x on facets of a plane body."""
+    """A dead pressure [Pa] at an angle [rad] to a direction of any length [m], on facets of a plane body."""
 
     on: Selection
     wind: float
+    along: tuple[float, ...]
     angle: float = 0.0
+
+    @property
+    def way(self) -> Floats:
+        """The direction, a unit vector, shape (2,)."""
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        return np.array([[cos, -sin], [sin, cos]]) @ self.along / np.linalg.norm(self.along)
 
     def spread(self, body: Body) -> Spread:
         facets = facets_within(body.mesh, self.on)
-        stress = self.wind * np.array([np.cos(self.angle), np.sin(self.angle)])
-        density = np.tile(body.thickness * stress, (len(facets), 1))
+        density = np.tile(body.thickness * self.wind * self.way, (len(facets), 1))
         return Spread(*body.carrying(facets, corner_measures(body.mesh.nodes[facets])), density)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, wind=factor * self.wind)
 
     def turned(self, rotation: Floats) -> Self:
-        return replace(self, angle=self.angle + float(np.arctan2(rotation[1, 0], rotation[0, 0])))
+        return replace(self, along=tuple(rotation @ self.along))
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        way = np.array([np.cos(self.angle), np.sin(self.angle)])
-        return Mark(loaded(body.mesh, self.on), way, "w", self.wind, "Pa")
+        return Mark(loaded(body.mesh, self.on), self.way, "w", self.wind, "Pa")
 
     def words(self) -> str:
-        return f"wind {self.wind:g} Pa at {self.angle:g} rad on {selection_words(self.on)}"
+        about = f"{self.angle:g} rad from {vector_words(self.along)}"
+        return f"wind {self.wind:g} Pa at {about} on {selection_words(self.on)}"
 
 
 # The line that a new load needs.
 WIND = LoadKind(
     Wind,
     Quantity("wind", "stress", "the pressure of the wind"),
-    {"angle": Quantity("angle", "angle", "from the x axis", default=0.25)},
+    {
+        "along": Quantity("along", "length", "the direction that the angle is measured from", vector=True),
+        "angle": Quantity("angle", "angle", "from the direction, anticlockwise", default=0.25),
+    },
     dims=(2,),
 )
 ALL = {**LOADS, "wind": WIND}
@@ -116,7 +136,9 @@ RESULTANTS: dict[str, Callable[[Floats, float, float], Floats]] = {
     "force": lambda vector, area, volume: vector,
     "traction": lambda vector, area, volume: area * vector,
     "gravity": lambda vector, area, volume: 1.5 * volume * vector,
-    "wind": lambda vector, area, volume: area * 2.5 * np.array([np.cos(2.5), np.sin(2.5)]),
+    "wind": lambda vector, area, volume: (
+        area * 2.5 * np.array([[np.cos(2.5), -np.sin(2.5)], [np.sin(2.5), np.cos(2.5)]]) @ vector / np.hypot(*vector)
+    ),
 }
 
 
@@ -238,7 +260,7 @@ def test_a_load_is_worded(key: str, dim: int) -> None:
     words = load_of(key, dim).words()
     assert "\n" not in words and not words.endswith(".")
     assert ("'top'" in words) == ALL[key].on_selection
-    assert all(f"{value:g}" in words for value in np.ravel(list(values(key, dim).values())))
+    assert all(f"{value:g}" in words for one in values(key, dim).values() for value in np.ravel(one))
 
 
 # --- how they are read and exported -------------------------------------------------------------------
@@ -263,9 +285,13 @@ def test_a_load_is_read_from_toml(key: str, dim: int) -> None:
                 form.model_validate({name: one for name, one in tables.items() if name != "on"})
     for name, quantity in kind.further.items():
         left = {one: value for one, value in {**on, **given}.items() if one != name}
-        assert getattr(form.model_validate(left).load(), quantity.argument) == quantity.default
+        if quantity.default is None:
+            with pytest.raises(ValueError, match=f"{name} is required"):
+                form.model_validate(left).load()
+        else:
+            assert getattr(form.model_validate(left).load(), quantity.argument) == quantity.default
         with pytest.raises(ValueError, match=f"{name} .* force"):
-            form.model_validate({"on": "top", "force": [1.0, 2.0], name: 1.0})
+            form.model_validate({"on": "top", "force": [1.0, 2.0], name: given[name]})
 
 
 def test_a_load_of_the_whole_body_takes_no_selection() -> None:
