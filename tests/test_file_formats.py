@@ -57,7 +57,7 @@ def test_a_surface_or_a_packed_file_is_refused_with_the_way_to_a_mesh(name: str,
         b"solid box\n facet normal 0 0 1\n  outer loop\n",
         b"ply\nformat ascii 1.0\n",
     )
-    for data, way in (*((one, "mesher") for one in surfaces), (gzip.compress(b"$MeshFormat\n"), "unpack")):
+    for data, way in (*((one, "mesher") for one in surfaces), (gzip.compress(b"$MeshFormat\n"), "gunzip")):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(MeshError, match=way):
             read_mesh(tmp_path / name)

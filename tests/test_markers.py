@@ -135,7 +135,7 @@ WRONG = {
     "units of places alone": (
         "x [mm],y [mm],ux,uy\n1,2,3,4\n",
         None,
-        r"column x is in mm, ux has no unit: are these metres, too\? Write ux \[m\], or ux \[mm\]",
+        r"column x is in mm, ux has no unit.* Write ux \[m\], or ux \[mm\]",
     ),
     "two decimal signs": (table(PLAIN, ";", ",").replace("0,25", "0.25"), None, "has a comma, '0.25' a point"),
     "one column twice": (MARKERS.replace("marker,", "X,"), None, "column x .*twice.* 'x .mm.'"),

@@ -515,7 +515,7 @@ def test_a_piece_that_is_there_twice_is_taken_once(tmp_path: Path) -> None:
     file.write_bytes(text.replace(piece[0], piece[0] * 2))
     mesh = read_mesh(file)
     assert mesh.n_nodes == 8 and len(mesh.elements) == 1
-    assert "1 cells are in two pieces and were taken once" in mesh.notes
+    assert "1 cells are in two pieces and were read once" in mesh.notes
 
 
 # --- what is refused ------------------------------------------------------------------------------
