@@ -73,8 +73,7 @@ _WHY = {
     "assembly": "to prevent two threads from writing to the same row, the block of a spring is computed once for each "
     "of its two nodes, and its data come from several arrays. Arithmetic and latency limit the speed, not bandwidth.",
     "matrix product": "a block is stored once for two rows, which halves the data of a plain product. Each byte "
-    "therefore "
-    "needs more arithmetic, in scalar double precision, and different blocks write to the same rows.",
+    "therefore needs more arithmetic, in scalar double precision, and different blocks write to the same rows.",
 }
 
 

@@ -285,7 +285,6 @@ def outer_facets(mesh: Mesh, on: Selection) -> Ints:
     if inner:
         raise MeshError(
             f"{inner} of {len(facets)} facets of '{on}' lie inside the body, between two elements, where a pressure "
-            "has "
-            "no outer side: select facets of the boundary, or use a traction, which has a direction"
+            "has no outer side: select facets of the boundary, or use a traction, which has a direction"
         )
     return facets

@@ -49,8 +49,7 @@ def _of_dim(rows: list[Row], dim: int, figure: str) -> Iterator[str]:
     chief = {row["method"]: row for row in rows if row["dim"] == dim and row["chief"]}
     yield (
         "Each cell has the printed and the measured sign of the entry in bold below, as printed : measured. "
-        "Differences "
-        "are in bold."
+        "Differences are in bold."
     )
     yield ""
     yield "| | " + " | ".join(METHODS) + " |"
@@ -148,8 +147,7 @@ def _definitions(table: Mapping[str, Any]) -> Iterator[str]:
     yield "* force: time of one evaluation of the internal force there."
     yield (
         "* 1 % from: the coarsest mesh such that it and all finer ones, up to 32 elements deep, have an error of the "
-        "end "
-        "displacement below 1 % at small load, and the time of its solve."
+        "end displacement below 1 % at small load, and the time of its solve."
     )
     yield (
         "* error of moduli: relative difference between the elasticity matrix for uniform strains and that of the "
@@ -158,8 +156,7 @@ def _definitions(table: Mapping[str, Any]) -> Iterator[str]:
     yield "* small load, fine mesh: root-mean-square nodal error there at a deflection of 0.0067 of the length."
     yield (
         "* within 5 % up to: the largest deflection, through stable states only, up to which the displacement of the "
-        "end "
-        "differs from neo-Hookean FEM by at most 5 %."
+        "end differs from neo-Hookean FEM by at most 5 %."
     )
     yield ""
     yield "Signs:"

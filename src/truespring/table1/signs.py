@@ -22,8 +22,7 @@ MEANING = {
     ),
     "large deflection": (
         "+ if the end is within 5 % of converged neo-Hookean FEM up to a deflection of half the length, - if not even "
-        "to "
-        "a fifth"
+        "to a fifth"
     ),
 }
 
@@ -122,8 +121,7 @@ IF = {
     ("large deflection", "Terzopoulos"): ("if it were linear. The metric tensor is not, it follows any rotation."),
     ("large deflection", "MSM"): (
         "on meshes of squares three or four deep, where the bending stiffness of Lloyd's springs is accurate. On "
-        "finer meshes "
-        "and on cubes their error is above 5 % at any load; that of the isotropic rule in 2D is not."
+        "finer meshes and on cubes their error is above 5 % at any load; that of the isotropic rule in 2D is not."
     ),
     ("large deflection", "HEML"): (
         "if the limit were above half the length: with the St. Venant-Kirchhoff law, stable solutions end at a "
@@ -131,8 +129,7 @@ IF = {
     ),
     ("large deflection", "BEM + MSM"): (
         "if the limit were slightly higher: with a block that cannot rotate, the error is 5 % at about a quarter of "
-        "the "
-        "length. A corotated block follows large rotations."
+        "the length. A corotated block follows large rotations."
     ),
     ("large deflection", "mass-tensor"): ("to its linear form."),
 }

@@ -104,8 +104,7 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
     if key is None:
         raise MeshError(
             f"{file}: the suffix of a mesh file is {', '.join(FORMATS)}, not '{file.suffix}', and the content of this "
-            "one "
-            f"has none of these formats: {foreign(data) or 'convert it, for example: meshio convert FILE NEW.vtu'}"
+            f"one has none of these formats: {foreign(data) or 'convert it, for example: meshio convert FILE NEW.vtu'}"
         )
     form = FORMATS[key]
     try:

@@ -478,8 +478,7 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
         first = int((over & is_turned).argmax())
         raise MeshError(
             f"{is_turned.sum()} of {len(elements)} elements are inverted, and {over.sum()} would overlap their "
-            "neighbours "
-            f"if these were mirrored; the first is element {first}, counted from 0 in the file's order, at "
+            f"neighbours if these were mirrored; the first is element {first}, counted from 0 in the file's order, at "
             f"{_place(positions[elements[first]].mean(axis=0))} m: the mesh is folded there; {_MEND}"
         )
     return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]

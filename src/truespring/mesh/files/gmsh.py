@@ -439,8 +439,7 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
         if one not in (b"\1\0\0\0", b"\0\0\0\1"):
             raise MeshError(
                 "$MeshFormat: the binary 1 that gives the byte order is missing: was the file transferred as text? "
-                "Transfer "
-                "it as binary, or save it as text (Mesh.Binary = 0)"
+                "Transfer it as binary, or save it as text (Mesh.Binary = 0)"
             )
         source = _Binary(data, header.end() + 4, "<" if one[0] else ">", int(size))
     source.end_section()

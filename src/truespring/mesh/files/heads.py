@@ -65,7 +65,6 @@ def foreign(data: bytes) -> str:
     if is_stl or re.match(rb"\s*(?:solid\b.*?\bfacet\s|ply\s|OFF\s)", data[:HEAD], re.DOTALL):
         return (
             "it contains a surface (as .stl, .ply and .off do), not a body: fill it by a mesher such as gmsh or "
-            "fTetWild "
-            "with tetrahedra"
+            "fTetWild with tetrahedra"
         )
     return ""

@@ -114,9 +114,8 @@ def _upright(labels: Labels) -> Labels:
     if off > _SHEARED:
         raise MeshError(
             f"the axes of the image are not perpendicular: the cosine between two is {off:.2g}, at most {_SHEARED:g} "
-            "is "
-            "allowed: resample the image onto perpendicular axes (3D Slicer: Resample "
-            "Scalar/Vector/DWI Volume, by nearest neighbour)"
+            "is allowed: resample the image onto perpendicular axes (3D Slicer: Resample Scalar/Vector/DWI Volume, "
+            "by nearest neighbour)"
         )
     left, _, right = np.linalg.svd(labels.direction)
     note = (

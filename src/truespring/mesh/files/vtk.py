@@ -47,8 +47,7 @@ def read_legacy_grid(data: bytes) -> Grid:
     if data_set not in _MADE:
         raise MeshError(
             f"DATASET {word(head[3])} is not supported; supported: {', '.join(_MADE)}; in ParaView, Append Datasets "
-            "and save "
-            "as .vtu"
+            "and save as .vtu"
         )
     is_text = head[2].upper() == b"ASCII"
     if is_text and not data[-1:].isspace():

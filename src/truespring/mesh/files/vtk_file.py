@@ -44,8 +44,7 @@ def read_vtk_grid(data: bytes, folder: Path) -> Grid:
         known = ", ".join((*GRIDS, *(f"P{name}" for name in GRIDS)))
         raise MeshError(
             f"a VTKFile of type {kind[:40] or 'none'} is not supported; supported: {known}; in ParaView, Append "
-            "Datasets and save "
-            "it as .vtu"
+            "Datasets and save it as .vtu"
         )
     names = [piece.get("Source", "") for piece in root.iterfind(f"{kind}/Piece")]
     if not names or len(names) > _MOST_PIECES or len(set(names)) < len(names):
