@@ -198,14 +198,8 @@ def test_constants_of_a_material_are_values() -> None:
 def test_a_study_takes_them_with_units() -> None:
     table = schema.with_constants(schema.MaterialKeys, "Material", SCRATCH.constants)
     found = table.model_validate({"young": "2 kPa", "poisson": 0.3, "c1": "0.4 kPa", "exponent": 3})
-    assert found.model_dump() == {
-        "young": 2000.0,
-        "poisson": 0.3,
-        "density": None,
-        "c1": 400.0,
-        "c2": None,
-        "exponent": 3.0,
-    }
+    expected = {"young": 2000.0, "poisson": 0.3, "density": None, "c1": 400.0, "c2": None, "exponent": 3.0}
+    assert found.model_dump(include=set(expected)) == expected
     for key, value in (("c1", "0.4 mm"), ("c1", True), ("exponent", "2 Pa"), ("c3", 1.0)):
         with pytest.raises(ValidationError):
             table.model_validate({"young": 1.0, "poisson": 0.3, key: value})

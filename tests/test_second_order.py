@@ -140,7 +140,8 @@ def test_a_law_is_a_part_of_mu_and_one_of_lambda(law: str) -> None:
     tensor = generator.uniform(-0.2, 0.2, (6, 4, 1))
     tensor[:3] += 1.0 if LAWS[law].finite else 0.0
     entry, lam, mu = LAWS[law], 5.0, 2.0
-    whole, shear = (entry.respond(tensor, Constants(one, mu, False)).energy for one in (lam, 0.0))
+    values = {name: constant.example for name, constant in entry.constants.items()}
+    whole, shear = (entry.respond(tensor, Constants(one, mu, False, values)).energy for one in (lam, 0.0))
     xx, yy, zz, yz, xz, xy = tensor
     det = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     traces = {"small": lambda: trace(tensor), "green": lambda: (trace(tensor) - 3) / 2}
