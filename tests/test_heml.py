@@ -1,5 +1,6 @@
 """HEML, biquadratic springs, the mass-tensor method and finite elements: where they are one function, they agree."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 import truespring as ts
-from tests.closed_forms import principal_state
+from tests.closed_forms import material_of, principal_state
 from tests.studies import changed, written
 from tests.test_biquadratic import PLANE, ROUNDING, apart, body, random_mesh
 from tests.test_fem import GRADIENTS, TIGHT, distorted, in_section, patch
@@ -30,10 +31,15 @@ BODIES = [
 SAME = "saint-venant-kirchhoff"
 
 
-def some_body(element: str, section: str, generator: np.random.Generator, poisson: float = 0.3) -> ts.Problem:
+def some_body(
+    element: str, section: str, generator: np.random.Generator, poisson: float = 0.3, law: str = SAME
+) -> ts.Problem:
     """Elements of random shape, the first of another material."""
     mesh = random_mesh(element, generator)
-    return body(mesh, section, poisson, regions=[ts.Region([0], ts.Material(5e4, 0.1))])
+    constants = material_of(law, 1.0, poisson).constants
+    plain = body(mesh, section, poisson, regions=[ts.Region([0], ts.Material(5e4, 0.1, constants=constants))])
+    assert plain.material is not None
+    return replace(plain, material=replace(plain.material, constants=constants))
 
 
 def upright(mesh: ts.Mesh, generator: np.random.Generator, strain: float) -> Floats:
@@ -73,7 +79,7 @@ def test_heml_is_the_finite_element(
     if element in OTHERS:
         law = SAME
     generator = np.random.default_rng(seed)
-    problem = some_body(element, section, generator, poisson)
+    problem = some_body(element, section, generator, poisson, law)
     positions = upright(problem.mesh, generator, strain)
     check_same(problem, ts.Heml(law), ts.Fem(law, "linear"), positions)
 
@@ -157,7 +163,7 @@ def test_patch(kind: str, model: Model) -> None:
     """Within a rim that moves uniformly the nodes inside follow, whatever the shape of the elements."""
     mesh = distorted(kind)
     gradient = GRADIENTS["large"][: mesh.dim, : mesh.dim]
-    problem = patch(mesh, gradient, in_section(mesh, "plane-strain", 0.5), poisson=0.3)
+    problem = patch(mesh, gradient, in_section(mesh, "plane-strain", 0.5), 0.3, model.law or SAME)
     path = ts.solve(problem, model, TIGHT)
     assert path.status is ts.Status.CONVERGED
     assert np.abs(path.states[-1].displacement - mesh.nodes @ gradient.T).max() <= 1e-12 * mesh.diameter

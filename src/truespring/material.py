@@ -9,7 +9,6 @@ from typing import ClassVar, NamedTuple, Self
 
 from truespring.errors import ProblemError
 
-
 _MODULI = {"mu": "shear", "bulk": "bulk"}
 
 

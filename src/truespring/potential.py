@@ -61,7 +61,9 @@ class Stressed(Potential, Protocol):
     """
 
     def stress(self, positions: Floats) -> Floats:
-        """Return the stress conjugate to the strain: tension [N] of each spring, stress [Pa] at each Gauss point."""
+        """Return the stress conjugate to the strain: tension [N], shape (n_springs,), or stress [Pa] at Gauss points.
+
+        The shape of the latter is (components, n_elements, n_points)."""
         ...
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
@@ -87,6 +89,16 @@ class Stretched(Potential, Protocol):
 
     def stretch(self, positions: Floats) -> Floats:
         """Return length over rest length [-], shape (n_springs,)."""
+        ...
+
+
+@runtime_checkable
+class Noted(Protocol):
+    """A potential whose fields need an explanation."""
+
+    @property
+    def cell_note(self) -> str:
+        """A sentence on the fields of `cell_fields`, without a full stop."""
         ...
 
 

@@ -12,14 +12,17 @@ from truespring.models.law import Constants
 
 
 def small_density(stretch: Any, constants: Constants) -> Any:
+    """Return the density of Hooke's law of the small strain [J/m^3]."""
     return _quadratic(stretch - 1, constants)
 
 
 def green_density(stretch: Any, constants: Constants) -> Any:
+    """Return the density of Hooke's law of the Green strain [J/m^3]."""
     return _quadratic((stretch**2 - 1) / 2, constants)
 
 
 def hencky_density(stretch: Any, constants: Constants) -> Any:
+    """Return mu sum e_i^2 + lam/2 (sum e_i)^2 of the logarithmic stretches e_i [J/m^3]."""
     return _quadratic(np.log(stretch), constants)
 
 
@@ -29,6 +32,7 @@ def _quadratic(strain: Any, constants: Constants) -> Any:
 
 
 def neo_hookean_density(stretch: Any, constants: Constants) -> Any:
+    """Return mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2 [J/m^3]."""
     log_J = np.log(stretch).sum()
     return constants.mu * (((stretch**2).sum() - 3) / 2 - log_J) + constants.lam / 2 * log_J**2
 
@@ -40,16 +44,19 @@ def _shape(psi: Callable[[Any], Any], stretch: Any, constants: Constants) -> Any
 
 
 def yeoh_density(stretch: Any, constants: Constants) -> Any:
+    """Return the sum of three powers of I1b - 3, and bulk/2 (ln J)^2 [J/m^3]."""
     c10, c20, c30 = constants.mu / 2, constants["c20"], constants["c30"]
     return _shape(lambda trace: c10 * (trace - 3) + c20 * (trace - 3) ** 2 + c30 * (trace - 3) ** 3, stretch, constants)
 
 
 def gent_density(stretch: Any, constants: Constants) -> Any:
+    """Return -mu jm/2 ln((jm - I1b + 3) / jm) + bulk/2 (ln J)^2 [J/m^3]."""
     jm = constants["jm"]
     return _shape(lambda trace: -constants.mu * jm / 2 * np.log((jm - trace + 3) / jm), stretch, constants)
 
 
 def arruda_boyce_density(stretch: Any, constants: Constants) -> Any:
+    """Return the series of Arruda and Boyce in I1b, and bulk/2 (ln J)^2 [J/m^3]."""
     N = constants["locking_stretch"] ** 2
     m = constants.mu / (1 + 3 / (5 * N) + 99 / (175 * N**2) + 513 / (875 * N**3) + 42039 / (67375 * N**4))
 

@@ -23,7 +23,6 @@ class Model:
         has_springs: whether the potential consists of springs, which are drawn and exported.
         any_mesh: whether the model can be solved on other meshes of the body, for refinement.
         solves: whether the model is solved; false for a solution that is read from a file.
-        lines: name of the lines of the potential in figures.
     """
 
     kind: str = "potential"
@@ -31,12 +30,16 @@ class Model:
     has_springs: bool = False
     any_mesh: bool = True
     solves: bool = True
-    lines: str = "springs"
 
     @property
     def label(self) -> str:
         """Name in figures and tables."""
         return type(self).__name__
+
+    @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures."""
+        return "springs"
 
     @property
     def finite(self) -> bool:

@@ -91,6 +91,11 @@ class Springs(Model):
     has_springs = True
 
     @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures: springs between all nodes of an element are not drawn."""
+        return "springs" if self.element is None else "edges"
+
+    @property
     def coupled(self) -> bool:
         """Whether the springs of an element are coupled, see BiquadraticSprings."""
         return self.rule is not None and RULES[self.rule].coupled

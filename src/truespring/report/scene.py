@@ -22,7 +22,7 @@ _MOST_SPRINGS = 20_000
 
 
 def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
-    """Return the nodes that a view of the paths `shown` draws: of the surface, of lines, the probe; ascending, (n,)."""
+    """Return the nodes that a view of the paths `shown` draws, ascending, shape (n,): surface, lines, probe."""
     kept = np.zeros(result.problem.mesh.n_nodes, dtype=bool)
     kept[facets_of(result.problem.mesh)] = True
     kept[result.probe] = True
@@ -38,7 +38,7 @@ def _lines(path: Solution) -> tuple[Ints, Ints]:
     none = np.zeros((0, 2), dtype=np.int64)
     if not len(facets):
         return lines, none
-    if spring_lines(path) is None:
+    if spring_lines(path.potential) is None:
         return edges_of(facets), none
     on, _ = lines_on(facets, lines)
     return lines[on], lines[~on] if len(lines) < _MOST_SPRINGS else none

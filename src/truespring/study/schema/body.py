@@ -28,7 +28,6 @@ from truespring.study.schema.values import (
     two_or_three,
 )
 
-
 #: The pairs of elastic constants of a material: exactly one is set.
 ELASTIC_PAIRS = (("young", "poisson"), ("mu", "bulk"))
 _PAIR_WORDS = "set young and poisson, or mu and bulk"
