@@ -547,6 +547,7 @@ def _with_feature() -> dict[Feature, tuple[ts.Problem, Any]]:
         Feature.PRESSURE: (_pulled(), ts.Springs("gaussian")),
         Feature.NEGATIVE: (flat, ts.Springs("isotropic", allow_negative=True)),
         Feature.PRESTRESS: (prestressed.problem, network_of(prestressed)),
+        Feature.FORCE_LAW: (_pulled(), ts.Springs("isotropic", law="neo-hookean")),
         Feature.FOLLOWING: (exported("pressed").problem, ts.Springs("lloyd")),
     }
 

@@ -101,7 +101,7 @@ class SpringNetwork(Model):
     def spring_data(self) -> SpringData:
         """Return the springs as arrays."""
         names = ("springs", "stiffness", "rest_length", "law")
-        return SpringData(self, {name: getattr(self, name) for name in names})
+        return SpringData(self, {name: getattr(self, name) for name in names} | {"dimension": self.nodes.shape[1]})
 
     @property
     def cells(self) -> dict[str, Ints]:
