@@ -100,8 +100,9 @@ class SpringNetwork(Model):
 
     def spring_data(self) -> SpringData:
         """Return the springs as arrays."""
-        names = ("springs", "stiffness", "rest_length", "law")
-        return SpringData(self, {name: getattr(self, name) for name in names} | {"dimension": self.nodes.shape[1]})
+        names = ("springs", "stiffness", "rest_length")
+        law = {"force_law": self.law, "dimension": self.nodes.shape[1]}
+        return SpringData(self, {name: getattr(self, name) for name in names} | law)
 
     @property
     def cells(self) -> dict[str, Ints]:
