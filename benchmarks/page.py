@@ -356,7 +356,7 @@ def _gaussian(results: dict) -> Iterator[str]:
     yield (
         f"Springs over finite elements: {'; '.join(ratios)}. The block is bent by half its length; its error is the "
         "rms distance at the nodes of the coarsest mesh from finite elements on two fine meshes, extrapolated. At no "
-        f"larger error than that of the springs, finite elements take {last['solve'] / first['solve']:.0f} times as long.\n"
+        f"larger error, finite elements take {last['solve'] / first['solve']:.0f} times as long as springs.\n"
     )
 
 
