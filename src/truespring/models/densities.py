@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from truespring.models.law import Constants
+from truespring.models.constants import Constants
 
 
 def small_density(stretch: Any, constants: Constants) -> Any:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.law import Constants, Response
+from truespring.models.constants import Constants, Response
 from truespring.models.symmetric import determinant, identity, inverted, outer, swapped, trace
 from truespring.models.thickness import Slope, free_thickness
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.material import Lame
-from truespring.models.law import Constants
+from truespring.models.constants import Constants
 from truespring.models.stretches import StretchDerivatives, isochoric
 
 _Number = float | Floats

@@ -6,8 +6,8 @@ The shear modulus at small strain is that of the material, mu; the volume functi
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.models.constants import Constants
 from truespring.models.invariants import Derivatives, isochoric
-from truespring.models.law import Constants
 
 # Coefficients of the series of Arruda and Boyce, of (I1b^i - 3^i) / locking_stretch^(2 i - 2).
 _SERIES = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)

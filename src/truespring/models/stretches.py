@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.law import Constants, Response
+from truespring.models.constants import Constants, Response
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import dimensions, dyad, outer
 from truespring.models.thickness import Slope, free_thickness
