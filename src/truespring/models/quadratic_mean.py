@@ -71,7 +71,7 @@ class QuadraticMeanPotential(QuadraticPotential):
         """Return the modulus of the part at the mean [Pa]: lam, or the bulk modulus."""
         return at.constants.lam if self.law.volumetric == "lam" else at.constants.bulk
 
-    def _respond(self, at: Points) -> Response:
+    def _law_response(self, at: Points) -> Response:
         without = replace(at.constants, lam=at.constants.lam - self._modulus(at))
         shear = self.law.respond(self._strain(at), without)
         volume = self._volume(at)
