@@ -120,6 +120,7 @@ ALLOWED = {
         "loading",
         "mesh",
         "material",
+        "fibres",
         "columns",
         "units",
         "potential",
