@@ -138,6 +138,7 @@ ALLOWED = {
         "loading",
         "mesh",
         "material",
+        "conditions",
     },
     "comparison": {"carrying", "support_errors", "solution", "problem", "mesh"},
     "support_errors": {"reactions", "solution"},
