@@ -134,6 +134,7 @@ ALLOWED = {
         "reactions",
         "models",
         "potential",
+        "conditions",
         "problem",
         "loading",
         "mesh",
