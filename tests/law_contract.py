@@ -305,10 +305,7 @@ def check_facts(law: Law) -> None:
             trace = {"small": stretch - 1, "green": (stretch**2 - 1) / 2, "logarithmic": np.log(stretch)}[law.trace]
             part = body.energy(deformed) - without.energy(deformed)
             assert close(part, lam / 2 * trace.sum() ** 2, mu), "lambda's part"
-        if law.volumetric == "bulk":
-            shape = Body(law, Constants(-2 / 3 * mu, mu, False, body.constants.values), 3)
-            assert close(shape.energy(shape.strain(np.full(3, 1.2))), 0.0, mu), "energy of shape of a swollen body"
-    for body in bodies(law, (0.3 if law.volumetric == "lam" else 0.49,)):
+    for body in bodies(law, (0.49,)):
         if body.dim == 3:
             check_domain(body)
 

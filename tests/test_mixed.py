@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from tests.closed_forms import material_of
 from tests.test_examples import EXAMPLES
 from truespring.study import read_study
 
@@ -39,7 +40,8 @@ def test_every_way_leads_to_the_same_tip_of_a_shipped_study(name: str) -> None:
 def test_one_step_to_half_the_length_takes_few_iterations(model: str) -> None:
     """As the line search finds it, which takes more of them; the linear law needs one."""
     mesh = ts.rectangle((8, 1), (64, 8))
-    problem = ts.Problem(mesh, SOFT, THIN, [ts.Fixed("left")], [ts.Force("right", (0, -0.24))])
+    material = material_of(model, SOFT.young, SOFT.poisson) if model in ts.LAWS else SOFT
+    problem = ts.Problem(mesh, material, THIN, [ts.Fixed("left")], [ts.Force("right", (0, -0.24))])
     path = ts.solve(problem, MODELS[model], ts.Newton(load_steps=1, tolerance=1e-8))
     searched = ts.solve(problem, MODELS[model], ts.Newton(load_steps=1, tolerance=1e-8, method="line-search"))
     assert path.status is ts.Status.CONVERGED
@@ -47,7 +49,7 @@ def test_one_step_to_half_the_length_takes_few_iterations(model: str) -> None:
     tip = path.states[-1].displacement
     assert model == "linear" or 0.4 * 8 < np.abs(tip[:, 1]).max() < 0.6 * 8
     assert np.abs(tip - searched.states[-1].displacement).max() <= 1e-7 * np.abs(tip).max()
-    assert path.newton_iterations <= 8
+    assert path.newton_iterations <= (13 if material.constants else 8)
     assert path.newton_iterations < searched.newton_iterations or model == "linear"
 
 

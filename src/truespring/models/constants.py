@@ -22,7 +22,7 @@ class Constant:
     Attributes:
         dimension: a key of SI_UNITS; None for a dimensionless number.
         meaning: description of the key, in a few words.
-        example: an allowed value [SI], used by the contract tests.
+        example: an allowed value [SI] for young = 3 Pa, used by the contract tests.
         default: value for materials without the constant [SI]; None if the law requires it.
         smallest, largest: allowed range [SI].
         exclusive: whether `smallest` itself is not allowed.

@@ -36,14 +36,13 @@ class Law:
         trace: the strain e for which the part of lam in the energy is lam/2 (tr e)^2, in 3D and plane strain: "small",
             "green", or "logarithmic", whose trace is ln J; None if the energy has another form. Required by elements
             of second order with mean dilatation.
-        volumetric: the modulus in that part: "lam", or "bulk" for a law with separate energies of shape and volume.
         invariants: the law as a function of I1 and ln J, which Gaussian springs require; None if it is no such
             function.
         constant_springs: whether `invariants` is linear in I1 with a factor that does not depend on ln J, so that the
             springs of `rule = "gaussian"` have a constant stiffness.
         domain: smallest and largest stretch of a bar between which its force increases with its length; beyond them a
-            bar under a dead load snaps. With `volumetric` "bulk", those of a nearly incompressible material, with
-            constants as in the examples.
+            bar under a dead load snaps. Those of a nearly incompressible material, with constants as in the
+            examples: otherwise, a part bulk/2 (ln J)^2 softens at very large stretch.
         limit: a sentence on a deformation that the law does not reach, because its energy is infinite there, without
             a full stop; "" if there is none.
         constants: the constants by name, without lam and mu.
@@ -61,7 +60,6 @@ class Law:
     barrier: bool
     quadratic: bool
     trace: Literal["small", "green", "logarithmic"] | None
-    volumetric: Literal["lam", "bulk"] = "lam"
     invariants: InvariantLaw | None = None
     constant_springs: bool = False
     domain: tuple[float, float] = (0.0, np.inf)

@@ -130,7 +130,6 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
-            volumetric="bulk",
             invariants=yeoh,
             constants=MappingProxyType(
                 {
@@ -148,7 +147,6 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
-            volumetric="bulk",
             invariants=gent,
             limit="Gent's law ends where I1 - 3 at constant volume reaches jm: the body cannot be stretched further",
             constants=MappingProxyType(
@@ -168,7 +166,6 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
-            volumetric="bulk",
             invariants=arruda_boyce,
             constants=MappingProxyType(
                 {
@@ -187,7 +184,6 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
-            volumetric="bulk",
             constants=MappingProxyType(
                 {"c01": Constant("stress", "coefficient of I2 - 3 in the Mooney-Rivlin law", 0.2, smallest=0.0)}
             ),
@@ -202,7 +198,6 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             barrier=True,
             quadratic=False,
             trace="logarithmic",
-            volumetric="bulk",
             constants=MappingProxyType(
                 {
                     "alpha1": Constant(None, "first exponent of Ogden's law", 1.3),
