@@ -139,7 +139,6 @@ ALLOWED = {
         "loading",
         "mesh",
         "material",
-        "conditions",
     },
     "comparison": {"carrying", "support_errors", "solution", "problem", "mesh"},
     "support_errors": {"reactions", "solution"},
