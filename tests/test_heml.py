@@ -11,7 +11,8 @@ from scipy.optimize import brentq
 import truespring as ts
 from tests.closed_forms import principal_state
 from tests.studies import changed, written
-from tests.test_biquadratic import PLANE, ROUNDING, apart, body, random_mesh
+from tests.meshes import random_mesh
+from tests.test_biquadratic import PLANE, ROUNDING, apart, body
 from tests.test_fem import GRADIENTS, TIGHT, distorted, in_section, patch
 from tests.test_report import words
 from truespring.arrays import Floats
