@@ -52,7 +52,7 @@ def best(action: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def timed(
-    problem: ts.Problem, model: Model, newton: ts.Newton, cells: tuple[int, ...] | int
+    problem: ts.Problem, model: Model, newton: ts.Newton, cells: tuple[int, ...] | int, solves: int = 3
 ) -> tuple[Timed, np.ndarray]:
     """Return times of a model and the displacement of the nodes at full load [m]."""
     solutions = [ts.solve(problem, model, newton) for _ in range(solves)]

@@ -540,6 +540,7 @@ def _with_feature() -> dict[Feature, tuple[ts.Problem, Any]]:
     return {
         Feature.VOLUME_TERM: (_pulled(), ts.Springs("isotropic", volume=True)),
         Feature.COUPLING: (_pulled(), ts.Springs("biquadratic")),
+        Feature.PRESSURE: (_pulled(), ts.Springs("gaussian")),
         Feature.NEGATIVE: (flat, ts.Springs("isotropic", allow_negative=True)),
         Feature.PRESTRESS: (prestressed.problem, network_of(prestressed)),
         Feature.FOLLOWING: (exported("pressed").problem, ts.Springs("lloyd")),

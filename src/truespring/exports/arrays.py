@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from truespring.conditions import Refined
 from truespring.exports.exported import Exported
+from truespring.mesh import ELEMENT_KINDS
+from truespring.models import LAWS
 
 # The unit of each key that has one.
 _UNITS = {
@@ -17,6 +20,12 @@ _UNITS = {
     "rest_length": "m",
     "kappa": "Pa",
     "coupling": "J/m^4",
+    "volume": "m^3",
+    "lam": "Pa",
+    "mu": "Pa",
+    "link_weights": "m",
+    "gradients": "1/m",
+    "point_volume": "m^3",
     "prescribed_displacement": "m",
     "external_force": "N",
     "displacement": "m",
@@ -56,6 +65,7 @@ def _values(exported: Exported) -> dict[str, Any]:
         "model": exported.path.label,
         "nodes": mesh.nodes,
         **exported.springs.arrays,
+        **_refined(exported),
         "held": exported.held,
         "prescribed_displacement": exported.motion,
         "external_force": exported.external_force,
@@ -77,9 +87,29 @@ def _values(exported: Exported) -> dict[str, Any]:
     }
 
 
+def _refined(exported: Exported) -> dict[str, Any]:
+    """Return supports, loads and displacement of all nodes of a potential that has more nodes than the mesh."""
+    potential, state = exported.path.potential, exported.path.states[-1]
+    if not isinstance(potential, Refined):
+        return {}
+    loading = potential.loading
+    return {
+        "all_nodes": potential.nodes,
+        "all_held": loading.held,
+        "all_prescribed_displacement": loading.motion(),
+        "all_external_force": exported.force_of(loading),
+        "all_displacement": state.all_positions - potential.nodes,
+    }
+
+
 def _units(values: Mapping[str, Any]) -> dict[str, str]:
-    known = {name: _UNITS.get(name.split("_")[0] if name.startswith("coupling") else name) for name in values}
-    return {name: unit for name, unit in known.items() if unit is not None}
+    """Return the unit of each key that has one; keys may start with "all_" and end with a kind of element."""
+    constants = {name: one.unit for law in LAWS.values() for name, one in law.constants.items() if one.dimension}
+    known = constants | _UNITS
+    plain = {name: name.removeprefix("all_") for name in values}
+    for kind in ELEMENT_KINDS:
+        plain = {name: short.removesuffix(f"_{kind}") for name, short in plain.items()}
+    return {name: known[short] for name, short in plain.items() if short in known}
 
 
 def _array(value: Any) -> np.ndarray[Any, Any]:

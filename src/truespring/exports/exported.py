@@ -8,6 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from truespring.arrays import Bools, Floats
+from truespring.conditions import Loading
 from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import vector_words
@@ -74,7 +75,10 @@ class Exported:
         Loads that follow the body are evaluated at the equilibrium at full load: as dead forces they have the same
         equilibrium. Raises ExportError if there are such loads and full load was not reached.
         """
-        loading = self.problem.loading
+        return self.force_of(self.problem.loading)
+
+    def force_of(self, loading: Loading) -> Floats:
+        """Return the nodal forces of a loading at full load, as `external_force` [N], shape (n, dim)."""
         if not loading.following:
             return loading.external_force
         if self.state is None:
@@ -82,7 +86,7 @@ class Exported:
                 "a load that follows the body is exported as its forces at full load, which was not reached "
                 f"(load factor {self.path.load_factor:.6g}): reduce the load or use more load_steps"
             )
-        return loading.force(self.state.positions)
+        return loading.force(self.state.all_positions[: len(loading.held)])
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from truespring.errors import ExportError
-from truespring.models.spring_data import COUPLING, VOLUME_TERM, SpringData
+from truespring.models.spring_data import COUPLING, PRESSURE, VOLUME_TERM, SpringData
 from truespring.problem import Problem
 
 # Relative difference of rest length and distance of the nodes that counts as rounding.
@@ -18,6 +18,7 @@ class Feature(StrEnum):
 
     VOLUME_TERM = VOLUME_TERM
     COUPLING = COUPLING
+    PRESSURE = PRESSURE
     NEGATIVE = "negative stiffness"
     PRESTRESS = "prestress"
     FOLLOWING = "load that follows a face"
@@ -36,6 +37,12 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
             Feature.COUPLING,
             "the springs of an element depend on each other's lengths, as those of the rule biquadratic do: use "
             "another rule",
+        )
+    if springs.beyond == PRESSURE:
+        yield (
+            Feature.PRESSURE,
+            "springs of zero rest length, as those of the rule gaussian, are kept apart by a pressure in each element: "
+            "use npz or json, or a rule of pair forces",
         )
     network = springs.network
     if network is not None:

@@ -12,6 +12,7 @@ from truespring.assembly import Pattern
 from truespring.models.gaussian_weights import Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
+from truespring.models.laws import LAWS
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import Summed
 from truespring.potential import SparseMatrix
@@ -296,12 +297,20 @@ class GaussianElements:
         self._run(gaussian.add_matrices, *self._curvature(positions, None), blocks)
         return blocks
 
-    def element_arrays(self) -> dict[str, Floats]:
-        """Return undeformed volumes [m^3] and constants of the volume function, arrays of shape (n_elements,)."""
-        constants = self._by_element
-        found = {"lam": constants.lam, "mu": constants.mu, **constants.values}
-        shape = len(self._volumes)
-        return {"volume": self._volumes, **{name: np.broadcast_to(value, shape) for name, value in found.items()}}
+    def element_arrays(self) -> dict[str, Any]:
+        """Return the elements as arrays: undeformed volumes, constants of the law, simplices of an element.
+
+        If the stiffness of the springs is not constant, also the weight of each link; see docs/export/arrays.md.
+        """
+        constants, kind, n = self._by_element, self.problem.mesh.kind, len(self._volumes)
+        values = {"lam": constants.lam, "mu": constants.mu, **constants.values}
+        found = {"volume": self._volumes, **{name: np.broadcast_to(value, n) for name, value in values.items()}}
+        found |= {"simplices": np.array(kind.simplices), "simplex_weight": np.array(kind.simplex_weight)}
+        if self.constant:
+            return found
+        links = np.array(kind.links)
+        weights = -self.laplacians.matrices[:, :, links[:, 0], links[:, 1]][:, self.laplacians.of]
+        return found | {"links": links, "link_weights": weights[0]}
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints, Ints]:
@@ -449,14 +458,15 @@ class SummedGaussian(Summed[GaussianElements]):
 def gaussian_data(
     parts: tuple[GaussianElements, ...], problem: Problem, springs: Ints, stiffness: Floats
 ) -> SpringData:
-    """Return Gaussian springs as arrays: springs and, for each kind of element, numbers, volumes and constants.
+    """Return Gaussian springs as arrays: springs, and for each kind of element nodes, volumes and constants.
 
     Shapes: springs (n_springs, 2), stiffness (n_springs,) [N/m].
     """
     arrays: dict[str, Any] = {"springs": springs, "stiffness": stiffness, "rest_length": np.zeros(len(springs))}
+    arrays["law"] = next(name for name, law in LAWS.items() if law is parts[0].law)
     for (numbers, block), part in zip(problem.mesh.blocks, parts, strict=True):
         suffix = f"_{block.element}" if len(parts) > 1 else ""
         arrays |= {f"{name}{suffix}": values for name, values in part.element_arrays().items()}
         if suffix:
-            arrays[f"elements{suffix}"] = numbers
+            arrays |= {f"elements{suffix}": numbers, f"corners{suffix}": block.elements}
     return SpringData(None, arrays, PRESSURE)

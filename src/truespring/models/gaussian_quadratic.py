@@ -96,20 +96,21 @@ class _BetweenAllNodes(QuadraticPotential):
         return self._pairs[1]
 
     def spring_data(self) -> SpringData:
-        """Return springs, nodes and elements as arrays; node numbers go on after those of the mesh with midpoints."""
+        """Return springs between all nodes, and points of integration of the elements; see docs/export/arrays.md."""
         springs, stiffness = self._pairs
-        lame = {
-            "lam": self.problem.of_elements(lambda material: material.lame.lam),
-            "mu": self.problem.of_elements(lambda material: material.lame.mu),
-        }
+        gradients, volumes = self.quadrature()
         arrays: dict[str, Any] = {
             "springs": springs,
             "stiffness": stiffness,
             "rest_length": np.zeros(len(springs)),
-            "all_nodes": self.nodes,
+            "law": "neo-hookean",
+            "lam": self.problem.of_elements(lambda material: material.lame.lam),
+            "mu": self.problem.of_elements(lambda material: material.lame.mu),
             "all_elements": self.elements,
+            "gradients": gradients,
+            "point_volume": volumes,
         }
-        return SpringData(None, arrays | lame, PRESSURE)
+        return SpringData(None, arrays, PRESSURE)
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,)."""
