@@ -208,7 +208,7 @@ def _model(rng: random.Random, element: str) -> Tables:
                 model["stiffness"] |= {} if simplices else {"diagonal": rng.uniform(0.05, 0.6)}
             else:
                 model["rule"] = rng.choice([name for name, rule in RULES.items() if element in rule.elements])
-            if rng.random() < 0.2 and model.get("rule") != "biquadratic":
+            if rng.random() < 0.2 and not ("rule" in model and RULES[model["rule"]].coupled):
                 model["sharing"] = rng.choice(words(schema.SpringsKeys, "sharing"))
             model["allow_negative"] = rng.random() < 0.9
             model["volume"] = rng.random() < (0.4 if model.get("rule") == "isotropic" else 0.02)

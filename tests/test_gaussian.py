@@ -18,6 +18,7 @@ from truespring.models.gaussian_rule import GAUSSIAN_LAWS
 from truespring.models.gaussian_weights import HOURGLASS_LIMITS, laplacians
 from truespring.models.heml import HEML_LAWS
 from truespring.models.law import Constants
+from truespring.models.laws import law_constants
 
 YOUNG, THICKNESS = 900.0, 0.3
 SECTIONS = {"plane stress": ts.PlaneStress(THICKNESS), "plane strain": ts.PlaneStrain(THICKNESS)}
@@ -74,7 +75,7 @@ def energy_and_stress(of: Body, F: Floats) -> tuple[float, Floats]:
 
 
 def facet_areas(nodes: Floats) -> Floats:
-    """Integral of N n over a facet, seen anticlockwise from outside, for each of its nodes [m^(d-1)], shape (k, dim)."""
+    """Integral of N n over a facet for each of its nodes, anticlockwise from outside [m^(d-1)], shape (k, dim)."""
     if len(nodes) == 2:
         (x, y) = nodes[1] - nodes[0]
         return np.array([[y, -x]] * 2) / 2
@@ -218,7 +219,7 @@ def test_simplices_are_finite_elements(kind: str, section: str, law: str) -> Non
 
 @pytest.mark.parametrize(("kind", "section"), SIMPLICES)
 def test_springs_of_second_order_are_finite_elements(kind: str, section: str) -> None:
-    """In plane stress, and where lam is zero, of the whole law at the points; else of its lam part at the mean volume."""
+    """In plane stress, and if lam is zero, of the law at the points; else with its lam part at the mean volume."""
     for poisson in (0.0, 0.45):
         at_points = section == "plane stress" or poisson == 0
         element = "quadratic" if at_points else "quadratic-mean-dilatation"
@@ -287,7 +288,10 @@ def test_triangles_have_cotangent_weights() -> None:
     corners = np.array([[0.0, 0.0], [2.0, 0.1], [0.9, 0.6]])
     problem = body(ts.Mesh(corners, [[0, 1, 2]], "triangle"), "plane stress")
     sides = np.roll(corners, -1, axis=0) - corners  # 01, 12, 20
-    angles = [np.arccos(-(a @ b) / np.linalg.norm(a) / np.linalg.norm(b)) for a, b in zip(sides, np.roll(sides, -1, 0))]
+    angles = [
+        np.arccos(-(a @ b) / np.linalg.norm(a) / np.linalg.norm(b))
+        for a, b in zip(sides, np.roll(sides, -1, 0), strict=True)
+    ]
     opposite = np.roll(angles, 2)  # the angle of sides 01 and 12 is opposite to 20
     mu = lame(YOUNG, 0.3)[1]
     found = ts.Springs("gaussian").element_stiffness(problem)[0]
@@ -304,9 +308,19 @@ def test_hourglass_limits(element: str) -> None:
     flat, limit = element == "quadrilateral", HOURGLASS_LIMITS[element]
     mesh = ts.rectangle((1.0, 1.0), (1, 1)) if flat else ts.box((1.0, 1.0, 1.0), (1, 1, 1))
     problem = body(mesh, "plane stress" if flat else "")
-    for hourglass, n_zero in ((limit, 2), (limit + 0.01, 1), (1.0, 1), (3.0, 1)):
-        values = np.linalg.eigvalsh(laplacians(problem, np.array([hourglass])).matrices[0][0])
-        assert (np.abs(values) < 1e-12).sum() == n_zero and values.min() > -1e-12
+    rigid = mesh.dim * (mesh.dim + 1) // 2
+
+    def stiffness(hourglass: float) -> Floats:
+        weights = laplacians(problem, np.array([hourglass]))
+        law = LAWS["neo-hookean"]
+        potential = GaussianElements(problem, law, law_constants(problem, "neo-hookean"), weights)
+        values = np.linalg.eigvalsh(potential.hessian(mesh.nodes).toarray())
+        return np.asarray(values / values[-1])
+
+    assert (np.abs(stiffness(limit)) < 1e-12).sum() > rigid
+    assert stiffness(limit - 0.01)[0] < -1e-4
+    for hourglass in (limit + 0.01, 1.0, 3.0):
+        assert np.abs(stiffness(hourglass)[:rigid]).max() < 1e-12 and stiffness(hourglass)[rigid] > 1e-4
     for hourglass in (limit, limit - 0.2, np.nan, np.inf):
         with pytest.raises(ts.TruespringError, match="hourglass"):
             gaussian(problem, hourglass=hourglass)

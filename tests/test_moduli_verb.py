@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from truespring.models.response import response
 
 import truespring as ts
 from tests.studies import changed, written
@@ -16,7 +17,6 @@ from truespring.cli import main
 from truespring.models.bending import bending_excess
 from truespring.models.findings import CODES, findings
 from truespring.models.fitness import Fitness, follows_poisson, judge
-from truespring.models.response import response
 from truespring.report.page import _moduli_rows
 from truespring.report.style import figure_style
 from truespring.report.verdict import moduli_sentence
