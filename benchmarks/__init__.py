@@ -1,1 +1,1 @@
-"""truespring beside other programs: `make bench` runs them and rebuilds docs/performance.md."""
+"""truespring compared with other programs: `make bench` runs them and rebuilds docs/performance.md."""

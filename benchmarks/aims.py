@@ -18,7 +18,7 @@ LARGE = 30_000
 class Aim:
     """A target: at least or at most a number; `measured` is None where it was not measured.
 
-    `why` tells what stands in the way where it is missed.
+    `why` is the reason if it is missed.
     """
 
     what: str
@@ -62,23 +62,23 @@ def faster(runs: list[Measured], dim: int, programs: tuple[str, ...], load: str 
 FELUPE = ("felupe-svk", "felupe-nh")
 
 _WHY = {
-    "2D": "at this size a loop takes about as long as starting the second thread (0.1 to 0.2 ms), and a solve makes "
-    "about 750 such calls (both measured separately); the profile above gives the share of each loop. For larger "
-    "bodies the time grows more slowly than the number of nodes.",
-    "3D": "half of the time is spent in the sweeps and transfers of multigrid (see the profile and the bandwidth "
-    "table above); building the coarse levels and assembly share the rest.",
-    "command": "most of the time is not spent in the solver. In one separate run under the profiler, of 5.1 s: 0.9 s "
-    "imports, 0.9 s numba and its compiled code, 1.4 s figures as PNG and SVG, 0.7 s files and page, 1.2 s five models "
-    "at ten levels.",
-    "assembly": "the block of a spring is computed for both of its nodes, so that no two threads write to one row, "
-    "and its data are gathered from several arrays: arithmetic and latency are the limit, not bandwidth.",
-    "matrix product": "a block is stored once for two rows, half the bytes of a plain product: each byte needs more "
-    "arithmetic, in scalar double precision, and the product writes to rows that other blocks have just written.",
+    "2D": "at this size, a loop takes about as long as the start of the second thread (0.1 to 0.2 ms), and a solve has "
+    "about 750 such loops (both measured separately). The table of fractions above lists each loop. For larger bodies "
+    "the time grows more slowly than the number of nodes.",
+    "3D": "half of the time is spent in the sweeps and transfers of multigrid (see the tables above), the rest in "
+    "the construction of coarse levels and in assembly.",
+    "command": "most of the time is not spent in the solver. A separate run of 5.1 s under a profiler spent 0.9 s in "
+    "imports, 0.9 s in numba and compiled code, 1.4 s in figures, 0.7 s in files and the page, and 1.2 s in solving "
+    "five models at ten levels.",
+    "assembly": "to prevent two threads from writing to the same row, the block of a spring is computed once for each "
+    "of its two nodes, and its data come from several arrays. Arithmetic and latency limit the speed, not bandwidth.",
+    "matrix product": "a block is stored once for two rows, which halves the data of a plain product. Each byte "
+    "therefore needs more arithmetic, in scalar double precision, and different blocks write to the same rows.",
 }
 
 
 def aims(results: dict, runs: list[Measured]) -> Iterator[Aim]:
-    """Yield all of them."""
+    """Yield the targets of the benchmark with the measured values."""
     for dim, size, target in ((2, "51,000", ((12, 25), (8, 15))), (3, "31,000", ((35, 80), (15, 30)))):
         for name, programs, (least, best) in zip(("CalculiX", "FElupe"), (("calculix",), FELUPE), target, strict=True):
             measured = faster(runs, dim, programs)

@@ -15,7 +15,7 @@ from benchmarks.runs import HERE, PROGRAMS, ROOT, Measured
 # The solver of each program; the rest of its row comes from the runs.
 _SOLVERS = {
     "truespring": "one load step, residual to 1e-8 of the load",
-    "calculix": "NLGEOM, one increment, SPOOLES on all threads; residual and correction to 1e-7, in its own norms",
+    "calculix": "NLGEOM, one increment, SPOOLES, all threads; residual and correction to 1e-7 in the norms of CalculiX",
     "felupe": "plain Newton, MKL Pardiso, threads; residual to 1e-8 of the reactions",
     "skfem": "plain Newton, MKL Pardiso; residual to 1e-8 of the load",
 }
@@ -86,8 +86,9 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
         "**Springs are a cheaper model than finite elements.** A spring depends on two nodes; an element integrates a "
         "constitutive law over its volume. Springs have a fixed Poisson's ratio and a model error, see "
         "[below](#time-to-the-same-error). The times compare springs with finite elements of the same nodes, supports "
-        "and force; they do not compare two ways to solve the same equations. For that, compare truespring's finite "
-        "elements with the peers, or the biquadratic springs, which converge to the St. Venant-Kirchhoff law.\n"
+        "and force; they do not compare two ways to solve the same equations. For that, compare the other programs "
+        "with "
+        "truespring's finite elements, or with biquadratic springs, which converge to the St. Venant-Kirchhoff law.\n"
     )
     yield (
         f"Two bodies are fixed on the left and loaded on the right by a dead force: a rectangle {LENGTH:g} by 1 of "
@@ -100,8 +101,8 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
         "Seconds are wall time from the built mesh to equilibrium: sparsity pattern, assembly, factorisation or "
         "multigrid setup, and all iterations, without reading, writing and compiling (compiled code comes from a "
         "cache; each process first solves a small mesh, untimed). Times are the median of three runs, or of one run "
-        "if it takes 20 s. Peers use the smallest number of equal load steps that converges; failed attempts are not "
-        "timed.\n"
+        "if it takes 20 s. The other programs use the smallest number of equal load steps that converges; failed "
+        "attempts are not timed.\n"
     )
     rows = []
     for name, program in PROGRAMS.items():
@@ -136,7 +137,7 @@ def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterato
     ]
     yield from table(("nodes", *(f"{count:,}" for count in nodes)), rows)
     if left_out:
-        yield f"Left out, because a solve may take at most {longest:g} s:\n"
+        yield f"Sizes left out, since the time of a solve is limited to {longest:g} s:\n"
         yield from (f"* {label}: {why}" for label, why in left_out.items())
         yield ""
 
@@ -154,8 +155,8 @@ def _agreement(runs: list[Measured]) -> Iterator[str]:
             apart[law, dim] = max(spreads, default=0.0)
     listed = "; ".join(f"{law}, {dim}D: {value:.1e}" for (law, dim), value in apart.items())
     yield (
-        "Programs with the same law agree. Largest relative difference of two tip displacements on one mesh, over all "
-        f"sizes and both loads: {listed}. (CalculiX prints seven digits.)\n"
+        "Programs with the same law agree. Largest relative difference between two tip displacements on the same "
+        f"mesh, over all sizes and both loads: {listed}. (CalculiX prints seven digits.)\n"
     )
 
 
@@ -219,8 +220,8 @@ def _details(runs: list[Measured]) -> Iterator[str]:
 def _memory(runs: list[Measured]) -> Iterator[str]:
     yield "## Memory\n"
     yield (
-        "Peak resident memory in MiB, minus that of a Python interpreter without imports; libraries are included. "
-        "Bending.\n"
+        "Peak resident memory in bending, in MiB, minus that of a Python interpreter without imports. Libraries are "
+        "included.\n"
     )
     for dim in (2, 3):
         depths = _sizes(runs, dim, "bending")
@@ -245,8 +246,10 @@ def _limit(results: dict) -> Iterator[str]:
     listed = "; ".join(f"{name}: {value / 1e9:.1f} GB/s" for name, value in results["bandwidth"].items())
     yield f"Memory bandwidth of this machine in the same run, arrays of 512 MiB: {listed}.\n"
     yield (
-        "Time of the spring kernels over the time needed to read and write their data once at the largest of these "
-        "bandwidths. Below 1 the data fit into a cache. Relative to the bandwidth of reading alone, "
+        "The last column of the table is the time of a spring kernel over its limit, the time needed to read and "
+        "write its "
+        "data once at the largest of these bandwidths. It can be below 1 if the data fit into a cache. Relative to "
+        "the bandwidth of reading alone, "
         f"{reading / 1e9:.1f} GB/s, the last column would be {reading / limit:.2f} times as large.\n"
     )
     rows = []
@@ -257,7 +260,7 @@ def _limit(results: dict) -> Iterator[str]:
             numbers = f"{moved.bytes_moved / 1e6:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}"
             rows.append((f"{_where(one)}: {moved.name}", *numbers, f"{moved.over(limit):.1f}"))
     yield from table(("", "MB", "ms", "limit, ms", "time over limit"), rows)
-    yield "Shares of the time of a whole solve, including the distribution of work to threads:\n"
+    yield "Fractions of the time of a whole solve, including the distribution of work to threads:\n"
     shares = [
         {name: value / sum(one["shares"].values()) for name, value in one["shares"].items()}
         for one in results["kernels"]
@@ -281,8 +284,9 @@ def _accuracy(runs: list[Measured]) -> Iterator[str]:
         "The bodies in bending on meshes with one or more elements over the height. The reference is the St. "
         "Venant-Kirchhoff law in the limit of infinitely fine meshes (Richardson extrapolation from the three finest "
         "meshes of truespring's finite elements). CalculiX solves this law, and biquadratic springs converge to it. "
-        "The model error is the error in the limit of infinitely fine meshes, too soft (+) or too stiff (-); mesh "
-        "refinement does not reduce it. For neo-Hookean programs it is the difference between the two laws. Errors "
+        "The model error is the error that remains in the limit of infinitely fine meshes: positive if the model is "
+        "too "
+        "soft, negative if it is too stiff. For neo-Hookean programs it is the difference between the two laws. Errors "
         "are those of the tip displacement; a target is reached if every finer mesh reaches it too; times are "
         "interpolated between meshes, one run each.\n"
     )
@@ -299,7 +303,9 @@ def _accuracy(runs: list[Measured]) -> Iterator[str]:
             rows.append((program.label, f"{round(found.floor, 4) + 0.0:+.2%}", *_reached(found)))
         yield from table((f"{dim}D", "model error", *(f"to {target:.0%}" for target in errors.TARGETS)), rows)
     yield (
-        "Seconds, and the approximate number of nodes; `<=` where the coarsest mesh is sufficient. Simple bodies need "
+        "Each cell has the time in seconds and, in parentheses, the approximate number of nodes; `<=` marks the "
+        "coarsest "
+        "mesh. Simple bodies need "
         "few nodes for such errors, and every program is fast: springs save time where the geometry needs a fine "
         "mesh.\n"
     )
@@ -333,7 +339,7 @@ def _recorded(recorded: dict) -> Iterator[str]:
     yield "## Other programs\n"
     yield (
         f"Measured once, not by `make bench`: {recorded['date']}, {recorded['processor']}, {recorded['cores']} cores, "
-        "one run each. Bending, with the same meshes and forces.\n"
+        "one run each, in bending on the same meshes with the same forces.\n"
     )
     rows = (
         (run["program"], run["version"], f"{run['dim']}D, {run['n_nodes']:,}", _seconds(run["seconds"]), run["notes"])

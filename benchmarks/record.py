@@ -11,8 +11,8 @@ from benchmarks.runs import HERE, Job, in_process
 
 # Module, label, material law, dimension, elements over the height.
 _RECORDED = (
-    ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 2, 12),
-    ("torchfem", "torch-fem", "neo-Hookean, its own load steps", 3, 6),
+    ("torchfem", "torch-fem", "neo-Hookean, load steps chosen by the program", 2, 12),
+    ("torchfem", "torch-fem", "neo-Hookean, load steps chosen by the program", 3, 6),
     ("jax_springs", "JAX with SciPy's L-BFGS", "the springs of Lloyd's rule", 2, 12),
     ("jax_springs", "JAX with SciPy's L-BFGS", "the springs of Lloyd's rule", 2, 25),
 )

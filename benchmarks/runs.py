@@ -152,7 +152,7 @@ def too_slow(last: Measured, job: Job) -> str:
     if not last.seconds:
         return last.failure
     if last.median * job.n_nodes / last.n_nodes > LIMIT:
-        return f"would take longer than {LIMIT:g} s: {last.median:.0f} s at {last.n_nodes:,} nodes"
+        return f"the next size would exceed {LIMIT:g} s ({last.median:.0f} s at {last.n_nodes:,} nodes)"
     return ""
 
 

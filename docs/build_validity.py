@@ -77,8 +77,8 @@ SHOWN = (
     Shown(
         "poisson",
         "Poisson's ratio",
-        "Squares, four through the depth, stretched at Poisson's ratios from 0 to 0.45: plain springs have 1/3, "
-        "springs with a volume term and coupled springs that of the material.",
+        "Squares, four through the depth, stretched at Poisson's ratios from 0 to 0.45: plain springs have the "
+        "ratio 1/3, springs with a volume term and coupled springs that of the material.",
         "examples/bending.toml",
         arguments={
             "loads": ["stretch"],
@@ -91,7 +91,7 @@ SHOWN = (
         "cubes",
         "Cubes",
         "The block of `examples/soft_block.toml`, 160 mm by 40 mm by 40 mm, at Poisson's ratio 0.45; plain springs "
-        "have 1/4.",
+        "have the ratio 1/4.",
         "examples/soft_block.toml",
         arguments={"loads": ["stretch", "bend"], "rules": ["all"], "ranges": {"depth": (1, 4)}},
     ),
@@ -110,8 +110,8 @@ SHOWN = (
     Shown(
         "tetrahedra",
         "Body-centred-cubic tetrahedra",
-        "The shorter block at 1/4, divided into body-centred-cubic tetrahedra, on which Lloyd's rule is isotropic; the "
-        "depth is in cells.",
+        "The shorter block with Poisson's ratio 1/4, divided into body-centred-cubic tetrahedra, on which Lloyd's rule "
+        "is isotropic. The depth is the number of cells.",
         "examples/soft_block.toml",
         {
             "poisson = 0.45": "poisson = 0.25",
@@ -147,12 +147,23 @@ def small_png(sheet: Sheet) -> bytes:
     return file.getvalue()
 
 
+def _change(old: str, new: str) -> str:
+    """Return a change of the text of a study in words."""
+    added = new.removeprefix(f"{old}\n")
+    return f"{_code(new)} instead of {_code(old)}" if added == new else f"{_code(added)} added"
+
+
+def _code(text: str) -> str:
+    """Return lines of a study as code spans."""
+    return ", ".join(f"`{line}`" for line in text.splitlines())
+
+
 def section(shown: Shown, found: Validity, folder: Path) -> Iterator[str]:
     """Yield the text of the maps of one body; write its figures into `folder`."""
     yield f"## {shown.title}\n\n{shown.text}\n\n```sh\n{shown.command}\n```\n"
     if shown.changes:
-        changed = "; ".join(f"`{new.splitlines()[-1]}`" for new in shown.changes.values())
-        yield f"(in a copy of the study with {changed})\n"
+        changed = "; ".join(_change(old, new) for old, new in shown.changes.items())
+        yield f"(The study is a copy with {changed}.)\n"
     pictures = found.figures()
     for load in dict.fromkeys(one.load.name for one in found.maps):
         yield f"### {LOAD_TYPES[load].did}\n"

@@ -1,4 +1,4 @@
-"""Rebuild docs/verification.md: every number measured anew and set beside its source.
+"""Rebuild docs/verification.md: every number is measured again and compared with its source.
 
 Run from the root of the repository: python docs/build_verification.py (or make verification).
 """
@@ -29,25 +29,25 @@ from truespring.study import read_study, run  # noqa: E402
 
 @dataclass(frozen=True)
 class Row:
-    """One number: what it is, what truespring gives, what the source says, and which source.
+    """A measured number: description, value of truespring, reference value and its source.
 
-    Of finite elements `own` is how far they are from the limit of finer and finer meshes.
+    `own` is the discretisation error of finite elements, None for springs.
     """
 
     what: str
     measured: float
-    wanted: float
+    reference: float
     source: str
     own: ts.OwnError | None = None
 
     def __str__(self) -> str:
-        apart = abs(self.measured - self.wanted) / (abs(self.wanted) or 1.0)
-        measured = 0.0 if not self.wanted and apart < ROUNDING[0] else self.measured + 0.0
-        shown = [self.what, f"{measured:.8g}", f"{self.wanted:.8g}", rounded(apart), self.source]
+        apart = abs(self.measured - self.reference) / (abs(self.reference) or 1.0)
+        measured = 0.0 if not self.reference and apart < ROUNDING[0] else self.measured + 0.0
+        shown = [self.what, f"{measured:.8g}", f"{self.reference:.8g}", rounded(apart), self.source]
         return f"| {' | '.join([*shown, own_limit(self.own)])} |"
 
 
-#: Differences below these are rounding, and what solvers leave: their digits are those of one machine on one day.
+#: Differences below these are rounding errors or solver tolerances, whose digits depend on the machine.
 ROUNDING = (1e-12, 1e-9)
 
 
@@ -58,7 +58,7 @@ def rounded(apart: float) -> str:
 
 
 def own_limit(own: ts.OwnError | None) -> str:
-    """Return how far finite elements are from their own limit as text; empty of what is none."""
+    """Return the discretisation error as text, empty if there is none."""
     if own is None:
         return ""
     if own.value is None:
@@ -318,7 +318,7 @@ def cook() -> Iterator[Row]:
 
 
 def cook_springs() -> Iterator[Row]:
-    """Cook's membrane by springs on triangles: wrong answers, which the moduli predict."""
+    """Cook's membrane by springs on triangles: inaccurate results, as predicted by the effective moduli."""
     for diagonal, tips in {"right": (45.338, 18.088), "left": (33.341, 15.938)}.items():
         for rule, wanted in zip(("van-gelder", "lloyd"), tips, strict=True):
             found = cook_tip(cook_mesh(64, "triangle", diagonal), ts.Springs(rule))
@@ -327,7 +327,7 @@ def cook_springs() -> Iterator[Row]:
 
 
 def locking() -> Iterator[Row]:
-    """A cantilever of 20 by 5 by 5 hexahedra under a small end load, beside what refined elements tend to."""
+    """A cantilever of 20 by 5 by 5 hexahedra under a small end load, compared with the limit of refined elements."""
     mesh = ts.box((4.0, 1.0, 1.0), (20, 5, 5))
     source = "extrapolated from refined elements of both kinds that do not lock, `tests/test_fem.py`"
     for poisson, limit in TRUE_DEFLECTION.items():
@@ -354,7 +354,7 @@ def loads_and_paths() -> Iterator[Row]:
 
 
 def shipped_studies() -> str:
-    """What the shipped studies show: among it the two findings of Lembryk and Ciszkiewicz."""
+    """Errors in the shipped studies, including the two findings of Lembryk and Ciszkiewicz."""
     errors = "error at the probe | rms error | largest error"
     lines = [
         f"| study | springs | reference | {errors} | error of the reference | error against the refined reference |"
@@ -372,7 +372,8 @@ def shipped_studies() -> str:
 def against_the_truth() -> str:
     """Springs of the shipped studies in the plane against each law refined: the table of the README.
 
-    The truth is of second order on a mesh twice halved; beside it what four-node elements of the same mesh make of it.
+    The refined elements are of second order on a mesh refined twice. Four-node elements on the mesh of the springs are
+    included for comparison.
     """
     lines = ["| against, refined | stretched by 30 % | bent by half the length |", "|---|---|---|"]
     found: dict[str, list[str]] = {}
@@ -385,7 +386,7 @@ def against_the_truth() -> str:
             models = {f"springs ({rule})": ts.Springs(rule) for rule in ("lloyd", "isotropic", "gaussian")}
             for who, model in {**models, "four-node elements": ts.Fem(law)}.items():
                 error = ts.compare(ts.solve(problem, model, steps), truth).error
-                shown = "no equilibrium of the truth" if error is None else f"{error:.1%}"
+                shown = "no equilibrium" if error is None else f"{error:.1%}"
                 found.setdefault(f"{who}: {ts.Fem(law).label}", []).append(shown)
     order = sorted(found, key=lambda one: one.split(":")[0])
     return "\n".join(lines + [f"| {name} | {' | '.join(found[name])} |" for name in order])
@@ -398,24 +399,25 @@ HEAD = """\
 ({versions});
 tests check the differences from CalculiX.
 
-The difference between springs and FEM is a measurement, not a test: see the last tables. The tests compare the springs
-with the theory of spring lattices and the finite elements with their constitutive law. For finite elements, the last
-column is their discretisation error: the rms difference from the limit of mesh refinement over the nodes
-([definition](study.md#error-of-a-reference)).
+Springs are compared with the theory of spring lattices, finite elements with their constitutive law. The differences
+between springs and FEM in the last tables are not errors of truespring but properties of the models. For finite
+elements, the last column is the discretisation error: the rms difference at the nodes from the limit of mesh
+refinement ([definition](study.md#error-of-a-reference)).
 """
 
 
 LOCKING = """\
 Linear hexahedra reach 0.922 of the limit at Poisson's ratio 0.45 and 0.791 at 0.49 (checked by `tests/test_fem.py`). An
-independent code found 0.937 and 0.819 against a different reference; these values are not reproduced.
+independent code gives 0.937 and 0.819 relative to a different limit; these values are not reproduced.
 """
 
 
 CALCULIX = """\
 ## CalculiX
 
-The same bodies, nodes and loads in CalculiX 2.20, checked by `tests/test_calculix.py` if `ccx` is installed: largest
-nodal difference over largest displacement, or the difference at the tip over its displacement.
+The same bodies, nodes and loads are solved by CalculiX 2.20 (`tests/test_calculix.py`, if `ccx` is installed). The
+table lists the largest nodal difference over the largest displacement or, where it says "tip", the relative difference
+of the tip displacement.
 
 | body | largest difference |
 |---|---|
@@ -425,7 +427,7 @@ nodal difference over largest displacement, or the difference at the tip over it
 | the same, stretching, tip | 1e-4 and 5e-5 |
 | spring lattices (SPRINGA), plane and in space, bending, stretching, prescribed motion | 1e-6 |
 | hexahedra (C3D8), tetrahedra (C3D4, C3D10), linear and NLGEOM, bending, tension, torsion, rms | 1e-6 |
-| pyramids (as C3D8), triangles beside quadrilaterals (CPE3, CPE4), linear and NLGEOM, rms | 1e-6 |
+| pyramids (as C3D8), triangles with quadrilaterals (CPE3, CPE4), linear and NLGEOM, rms | 1e-6 |
 | wedges (as C3D8) and solids of four kinds, tension and pressure, linear, NLGEOM, rms | 1e-6, 1e-5 |
 | pressure that follows, gravity, traction, twisted ends, linear and NLGEOM, plane strain and in space | 1e-3 |
 | the shipped organ, linear and NLGEOM under 0.3 of its loads, Poisson's ratio 0.3 (`make verification`) | 1e-3 |

@@ -16,11 +16,14 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, get_args
 
+from tests.closed_forms import material_of
 from truespring.cli import main
 from truespring.loading import LOADS
 from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS
 from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.models.heml import HEML_LAWS
+from truespring.models.mass_tensor import TENSOR_LAWS
 from truespring.study import schema
 from truespring.study.toml import toml_text
 
@@ -89,6 +92,8 @@ def valid(rng: random.Random) -> Tables:
     tables["solver"] = _solver(rng, dim, size, driven)
     element = tables["mesh"].get("element", "quadrilateral" if dim == 2 else "hexahedron").removeprefix("bcc-")
     tables["models"] = {f"{rng.choice('abcxyz')}{n}": _model(rng, element) for n in range(rng.choice((1, 2, 2, 3)))}
+    for one in (tables["material"], *tables.get("region", [])):
+        _add_constants(one, [model["law"] for model in tables["models"].values() if "law" in model])
     if rng.random() < 0.4:
         tables["compare"] = _compare(rng, dim, size, list(tables["models"]))
     return tables
@@ -126,6 +131,16 @@ def _material(rng: random.Random) -> Tables:
     return material
 
 
+def _add_constants(material: Tables, laws: list[str]) -> None:
+    """Add the constants of laws to a material, those that are stresses by its modulus; and the moduli they give."""
+    for law in laws:
+        young = _si(material["young"])
+        whole = material_of(law, young, material["poisson"])
+        material |= dict(whole.constants)
+        if LAWS[law].lame is not None:
+            material["poisson"] = whole.poisson
+
+
 def _si(value: Any) -> float:
     if isinstance(value, str):
         number, unit = value.split()
@@ -152,7 +167,7 @@ def _moved(rng: random.Random, dim: int, size: list[float]) -> Tables:
 
 def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tables:
     key = rng.choice([*LOADS, "force", "traction"])
-    key = "force" if dim == 3 and key == "moment" else key  # in space it has no potential
+    key = key if dim in LOADS[key].dims else "force"
     strain = rng.uniform(-5, -1) if rng.random() < 0.85 else rng.uniform(-14, 2)
     stress = young * 10**strain * rng.choice((1, -1))
     section = size[1] * (size[2] if dim == 3 else 0.01)
@@ -166,7 +181,12 @@ def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tabl
             return {"on": rng.choice(("right", "top", "bottom")), "pressure": stress}  # refused where edges are free
         case "moment":
             return {"on": "right", "moment": stress * section * size[1]}
-    return {"gravity": _vector(rng, dim, 9.81)}
+        case "gravity":
+            return {"gravity": _vector(rng, dim, 9.81)}
+    sizes = {"stress": stress, "force": stress * section, "moment": stress * section * size[1], "length": size[0]}
+    several = {name: (one, sizes.get(one.dimension, 1.0)) for name, one in LOADS[key].quantities(key).items()}
+    load = {name: _vector(rng, dim, value) if one.vector else value for name, (one, value) in several.items()}
+    return {**({"on": rng.choice(("right", "top"))} if LOADS[key].on_selection else {}), **load}
 
 
 def _vector(rng: random.Random, dim: int, size: float) -> list[float]:
@@ -215,9 +235,9 @@ def _model(rng: random.Random, element: str) -> Tables:
         case "terzopoulos":
             model["boundary"] = rng.choice(words(schema.TerzopoulosKeys, "boundary"))
         case "mass-tensor":
-            model["law"] = rng.choice(("linear", "saint-venant-kirchhoff")) if simplices else "linear"
+            model["law"] = rng.choice(TENSOR_LAWS) if simplices else "linear"
         case "heml":
-            model["law"] = rng.choice([*LAWS][1:]) if simplices else "saint-venant-kirchhoff"
+            model["law"] = rng.choice(HEML_LAWS) if simplices else "saint-venant-kirchhoff"
         case _:
             model["law"] = rng.choice(list(LAWS))
     if kind == "fem" and rng.random() < 0.4:

@@ -16,7 +16,9 @@ import pytest
 import trimesh
 
 from tests.studies import changed, written
+from tests.wording import in_order
 from truespring.cli import main
+from truespring.outputs import UNFINISHED, Lock
 from truespring.study import read_study
 
 MODELS = ["springs", "linear"]
@@ -168,6 +170,8 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     for text in ("8.824 to 11.05 kPa", "0.263 to 0.412"):
         assert text in " ".join(shown.split())
     assert "Zener" not in shown
+    brief = " ".join(shown.split())
+    assert in_order(brief, "8.824", "(material 10 kPa, 0.300)", "'springs'", "not fit", 'rule = "isotropic"', "-v")
     assert shown.splitlines()[-1] == f"picture: {out / 'study' / 'check.png'}"
     assert {one.name for one in (out / "study").iterdir()} == {"check.png", ".truespring.json"}
     assert (out / "study" / "check.png").read_bytes().startswith(b"\x89PNG")
@@ -178,6 +182,9 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     assert main(["check", str(file), "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
+    reasons = plan["models"]["springs"]["sentence"].split(". ")[0]
+    assert in_order(reasons, "0.882", "1.105", "0.263", "0.412", "0.300")
+    assert reasons in " ".join(shown.split()) and reasons not in brief
     assert plan["total_force"] == pytest.approx([0, -0.01])
     problem = read_study(file).problem
     stated = {"supports": [one.words(2) for one in problem.supports], "loads": [one.words() for one in problem.loads]}
@@ -185,6 +192,34 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
     assert all(words in shown for several in stated.values() for words in several)
     assert plan["models"]["springs"]["n_springs"] == 8 * 3 + 2 * 9 + 2 * 16
     assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "out"}
+
+
+def test_check_needs_no_picture_unless_out_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path)
+
+    def require_no_picture() -> None:
+        assert main(["check", "study.toml"]) == 0
+        printed = capsys.readouterr()
+        assert "27 nodes" in printed.out and "check.png" not in printed.out
+        assert len(printed.err.splitlines()) == 1
+        assert main(["check", "study.toml", "--out", "out"]) == 2
+        capsys.readouterr()
+        assert main(["check", "study.toml", "--quiet"]) == 0
+        assert capsys.readouterr() == ("", "")
+
+    Path("out").touch()
+    require_no_picture()
+    Path("out").unlink()
+    with Lock(Path("out/study")):
+        require_no_picture()
+        Path("out/study", UNFINISHED).touch()
+    require_no_picture()
+    Path("out/study", UNFINISHED).unlink()
+    assert main(["check", "study.toml"]) == 0
+    assert Path("out/study/check.png").is_file() and capsys.readouterr().err == ""
 
 
 def test_plane_strain_says_which_moduli_it_compares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """The command line before anything is solved: help, examples, the nearest word, completion, `new`, closed pipes."""
 
+import errno
 import json
 import os
 import re
@@ -8,8 +9,9 @@ import shutil
 import subprocess
 import sys
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import pytest
 
@@ -17,6 +19,7 @@ import truespring
 from tests.test_examples import EXAMPLES
 from truespring.cli import main, printing
 from truespring.cli.parser import VERBS, build_parser, parse
+from truespring.cli.verb import COMMON
 
 KINDS = tuple(one.stem for one in (Path(truespring.__file__).parent / "examples").glob("*.toml"))
 
@@ -86,16 +89,39 @@ def test_the_nearest_word_is_named(arguments: list[str], word: str, capsys: pyte
     assert f"did you mean {word}" in capsys.readouterr().err
 
 
-def test_options_without_effect_are_none() -> None:
+@pytest.mark.parametrize("name", VERBS)
+def test_every_verb_accepts_every_common_option(name: str) -> None:
+    line = shlex.split(VERBS[name].examples[0].partition(" > ")[0])[1:]
+    assert {"json", "quiet", "threads"} <= set(COMMON)
+    for option, (words, _) in COMMON.items():
+        for word in words:
+            options = parse([*line, word, "3"] if option == "threads" else [*line, word])
+            assert {key: getattr(options, key) for key in COMMON} == {
+                **dict.fromkeys(COMMON, False),
+                "threads": None,
+                option: 3 if option == "threads" else True,
+            }
+
+
+def test_help_lists_common_options_that_have_an_effect() -> None:
     _, verbs = build_parser(VERBS)
-    without = {name: {"--json", "--quiet", "--threads", "--verbose"} - set(verbs[name].option_names) for name in VERBS}
-    assert without == {
+    shown = {name: set(re.findall(r"--\w+", verbs[name].format_help())) for name in VERBS}
+    common = {f"--{option}" for option in COMMON}
+    assert {name: common - words for name, words in shown.items()} == {
         **{name: {"--verbose"} for name in VERBS},
         **{name: set() for name in ("verify", "solve", "check")},
         "new": {"--threads", "--verbose"},
         "rules": {"--quiet", "--threads", "--verbose"},
         "schema": {"--json", "--quiet", "--threads", "--verbose"},
     }
+
+
+def test_options_without_effect_change_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = []
+    for more in ((), ("--json", "--quiet", "--threads", "2")):
+        assert main(["schema", *more]) == 0
+        shown.append(capsys.readouterr().out)
+    assert shown[0] == shown[1] and json.loads(shown[0])
 
 
 def test_names_in_help_are_those_of_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,6 +181,57 @@ def test_a_closed_pipe_is_no_error() -> None:
         assert writer.stdout is not None and writer.stderr is not None
         writer.stdout.close()  # long before it has started to write
         assert writer.stderr.read() == b"" and writer.wait() == 141
+
+
+def written_to(stream: TextIO, arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+    """Return the exit code of a command with this standard output."""
+    with stream, monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", stream)
+        return main(arguments)
+
+
+@pytest.mark.parametrize("arguments", [["schema"], ["rules"], ["new", "strip"], ["--help"]])
+def test_a_command_ends_when_its_output_is_closed(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert written_to(os.fdopen(writer, "w", buffering=1), arguments, monkeypatch) == 141
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("buffering", [1, -1])
+def test_a_full_disk_is_an_error(
+    buffering: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stream = Path("/dev/full").open("w", buffering=buffering, encoding="utf-8")  # noqa: SIM115
+    assert written_to(stream, ["rules"], monkeypatch) == 1
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        BrokenPipeError(errno.EPIPE, "Broken pipe"),
+        ConnectionResetError(errno.ECONNRESET, "Connection reset by peer"),
+        OSError(errno.ENOSPC, "No space left on device"),
+        OSError("a text alone"),
+        OSError(errno.EACCES, "Permission denied", "curves.csv"),
+    ],
+)
+def test_other_errors_of_streams_are_printed(
+    error: OSError, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(_: Namespace) -> int:
+        raise error
+
+    monkeypatch.setitem(VERBS, "rules", replace(VERBS["rules"], run=run))
+    assert main(["rules"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    for text in (error.strerror or str(error), error.filename or ""):
+        assert text in line
 
 
 def undescribed(schema: dict[str, Any]) -> list[str]:

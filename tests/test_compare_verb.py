@@ -10,8 +10,10 @@ import pytest
 
 import truespring as ts
 from tests.calculix import needs_ccx
+from tests.studies import changed, written
 from tests.test_examples import EXAMPLES
 from truespring.cli import main
+from truespring.comparing.sources import find_sources, open_source
 from truespring.study import read_study
 
 BENDING = EXAMPLES / "bending.toml"
@@ -284,7 +286,7 @@ def test_markers_in_the_body(folder: Path, tmp_path: Path, capsys: pytest.Captur
         ((BENDING, BENDING, "--unit", "other.frd=mm"), "'other.frd' matches none of"),
         ((BENDING, BENDING, "--axes", "x,y"), "x, y and z"),
         ((BENDING, BENDING, "--shift", "1,2,3,4"), "two or three lengths"),
-        ((BENDING, BENDING, "--load-factor", "2"), "not above 0 and at most 1"),
+        ((BENDING, BENDING, "--load-factor", "2"), "above 0 and at most 1"),
         ((BENDING, BENDING, "--probe", "left-middle-of"), "left-middle-of"),
         ((BENDING, BENDING, "--probe", "1 mm, 2 kg"), "--probe"),
         ((BENDING, BENDING, "--tolerance", "5"), "between 0 and 1"),
@@ -357,6 +359,25 @@ def test_what_a_folder_warns_of_is_told_again(folder: Path, tmp_path: Path, caps
     broken.mkdir()
     (broken / "summary.json").write_text(json.dumps(summary))
     assert "models.springs.label is missing" in refused(capsys, broken, folder, "--out", tmp_path)
+
+
+def test_a_folder_keeps_what_its_models_consist_of(tmp_path: Path) -> None:
+    """Springs and the lines of figures are read as the models reported them; folders of 0.1 by the kind alone."""
+    links = '[models.links]\nkind = "heml"\nlaw = "saint-venant-kirchhoff"\n\n[compare]'
+    file = written(tmp_path, changed(("[compare]", links)))
+    assert main(["solve", str(file), "--out", str(tmp_path), "--quiet"]) == 0
+
+    def read() -> dict[str, tuple[bool, str]]:
+        texts = [f"{tmp_path / 'study'}:{name}" for name in ("springs", "linear", "links")]
+        paths = [open_source(one, None, None) for one in find_sources(texts, [])]
+        return {one.kind: (one.has_springs, one.lines) for one in paths}
+
+    assert read() == {"springs": (True, "springs"), "fem": (False, "springs"), "heml": (False, "links")}
+    summary = json.loads((tmp_path / "study" / "summary.json").read_text())
+    for model in summary["models"].values():
+        del model["has_springs"], model["lines"]
+    (tmp_path / "study" / "summary.json").write_text(json.dumps(summary))
+    assert {kind: springs for kind, (springs, _) in read().items()} == {"springs": True, "fem": False, "heml": False}
 
 
 def test_options_go_to_the_files_that_can_take_them(

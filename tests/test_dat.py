@@ -135,13 +135,13 @@ def test_a_file_that_is_cut_is_refused(sample: Path, tmp_path: Path) -> None:
 
 
 DAMAGED = {
-    "a letter in a number": (rb"(?m)^(         5.*)\d\.", rb"\1x.", r"line 8: 'x.* is no number"),
+    "a letter in a number": (rb"(?m)^(         5.*)\d\.", rb"\1x.", r"line 8: 'x.* is not a number"),
     "a row is shorter": (rb"(?m)^(         5.*)\d$", rb"\1", "line 8: .* is shorter or longer"),
     "a row is missing": (rb"(?m)^         5.*\n", b"", "set NALL at time 0.5 has 8 nodes in the deck, 7 are printed"),
     "a node twice": (rb"(?m)^         5", b"         4", "set NALL at time 0.5: node 4 is repeated"),
     "a node too many": (rb"(?m)^         5", b"        55", "node 55"),
     "no time": (rb"time  0.5", b"time  x.5", "line 2: 'x.*' is not a time"),
-    "no energy": (rb"(?m)(energy.*\n\n) .*$", rb"\1 nothing", "line 1[45]: 'nothing' is no row"),
+    "no energy": (rb"(?m)(energy.*\n\n) .*$", rb"\1 nothing", "line 1[45]: 'nothing' is not a row"),
     "binary": (rb"(?s).*", bytes(range(256)) * 9 + b"\n", "it is binary, not text"),
     "another text": (rb"(?s).*", b"Results\n 1 2 3\n", "no table 'displacements"),
     "another quantity": (rb"displacements", b"velocities", "no table 'displacements"),

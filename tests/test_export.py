@@ -26,11 +26,13 @@ import truespring as ts
 from tests.calculix import displacements
 from tests.exports import CASES, difference, expected, exported
 from tests.studies import changed, written
+from tests.wording import in_order
 from truespring.arrays import Floats
 from truespring.cli import main
 from truespring.errors import ExportError
 from truespring.exports import TARGETS, Exported, check_targets, solve_springs, target_files
 from truespring.exports.features import Feature, features
+from truespring.models.spring_data import SpringData
 
 
 def text_of(one: Exported, target: str) -> str:
@@ -62,7 +64,9 @@ def moved(model: mujoco.MjModel, data: mujoco.MjData, case: str) -> float:
 @pytest.mark.parametrize("case", CASES)
 def test_mujoco_settles_on_our_equilibrium(case: str) -> None:
     """Within 0.1 % when the file says so, and nearer and nearer."""
-    model = mujoco.MjModel.from_xml_string(text_of(exported(case), "mujoco"))
+    text = text_of(exported(case), "mujoco")
+    assert "did not settle" not in text and "settles within" in " ".join(text.split())
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     steps = round(model.numeric("settled").data[0] / model.opt.timestep)
     assert moved(model, data, case) > 0.1
@@ -547,6 +551,27 @@ def _with_feature() -> dict[Feature, tuple[ts.Problem, Any]]:
     }
 
 
+def _named(feature: Feature, problem: ts.Problem, springs: SpringData) -> tuple[str, ...]:
+    """The numbers and names that the error for a feature states, in their order."""
+    network = springs.network
+    if feature in (Feature.NEGATIVE, Feature.PRESTRESS):
+        assert network is not None
+        distance = np.linalg.norm(network.nodes[network.springs[:, 1]] - network.nodes[network.springs[:, 0]], axis=1)
+        has = network.stiffness < 0 if feature is Feature.NEGATIVE else ~np.isclose(network.rest_length, distance)
+        first = int(np.argmax(has))
+        of_first = (
+            (f"{network.stiffness[first]:g} N/m", "rule")
+            if feature is Feature.NEGATIVE
+            else (f"{network.rest_length[first]:g} m", f"{distance[first]:g} m")
+        )
+        return f"{has.sum()} springs", f"spring {first}", *of_first
+    if feature is Feature.FOLLOWING:
+        (load,) = problem.loads
+        assert load.instead
+        return load.words(), load.instead
+    return {Feature.VOLUME_TERM: ("volume = true",), Feature.COUPLING: ("biquadratic", "rule")}[feature]
+
+
 @pytest.mark.parametrize("feature", Feature)
 def test_a_target_takes_what_it_names_and_no_more(
     feature: Feature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -557,6 +582,7 @@ def test_a_target_takes_what_it_names_and_no_more(
     assert found == {feature}, "the body shows nothing else"
     monkeypatch.setattr("truespring.exports.exported.solve", None)
     taking = [name for name, target in TARGETS.items() if feature in target.takes]
+    named = _named(feature, problem, solved.springs)
     assert taking
     for name, target in TARGETS.items():
         if name in taking:
@@ -564,8 +590,9 @@ def test_a_target_takes_what_it_names_and_no_more(
             assert target_files(solved, [name])[name]
             continue
         words = re.escape(target.program) + f" .*{feature}: .*targets .*: {', '.join(taking)}$"
-        with pytest.raises(ExportError, match=words):
+        with pytest.raises(ExportError, match=words) as raised:
             ts.export(problem, model, name, tmp_path)
+        assert in_order(str(raised.value), *named)
         with pytest.raises(ExportError, match=words):
             target_files(solved, [name])
     assert not list(tmp_path.iterdir())

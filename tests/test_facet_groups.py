@@ -193,7 +193,7 @@ def test_a_mesh_that_is_folded_is_refused(name: str) -> None:
     inner = int(np.linalg.norm(nodes - 1.0, axis=1).argmin())
     nodes[inner] += 4.0  # out of the elements around it, whose other corners stay
     file = contents(body, at_ends(body))
-    with pytest.raises(MeshError, match=r"elements are inverted.*: mend the mesh|folded there; mend the mesh"):
+    with pytest.raises(MeshError, match=r"elements are inverted.*: correct the mesh|folded there; correct the mesh"):
         replace(file, points=np.pad(nodes, ((0, 0), (0, 3 - body.dim)))).mesh(1.0)
 
 

@@ -92,11 +92,11 @@ def test_exponents_of_three_digits_say_the_same(tmp_path: Path) -> None:
     tiny.write_text(re.sub(r"(?s)(DISP.*?\n -1 {9}3).{12}", r"\1-1.00000E-100", linux, count=1))
     assert read_frd(tiny).levels[0].displacement[2, 0] == -1e-100
     for damaged, message in {
-        of_windows(linux)[: of_windows(linux).index("DISP") + 400]: "cut off",
-        re.sub(r"(\d\.\d{5})E([+-]0\d\d-)", r"\1F\2", of_windows(linux)): "no row of this block: a node and 3 numbers",
+        of_windows(linux)[: of_windows(linux).index("DISP") + 400]: "truncated",
+        re.sub(r"(\d\.\d{5})E([+-]0\d\d-)", r"\1F\2", of_windows(linux)): "not a row .*a node and 3 numbers",
         re.sub(
             r"(\dE[+-]0\d\d)-", r"\1 1.00000E+000-", of_windows(linux)
-        ): "no row of this block: a node and 3 numbers",
+        ): "not a row of this block: .*a node and 3 numbers",
     }.items():
         windows.write_text(damaged)
         with pytest.raises(ReferenceFileError, match=message):
@@ -122,13 +122,13 @@ def test_all_layers_of_a_composite_shell_are_read(tmp_path: Path) -> None:
         record = read_frd(file)
         cells = record.cells["hexahedron20"]
         assert np.ptp(record.points[cells], axis=1) == pytest.approx(np.array([[1, 1, h] for h in (0.05, 0.05, 0.02)]))
-        assert record.notes == ("elements (3C): 1 are announced, 3 were found and read",)
+        assert record.notes == ("elements (3C): 1 are stated, 3 were found and read",)
         assert np.abs(record.levels[0].displacement[:, 2]).max() > 0.01
     data = text.read_bytes()
     begin, end = data.index(b"    3C"), data.index(b" -3", data.index(b"    3C"))
     for at in range(begin + 80, end + 3, 7):
         text.write_bytes(data[:at])
-        with pytest.raises(ReferenceFileError, match=r"cut off|not a|-3|expected"):
+        with pytest.raises(ReferenceFileError, match=r"truncated|not a|-3|expected"):
             read_frd(text)
 
 
@@ -169,14 +169,14 @@ def test_a_file_that_is_cut_is_refused_or_says_so(sample: bytes, tmp_path: Path)
 
 LOST = "level 3 of 3 .time 2. has no finite displacement"
 DAMAGED = {
-    "a digit": (rb"(?m)^( -1 +1[ -]\d\.\d)", rb"\1x", "cut|longer|no row"),
-    "a letter in a number": (rb"(?m)^( -1 +5.)\d(?=\.\d{5}E)", rb"\1x", "line 1[78]: 'x.* is no number"),
+    "a digit": (rb"(?m)^( -1 +1[ -]\d\.\d)", rb"\1x", "cut|longer|not a row"),
+    "a letter in a number": (rb"(?m)^( -1 +5.)\d(?=\.\d{5}E)", rb"\1x", "line 1[78]: 'x.* is not a number"),
     "a node twice": (rb"(?m)^ -1         2(?=.*E.*E)", b" -1         1", "node 1 is repeated"),
     "an unknown node": (rb"(?s)(DISP.*?\n -1)         7", rb"\1        77", "node 77"),
     "an element's node": (rb"(?m)^ -2         1", b" -2        99", "a hexahedron20 .*node 99"),
     "an unknown element": (rb"(?m)^ -1         1    4", b" -1         1   15", r"element type 15 .*: 1, 2"),
     "fewer nodes of an element": (rb"(?m)^ -1         1    4", b" -1         1    2", "has 6"),
-    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are announced, after 19 follows '-3'"),
+    "fewer rows than announced": (rb"(?m)^ -1         4.*\n", b"", "20 rows are stated, after 19 follows '-3'"),
     "more rows than announced": (rb"(?m)^( -1         4.*\n)", rb"\1\1", "-3|repeated"),
     "an unknown format": (rb"(?m)^(    2C.*)1$", rb"\g<1>7", "format 7 "),
     "no number of rows": (rb"(?m)^(    2C +)20", rb"\1xx", "number of rows"),
@@ -184,7 +184,7 @@ DAMAGED = {
     "components": (rb"(?m)^ -5  D3.*\n", b"", "4 rows '-5'"),
     "a strange record": (rb"(?m)^    1PSTEP", b"    7PSTEP", "record of a .frd file"),
     "a second mesh": (rb"(?s)(    2C.*?-3\n)", rb"\1\1", "a second block of nodes"),
-    "a zero byte": (rb"(?m)^( -1 +3.*)0$", rb"\1" + b"\0", "is no row of this block"),
+    "a zero byte": (rb"(?m)^( -1 +3.*)0$", rb"\1" + b"\0", "is not a row"),
     "coordinates without end": (
         rb"(?m)^( -1         1).*$",
         rb"\1" + b"         inf" * 3,
@@ -209,7 +209,7 @@ def test_what_is_damaged_is_refused_with_its_place(name: str, sample: bytes, tmp
 
 OTHERS = {
     "empty": (b"", "is empty"),
-    "text": (b"Nodes and elements\n1 2 3\n", "line 1: not a .frd file of CalculiX: it begins with 'Nodes and el"),
+    "text": (b"Nodes and elements\n1 2 3\n", "line 1: not a .frd file of CalculiX: .* 'Nodes and el"),
     "binary": (bytes(range(256)) * 20, "line 1: not a .frd file"),
     "one line without an end": (b"    1C" + b"x" * 5000, "record of a .frd file"),
     "no mesh": (b"    1C\n 9999\n", "no nodes"),
@@ -230,7 +230,7 @@ def test_a_binary_file_that_is_cut_is_refused_by_its_byte(tmp_path: Path) -> Non
     places = [data.index(key) for key in (b"    2C", b"    3C", b" -4  DISP")]
     for place in places:
         file.write_bytes(data[: place + 400 if b"DISP" in data[place : place + 20] else place + 90])
-        with pytest.raises(ReferenceFileError, match=r"byte \d+: the file is cut off"):
+        with pytest.raises(ReferenceFileError, match=r"byte \d+: the file is truncated"):
             read_frd(file)
     file.write_bytes(data.replace(b"\1\0\0\0\1\0\0\0\0\0\0\0\1\0\0\0", b"\1\0\0\0\0\0\0\1\0\0\0\0\1\0\0\0"))
     with pytest.raises(ReferenceFileError, match="element type 16777216 "):

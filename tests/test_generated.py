@@ -47,7 +47,10 @@ def test_the_generator_makes_what_it_says() -> None:
     assert {model["kind"] for model in models} == set(schema.MODEL_KINDS) - elsewhere
     assert {model.get("rule") for model in models} >= set(RULES)
     assert {model.get("law") for model in models} >= set(LAWS)
-    assert {key for tables in several for load in tables.get("load", []) for key in load} == {"on", *LOADS}
+    assert {key for tables in several for load in tables.get("load", []) for key in load} == {
+        "on",
+        *(key for name, kind in LOADS.items() for key in kind.quantities(name)),
+    }
     assert {tables["solver"]["control"] for tables in several} == set(words(schema.SolverKeys, "control"))
     assert len(HOSTILE) > 100
 

@@ -182,7 +182,7 @@ def test_cells_of_a_lower_dimension_only_bound_others() -> None:
 @pytest.mark.parametrize(
     ("cells", "words"),
     [
-        ({"polygon": np.zeros((1, 5), int)}, "'polygon' are not read"),
+        ({"polygon": np.zeros((1, 5), int)}, "'polygon' are not supported"),
         ({"quad": np.zeros((1, 3), int)}, "shape"),
         ({"quad": np.array([[0, 1, 2, 9]])}, "name points 0 to 9"),
     ],

@@ -1,4 +1,4 @@
-"""Label images: what their headers tell, held against SimpleITK; names of segments; what is cut off or damaged."""
+"""Label images: what their headers tell, held against SimpleITK; names of segments; what is truncated or damaged."""
 
 import gzip
 import struct
@@ -71,7 +71,7 @@ def patched(file: Path, *patches: tuple[int, str, float]) -> Path:
     [
         ([(254, "<h", 0)], "LPS"),  # qform alone
         ([(252, "<h", 0)], "LPS"),  # sform alone
-        ([(252, "<h", 0), (254, "<h", 0)], "no places of voxels"),
+        ([(252, "<h", 0), (254, "<h", 0)], "no position of the voxels"),
         ([(123, "B", 1)], "LPS"),  # metres
         ([(123, "B", 3)], "LPS"),  # micrometres
         ([(112, "<f", 2.0), (116, "<f", 1.0)], "LPS"),  # a scale of the values
@@ -152,7 +152,7 @@ def test_axes_that_are_nearly_upright_are_taken_and_told(tmp_path: Path) -> None
         mesh = ts.read_voxels(file, int(VALUES[2, 2, 2]))
         assert mesh.measures == pytest.approx(np.full(len(mesh.elements), 27e-9), rel=1e-6)
         assert any("not quite perpendicular" in note for note in mesh.notes) == is_told
-    with pytest.raises(MeshError, match=r"image\.nii: the axes .* cosine between two is 0\.02, up to 0\.01 .*resample"):
+    with pytest.raises(MeshError, match=r"image\.nii: the axes .* is 0\.02, at most 0\.01 .*resample"):
         read_labels(sheared(tmp_path, 0.02))
 
 
@@ -220,7 +220,7 @@ def test_a_study_names_a_segment(tmp_path: Path) -> None:
     )  # a sixth layer is filled by a third
 
 
-# --- what is cut off, damaged or larger than it says --------------------------------------------------------------
+# --- what is truncated, damaged or larger than it says --------------------------------------------------------------
 
 
 def what_counts(file: Path) -> tuple[Any, ...]:
@@ -258,7 +258,7 @@ def beginning_of_voxels(data: bytes, suffix: str) -> int:
 
 
 def damaged(data: bytes, suffix: str, compressed: bool, count: int) -> Iterator[tuple[str, bytes]]:
-    """Files that are cut off anywhere and, of compressed voxels, with a flipped bit."""
+    """Files that are truncated anywhere and, of compressed voxels, with a flipped bit."""
     rng = np.random.default_rng(len(data))
     for end in sorted({0, len(data) - 1, *rng.integers(0, len(data), count).tolist()}):
         if suffix == ".vti" and end >= len(data) - 1:
@@ -330,10 +330,10 @@ def test_a_header_that_tells_terabytes_is_refused_by_the_size_of_its_file(tmp_pa
     np.save(tmp_path / "image.npy", VALUES)
     data = (tmp_path / "image.npy").read_bytes()
     (tmp_path / "image.npy").write_bytes(data.replace(b"(6, 5, 4), ", b"(60000, 50000, 40000),")[:700])
-    with pytest.raises(MeshError, match=r"image\.npy: its header announces 960000000000000 bytes|damaged"):
+    with pytest.raises(MeshError, match=r"image\.npy: its header states 960000000000000 bytes|damaged"):
         read_labels(tmp_path / "image.npy")
     patched(written(tmp_path / "image.nii", image()), *((42 + 2 * axis, "<h", 32000) for axis in range(3)))
-    with pytest.raises(MeshError, match=r"image\.nii: .* GiB are announced, more than half of the memory"):
+    with pytest.raises(MeshError, match=r"image\.nii: .* GiB are stated, more than half of the memory"):
         read_labels(tmp_path / "image.nii")
 
 

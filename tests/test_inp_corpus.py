@@ -15,7 +15,7 @@ from truespring.mesh.files.inp import read_inp
 CORPUS = Path("/usr/share/doc/calculix-ccx-test/examples/test")
 # Of the 155 decks of version 2.11 these have a body; the others have pipes, beams, shells in space or turned bodies.
 N_BODIES = 65
-NO_BODY = r"none; a body is made of|there are only|a shell is not supported|axisymmetric, is not read|no \*NODE|wedge"
+NO_BODY = r"none; a body consists of|there are only|a shell is not supported|axisymmetric, |no \*NODE|wedge"
 
 FACES = {8: ("3210", "4567", "0154", "1265", "2376", "3047"), 6: ("021", "345", "0143", "1254", "2035")}
 

@@ -11,12 +11,24 @@ import pytest
 
 import truespring as ts
 from tests.test_calculix_decks import among, model_and_steps
+from tests.wording import in_order
 from truespring.arrays import Bools, Floats
 from truespring.errors import ExportError, ProblemError
 from truespring.exports import TARGETS, Exported, check_targets, solve_springs
 from truespring.exports.calculix import fem_deck
 from truespring.exports.features import Feature
-from truespring.loading import LOADS, Body, DeadLoad, Load, LoadKind, Mark, Quantity, Spread, selection_words
+from truespring.loading import (
+    LOADS,
+    Body,
+    DeadLoad,
+    Load,
+    LoadKind,
+    Mark,
+    Quantity,
+    Spread,
+    selection_words,
+    vector_words,
+)
 from truespring.mesh import Selection, corner_measures, facets_within, loaded, refined, select
 from truespring.models import Springs
 from truespring.report.symbols import find_acting
@@ -27,37 +39,46 @@ from truespring.units import SI_UNITS
 
 @dataclass(frozen=True)
 class Wind(DeadLoad):
-    """A dead pressure [Pa] at an angle [rad] to x on facets of a plane body."""
+    """A dead pressure [Pa] at an angle [rad] to a direction of any length [m], on facets of a plane body."""
 
     on: Selection
     wind: float
+    along: tuple[float, ...]
     angle: float = 0.0
+
+    @property
+    def way(self) -> Floats:
+        """The direction, a unit vector, shape (2,)."""
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        return np.array([[cos, -sin], [sin, cos]]) @ self.along / np.linalg.norm(self.along)
 
     def spread(self, body: Body) -> Spread:
         facets = facets_within(body.mesh, self.on)
-        stress = self.wind * np.array([np.cos(self.angle), np.sin(self.angle)])
-        density = np.tile(body.thickness * stress, (len(facets), 1))
+        density = np.tile(body.thickness * self.wind * self.way, (len(facets), 1))
         return Spread(*body.carrying(facets, corner_measures(body.mesh.nodes[facets])), density)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, wind=factor * self.wind)
 
     def turned(self, rotation: Floats) -> Self:
-        return replace(self, angle=self.angle + float(np.arctan2(rotation[1, 0], rotation[0, 0])))
+        return replace(self, along=tuple(rotation @ self.along))
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        way = np.array([np.cos(self.angle), np.sin(self.angle)])
-        return Mark(loaded(body.mesh, self.on), way, "w", self.wind, "Pa")
+        return Mark(loaded(body.mesh, self.on), self.way, "w", self.wind, "Pa")
 
     def words(self) -> str:
-        return f"wind {self.wind:g} Pa at {self.angle:g} rad on {selection_words(self.on)}"
+        about = f"{self.angle:g} rad from {vector_words(self.along)}"
+        return f"wind {self.wind:g} Pa at {about} on {selection_words(self.on)}"
 
 
 # The line that a new load needs.
 WIND = LoadKind(
     Wind,
     Quantity("wind", "stress", "the pressure of the wind"),
-    {"angle": Quantity("angle", "angle", "from the x axis", default=0.25)},
+    {
+        "along": Quantity("along", "length", "the direction that the angle is measured from", vector=True),
+        "angle": Quantity("angle", "angle", "from the direction, anticlockwise", default=0.25),
+    },
     dims=(2,),
 )
 ALL = {**LOADS, "wind": WIND}
@@ -115,7 +136,9 @@ RESULTANTS: dict[str, Callable[[Floats, float, float], Floats]] = {
     "force": lambda vector, area, volume: vector,
     "traction": lambda vector, area, volume: area * vector,
     "gravity": lambda vector, area, volume: 1.5 * volume * vector,
-    "wind": lambda vector, area, volume: area * 2.5 * np.array([np.cos(2.5), np.sin(2.5)]),
+    "wind": lambda vector, area, volume: (
+        area * 2.5 * np.array([[np.cos(2.5), -np.sin(2.5)], [np.sin(2.5), np.cos(2.5)]]) @ vector / np.hypot(*vector)
+    ),
 }
 
 
@@ -237,7 +260,7 @@ def test_a_load_is_worded(key: str, dim: int) -> None:
     words = load_of(key, dim).words()
     assert "\n" not in words and not words.endswith(".")
     assert ("'top'" in words) == ALL[key].on_selection
-    assert all(f"{value:g}" in words for value in np.ravel(list(values(key, dim).values())))
+    assert all(f"{value:g}" in words for one in values(key, dim).values() for value in np.ravel(one))
 
 
 # --- how they are read and exported -------------------------------------------------------------------
@@ -262,9 +285,13 @@ def test_a_load_is_read_from_toml(key: str, dim: int) -> None:
                 form.model_validate({name: one for name, one in tables.items() if name != "on"})
     for name, quantity in kind.further.items():
         left = {one: value for one, value in {**on, **given}.items() if one != name}
-        assert getattr(form.model_validate(left).load(), quantity.argument) == quantity.default
+        if quantity.default is None:
+            with pytest.raises(ValueError, match=f"{name} is required"):
+                form.model_validate(left).load()
+        else:
+            assert getattr(form.model_validate(left).load(), quantity.argument) == quantity.default
         with pytest.raises(ValueError, match=f"{name} .* force"):
-            form.model_validate({"on": "top", "force": [1.0, 2.0], name: 1.0})
+            form.model_validate({"on": "top", "force": [1.0, 2.0], name: given[name]})
 
 
 def test_a_load_of_the_whole_body_takes_no_selection() -> None:
@@ -293,7 +320,7 @@ def test_a_target_exports_a_load_or_states_why_not(key: str, target: str) -> Non
     if load.follows and Feature.FOLLOWING not in TARGETS[target].takes:
         with pytest.raises(ExportError) as raised:
             check_targets([target], found.problem, springs)  # type: ignore[arg-type]
-        assert load.words() in str(raised.value) and load.instead in str(raised.value)
+        assert load.instead and in_order(str(raised.value), load.words(), load.instead)
         return
     check_targets([target], found.problem, springs)  # type: ignore[arg-type]
     files = TARGETS[target].files(found)
@@ -312,7 +339,7 @@ def test_a_deck_of_finite_elements_has_the_load_or_states_why_not(key: str, dim:
     if load.follows and not by_keyword and law != "linear":
         with pytest.raises(ExportError) as raised:
             fem_deck(problem, [level], law)
-        assert load.words() in str(raised.value) and load.instead in str(raised.value)
+        assert load.instead and in_order(str(raised.value), load.words(), load.instead)
         return
     _, (step,) = model_and_steps(fem_deck(problem, [level], law))
     assert bool(among(step, "DLOAD")) == bool(by_keyword) and bool(among(step, "CLOAD")) == (not by_keyword)

@@ -52,7 +52,7 @@ def test_positions_at_rest_may_stand_in_a_file_of_their_own(tmp_path: Path) -> N
 def test_a_lost_marker_is_told(tmp_path: Path) -> None:
     record = read_markers(written(tmp_path, MARKERS.replace("-1,0\n", "nan,nan\n")))
     assert "1 of 2 points have no displacement at time 1" in record.notes
-    assert "columns without a unit were taken in metres: uy" in record.notes
+    assert "columns without a unit are in metres: uy" in record.notes
 
 
 ROWS = (("tip", 160.0, 20.0, -31.4, -85.2), ("base", 0.0, 20.0, 0.25, 0.0))
@@ -103,23 +103,23 @@ def test_columns_that_tell_something_else_are_left_out_and_told(tmp_path: Path) 
     record = read_record(written(tmp_path, text))
     assert record.points.tolist() == [[0.001, 0.002, 0.003]]
     assert record.levels[0].displacement == pytest.approx(np.array([[0.004, 0.005, 0.006]]))
-    assert record.notes == ("columns that are not read: sigma [pixel], x [pixel], u [pixel], exx",)
+    assert record.notes == ("ignored columns: sigma [pixel], x [pixel], u [pixel], exx",)
 
 
 WRONG = {
-    "no displacement": ("x,y\n0,0\n", None, r"there is no displacement: add columns ux, uy, or give a second file"),
+    "no displacement": ("x,y\n0,0\n", None, r"there is no displacement: add columns ux, uy, or add a second file"),
     "both": (MARKERS, "x,y\n0,0\n", "has the displacement in column ux: leave undeformed out"),
     "unknown column": ("x,y,u\n0,0,0\n", None, "markers.csv:1: column 'u' is unknown"),
     "missing column": ("x,ux\n0,0\n", None, "markers.csv:1: column y is missing"),
-    "half a displacement": ("x,y,ux\n0,0,0\n", None, "markers.csv:1: places have x, y, displacements ux$"),
+    "half a displacement": ("x,y,ux\n0,0,0\n", None, "markers.csv:1: positions have x, y, displacements ux$"),
     "no number": (MARKERS.replace("20", "far"), None, "markers.csv:3: x = 'far' .*number"),
     "no number behind a blank line": (
         MARKERS.replace("\nb,20", "\n\nb,far"),
         None,
         "markers.csv:4: x = 'far' .*number",
     ),
-    "cut off": (MARKERS[:-5], None, "markers.csv:3: 4 values.* 5 columns"),
-    "twice": (MARKERS.replace("b,", "a,"), None, "markers.csv:3: marker 'a' is there twice, first in line 2"),
+    "truncated": (MARKERS[:-5], None, "markers.csv:3: 4 values.* 5 columns"),
+    "twice": (MARKERS.replace("b,", "a,"), None, "markers.csv:3: marker 'a' is defined twice, first in line 2"),
     "all lost": (MARKERS.replace(",1,0.002", ",nan,0").replace("-1,0", "0,nan"), None, "no finite displacement"),
     "place lost": (MARKERS.replace("10", "nan"), None, "have no finite coordinates.*the first is a"),
     "only names": ("marker,x,y,ux,uy\n", None, "at least one row"),
@@ -128,19 +128,19 @@ WRONG = {
     "unit of another kind": (MARKERS.replace("[mm]", "[N]", 1), None, "markers.csv:1: x: "),
     "another marker": (LEVELS.replace("b,1,1", "c,1,1"), None, "marker 'c' is there only at load_factor 1"),
     "a marker less": (LEVELS.replace("b,1,1,0,1,40,50,60\n", ""), None, "marker 'b' is missing at load_factor 1"),
-    "rests elsewhere": (LEVELS.replace("b,1,1,0", "b,1,2,0"), None, "markers.csv:4: this marker rests elsewhere"),
+    "rests elsewhere": (LEVELS.replace("b,1,1,0", "b,1,2,0"), None, "markers.csv:4: the undeformed position"),
     "names in one file": ("marker,x,y\na,0,0\n", "x,y\n0,0\n", "only one of both files has a column marker"),
-    "more rows": ("x,y\n0,0\n1,1\n", "x,y\n0,0\n", "2 markers are here, 1 at rest: give them names"),
+    "more rows": ("x,y\n0,0\n1,1\n", "x,y\n0,0\n", "2 markers are here, 1 are undeformed"),
     "two units in one column": (MARKERS.replace("x [mm]", "x_mm [m]"), None, "has two units, mm and m: keep one"),
     "units of places alone": (
         "x [mm],y [mm],ux,uy\n1,2,3,4\n",
         None,
-        r"column x is in mm, ux has no unit: are these metres, too\? Write ux \[m\], or ux \[mm\]",
+        r"column x is in mm, ux has no unit.* Write ux \[m\], or ux \[mm\]",
     ),
     "two decimal signs": (table(PLAIN, ";", ",").replace("0,25", "0.25"), None, "has a comma, '0.25' a point"),
     "one column twice": (MARKERS.replace("marker,", "X,"), None, "column x .*twice.* 'x .mm.'"),
     "nearly a column": (MARKERS.replace("marker", "load_factr"), None, r"did you mean 'load_factor'.*may be: marker,x"),
-    "in space and plane": ("x,y,z\n0,0,0\n", "x,y\n0,0\n", "places have x, y, z, those in .*rest.csv x, y"),
+    "in space and plane": ("x,y,z\n0,0,0\n", "x,y\n0,0\n", "positions have x, y, z, those in .*rest.csv x, y"),
 }
 
 
@@ -174,10 +174,10 @@ def test_two_stl_files_tell_where_each_point_went(tmp_path: Path) -> None:
         read_record(file)
     data = file.read_bytes()
     file.write_bytes(data[:84] + data[134:] + data[84:134])
-    with pytest.raises(ReferenceFileError, match="goes to two places"):
+    with pytest.raises(ReferenceFileError, match="moves to two positions"):
         read_record(file, undeformed=rest)
     file.write_bytes(data[:300])
-    with pytest.raises(ReferenceFileError, match="cut off"):
+    with pytest.raises(ReferenceFileError, match="truncated"):
         read_record(file, undeformed=rest)
     file.write_bytes(data[:80] + (11).to_bytes(4, "little") + data[84:-50])
     with pytest.raises(ReferenceFileError, match="has 11 facets"):
@@ -209,11 +209,9 @@ def test_files_that_are_no_result_are_refused(suffix: str, tmp_path: Path) -> No
 
 
 def test_what_ends_otherwise_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        ReferenceFileError, match=r"ends in \.frd, \.dat, .*, not in '\.frdx' \(did you mean '\.frd'\?\)"
-    ):
+    with pytest.raises(ReferenceFileError, match=r"is \.frd, \.dat, .*, not '\.frdx' \(did you mean '\.frd'\?\)"):
         read_record(tmp_path / "body.frdx")
-    with pytest.raises(ReferenceFileError, match=r"mesh is not for \.frd files, but for \.dat"):
+    with pytest.raises(ReferenceFileError, match=r"mesh does not apply to \.frd files, only to \.dat"):
         read_record(tmp_path / "body.frd", mesh=tmp_path / "body.inp")
     with pytest.raises(ReferenceFileError, match="is a folder"):
         read_record(tmp_path)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from inspect import isclass, signature
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 import truespring as ts
 import truespring.models
+from tests.wording import in_order
 from truespring.conditions import Loading
 from truespring.equilibrium import check_solver
 from truespring.models import Model, as_model
@@ -83,6 +85,32 @@ def test_solvers_answer_for_themselves(solver: Any) -> None:
 def test_what_is_no_solver_is_an_error(solver: Any) -> None:
     with pytest.raises(ts.TruespringError, match=r"solver.*follow\("):
         ts.solve(PROBLEM, ts.Springs("lloyd"), solver)
+
+
+@pytest.mark.parametrize(
+    ("follow", "named"),
+    [
+        (lambda self, potential, loading: iter(()), "too many positional arguments"),
+        (lambda self, potential, loading, report, geometry, steps: iter(()), "'steps'"),
+        (lambda self, potential, loading, *, report, geometry: iter(()), "positional"),
+        (lambda self, loading, potential, report, geometry: iter(()), "'loading'"),
+    ],
+)
+def test_follow_with_other_arguments_is_an_error_that_names_those_expected(follow: Any, named: str) -> None:
+    solver = type("Mine", (), {"follow": follow})()
+    with pytest.raises(ts.TruespringError) as raised:
+        ts.solve(PROBLEM, ts.Springs("lloyd"), solver)
+    parts = ("Mine", "follow(", named, "follow(self, potential, loading, report, geometry)")
+    assert in_order(str(raised.value), *parts)
+    for fitting in (lambda *arguments: iter(()), lambda p, q, r=None, s=None, more=1: iter(())):
+        mine = SimpleNamespace(follow=fitting)
+        assert as_solver(mine).follow is mine.follow
+
+
+def test_a_class_in_the_place_of_a_solver_is_an_error() -> None:
+    for kind in (PlainNewton, ts.Newton):
+        with pytest.raises(ts.TruespringError, match=rf"{kind.__name__}\(\.\.\.\)"):
+            as_solver(kind)
 
 
 def test_a_model_of_ones_own_needs_a_potential_only() -> None:

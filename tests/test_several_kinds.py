@@ -289,7 +289,7 @@ def test_what_is_for_one_kind_says_so() -> None:
         ts.BemSprings([0, 1], "projected").potential(wedges)
     with pytest.raises(ts.TruespringError, match="mixed elements"):
         ts.Terzopoulos().potential(plane)
-    with pytest.raises(MeshError, match="for elements of one kind, the mesh has 16 triangle and 16 quadrilateral"):
+    with pytest.raises(MeshError, match="needs elements of one kind, the mesh has 16 triangle and 16 quadrilateral"):
         _ = plane.mesh.kind
     assert any("16 triangles" in text for text in ts.Fem("linear").warnings(plane))
     assert ts.Fem("linear").chosen_element(body(PLANE(), 0.45)) == "mean-dilatation"
@@ -378,7 +378,7 @@ def test_bricks_with_corners_that_are_one_are_what_they_are(tmp_path: Path) -> N
         **{"tetrahedron": 2, "pyramid": 5, "wedge": 2, "hexahedron": 1}
     }
     assert np.sort(found.measures) == pytest.approx(np.sort(mesh.measures), rel=1e-9)
-    assert found.notes == ("7 hexahedron cells with corners that are one node became what they are",)
+    assert found.notes == ("7 hexahedron cells with coincident corners became wedges, pyramids or simplices",)
 
 
 # --- all the way ----------------------------------------------------------------------------------

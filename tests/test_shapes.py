@@ -151,9 +151,9 @@ def test_diagonals_go_where_their_name_says(diagonal: str, slopes: set[float]) -
             "diagonal = 'up' is unknown.*right, left, alternating",
         ),
         (lambda: ts.box((1.0, 1.0, 1.0), (2, 2, 2), "bcc"), r"element = 'bcc' is unknown.*bcc-tetrahedron"),
-        (lambda: ts.box((1.0, 1.0), (2, 2, 2)), "a box takes 3 values, along x, y and z"),
-        (lambda: ts.box((1.0, 1.0, 1.0), (2, 2)), "a box takes 3 values"),
-        (lambda: ts.rectangle((1.0, 1.0, 1.0), (2, 2)), "a rectangle takes 2 values, along x and y"),
+        (lambda: ts.box((1.0, 1.0), (2, 2, 2)), "a box has 3 values, along x, y and z"),
+        (lambda: ts.box((1.0, 1.0, 1.0), (2, 2)), "a box has 3 values"),
+        (lambda: ts.rectangle((1.0, 1.0, 1.0), (2, 2)), "a rectangle has 2 values, along x and y"),
         (lambda: ts.box((1.0, -1.0, 1.0), (2, 2, 2)), "lengths must be positive and finite"),
         (lambda: ts.box((1.0, math.inf, 1.0), (2, 2, 2)), "lengths must be positive and finite"),
         (lambda: ts.box((1.0, 1.0, 1.0), (2, 0, 2)), "counts must be whole numbers of at least 1"),
@@ -176,7 +176,7 @@ def test_a_box_too_large_for_memory_is_refused_before_it_is_built(
     # By estimate 10 KiB a node: of 1 GiB 104,857 nodes.
     monkeypatch.setattr(shapes, "available_memory", lambda: 2**30)
     ts.box((1.0, 1.0, 1.0), (20, 20, 20), element)
-    with pytest.raises(MeshError, match=r"needs about \d GiB to be solved, .* has 1\.0 GiB: take fewer elements"):
+    with pytest.raises(MeshError, match=r"needs about \d GiB to be solved, .* has 1\.0 GiB: use fewer elements"):
         ts.box((1.0, 1.0, 1.0), (47, 47, 47), element)
 
 
@@ -453,5 +453,5 @@ def test_a_load_on_two_sides_is_shared_by_area(element: str) -> None:
 def test_groups_are_numbers() -> None:
     plain = ts.rectangle((2.0, 1.0), (2, 1))
     for wrong in ([0.7], [True, False]):
-        with pytest.raises(MeshError, match="a list of element numbers is wanted"):
+        with pytest.raises(MeshError, match="must be a list of element numbers"):
             ts.Mesh(plain.nodes, plain.elements, element_groups={"a": np.array(wrong)})

@@ -88,7 +88,7 @@ def test_moduli_errors_are_those_of_closed_forms() -> None:
     ("method", "name", "published"),
     [
         ("FEM", "St. Venant", 0.036),
-        ("Terzopoulos", "his boundary", 0.499),
+        ("Terzopoulos", "boundary of the paper", 0.499),
         ("Terzopoulos", "trapezoidal", 0.193),
         ("MSM", "Lloyd", 0.035),
         ("MSM", "isotropic", 0.077),

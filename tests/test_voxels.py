@@ -165,15 +165,15 @@ def renamed(folder: Path) -> Path:
 
 WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {
     "no such label": (lambda at: written(at, ".nrrd"), {"label": 5}, r"no voxel has the label 5; there are 0, 4, 7"),
-    "cubes too large": (lambda at: written(at, ".nrrd"), {"label": 7, "edge": 0.05}, "too large: none is filled"),
-    "fractions": (blurred, {"label": 4}, "fractions, not labels"),
-    "cut off": (cut_off, {"label": 4}, "it is cut off: 6 x 5 x 4 voxels of 1 bytes are 120 bytes, .*80"),
-    "cut off vti": (cut_vti, {"label": 4}, "organ.vti: "),
+    "cubes too large": (lambda at: written(at, ".nrrd"), {"label": 7, "edge": 0.05}, "too large: no cube is filled"),
+    "fractions": (blurred, {"label": 4}, "fractional values, not labels"),
+    "truncated": (cut_off, {"label": 4}, "it is truncated: 6 x 5 x 4 voxels of 1 bytes are 120 bytes, .*80"),
+    "truncated vti": (cut_vti, {"label": 4}, "organ.vti: "),
     "two axes": (flat, {"label": 1}, "three axes"),
     "empty": (nothing, {"label": 1}, "no MetaImage"),
-    "no image": (renamed, {"label": 1}, "a label image ends in"),
+    "no image": (renamed, {"label": 1}, "the suffix of a label image is"),
     "not there": (lambda at: at / "absent.nii", {"label": 1}, "does not exist"),
-    "no edge": (lambda at: written(at, ".nrrd"), {"label": 7, "edge": -1.0}, "must be above 0"),
+    "no edge": (lambda at: written(at, ".nrrd"), {"label": 7, "edge": -1.0}, "must be positive"),
     "no such frog": (lambda _: Path("pyvista:toad"), {"label": 1}, "no image of this name"),
 }
 

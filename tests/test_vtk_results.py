@@ -88,7 +88,7 @@ def test_grids_that_vtk_wrote(suffix: str, binary: bool, tmp_path: Path) -> None
 def test_the_displacement_is_named_where_it_is_not_plain(tmp_path: Path) -> None:
     file = tmp_path / "grid.vtu"
     write_grid(file, "velocity")
-    with pytest.raises(ReferenceFileError, match=r"vectors of the points are velocity, none is called disp.*by field"):
+    with pytest.raises(ReferenceFileError, match=r"vectors of the points are velocity, none .* displacement.*by field"):
         read_vtk_result(file)
     with pytest.raises(ReferenceFileError, match=r"no vector 'velocty' \(did you mean 'velocity'\?\)"):
         read_vtk_result(file, field="velocty")
@@ -100,7 +100,7 @@ def test_the_displacement_is_named_where_it_is_not_plain(tmp_path: Path) -> None
     np.testing.assert_array_equal(read_vtk_result(file, field="Displacement").levels[0].displacement, moved)
     write_grid(file, "DISP")
     assert len(read_record(file).levels) == 1
-    with pytest.raises(ReferenceFileError, match=r"field is not for \.csv files, but for \.vtu, \.vtk, .*, \.pvd"):
+    with pytest.raises(ReferenceFileError, match=r"field .* \.csv files, only to \.vtu, \.vtk, .*, \.pvd"):
         read_record(tmp_path / "markers.csv", field="DISP")
 
 
@@ -112,7 +112,7 @@ def test_cells_without_our_shape_functions_are_refused(tmp_path: Path) -> None:
     grid = pyvista.UnstructuredGrid(np.array([5, 0, 1, 2, 3, 4]), np.array([7]), places)
     grid.point_data["u"] = places
     grid.save(file)
-    with pytest.raises(ReferenceFileError, match=r"grid.vtu: cells of VTK's type 7 are not read; line, "):
+    with pytest.raises(ReferenceFileError, match=r"grid.vtu: cells of VTK's type 7 are not supported; .*: line, "):
         read_vtk_result(file)
 
 
@@ -135,11 +135,11 @@ def test_a_series_has_one_mesh_at_rest(problem: ts.Problem, tmp_path: Path) -> N
     text, grid = file.read_text(), pyvista.read(last)
     wrong = {
         "no .pvd file": text[:90],
-        "names no file": "<VTKFile><Collection/></VTKFile>",
+        "refers to no file": "<VTKFile><Collection/></VTKFile>",
         'has timestep="soon"': text.replace('timestep="1.0"', 'timestep="soon"'),
         "names 'body/body_0009.vtu'": text.replace("body_0002", "body_0009"),
-        r"names 'body/body_0002.vti'; files that end in .vtu, .vtk": text.replace("body_0002.vtu", "body_0002.vti"),
-        "time 1 is there twice: merge": text.replace('timestep="0.5"', 'timestep="1.0"'),
+        r"refers to 'body/body_0002.vti', .* supported: .vtu, .vtk": text.replace("body_0002.vtu", "body_0002.vti"),
+        "time 1 is defined twice: merge": text.replace('timestep="0.5"', 'timestep="1.0"'),
     }
     for message, damaged in wrong.items():
         assert damaged != text
@@ -150,12 +150,12 @@ def test_a_series_has_one_mesh_at_rest(problem: ts.Problem, tmp_path: Path) -> N
     warped = grid.copy()
     warped.points = grid.points + grid.point_data["displacement"]
     warped.save(last)
-    with pytest.raises(ReferenceFileError, match=r"not those of body_0000.vtu.*before it is warped"):
+    with pytest.raises(ReferenceFileError, match=r"differ from those of body_0000.vtu.*before it is warped"):
         read_vtk_result(file)
     shuffled = pyvista.UnstructuredGrid({9: grid.cells_dict[9][::-1]}, grid.points)
     shuffled.point_data["displacement"] = grid.point_data["displacement"]
     shuffled.save(last)
-    with pytest.raises(ReferenceFileError, match="cells are not those of body_0000"):
+    with pytest.raises(ReferenceFileError, match="cells differ from those of body_0000"):
         read_vtk_result(file)
     last.write_bytes(b"")
     with pytest.raises(ReferenceFileError, match=r"body_0002.vtu is empty"):

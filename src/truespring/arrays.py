@@ -14,7 +14,7 @@ Bools = NDArray[np.bool_]
 
 
 def frozen_floats(values: object, shape: tuple[int | None, ...], name: str) -> Floats:
-    """Return a read-only float64 copy of `values`; None in `shape` stands for any length.
+    """Return a read-only float64 copy of `values`, of their shape and unit; None in `shape` stands for any length.
 
     Raises ValueError, with `name`, for another shape or values that are not finite.
     """
@@ -46,7 +46,7 @@ def along_axes(vectors: Floats, axes: Sequence[str]) -> Floats:
 
 
 def in_space(vectors: Floats) -> Floats:
-    """Return vectors of 1 to 3 components with zeros for the missing ones, shape (n, 3)."""
+    """Return vectors of 1 to 3 components with zeros for the missing ones, shape (n, 3), in the same unit."""
     padded = np.zeros((len(vectors), 3))
     padded[:, : vectors.shape[1]] = vectors
     return padded

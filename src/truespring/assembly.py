@@ -48,7 +48,7 @@ class Pattern:
         run(sparsity.fill_slots, len(elements), self.elements, self.starts, self.columns, self.slots)
 
     def values(self) -> Floats:
-        """Return an array for the values of a matrix, shape (n_blocks, dim, dim), uninitialised."""
+        """Return an uninitialised array for the values of a matrix, in its unit, shape (n_blocks, dim, dim)."""
         # Reuse the last array if nothing refers to it: allocating large arrays is slow.
         if self._room is None or sys.getrefcount(self._room) > _UNREFERENCED:
             self._room = np.empty((len(self.columns), self.dim, self.dim))
@@ -93,7 +93,7 @@ class Pattern:
             run(add, rows, smallest=_SMALLEST_SLAB)
 
     def vector(self, values: Floats) -> Floats:
-        """Return the sum of element vectors, shape (n_elements, k * dim), by node, shape (n_nodes, dim)."""
+        """Return element vectors, shape (n_elements, k * dim), summed by node, shape (n_nodes, dim); units stay."""
         from truespring.kernels import sparsity
         from truespring.kernels.threads import run
 

@@ -164,7 +164,7 @@ class Columns:
     def _column(self, name: str, place: int, unit: str, head: str) -> None:
         """Add a known column with its index in the file and its unit; raise an error for a duplicate or wrong unit."""
         if name in self.columns:
-            raise self._error(f"{self._file}:1: column {name} is there twice, the second time as '{head.strip()}'")
+            raise self._error(f"{self._file}:1: column {name} is defined twice, the second time as '{head.strip()}'")
         dimension = self._known[name]
         if unit and dimension is None:
             raise self._error(f"{self._file}:1: column {name} cannot have a unit")

@@ -44,6 +44,10 @@ class ExportError(TruespringError):
     """A target of export cannot represent the model or its loads."""
 
 
+class OutputError(TruespringError):
+    """An output folder cannot be written, or another run is writing to it."""
+
+
 def nearest(word: str, allowed: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, empty if none is near."""
     close = close_words(word, allowed)

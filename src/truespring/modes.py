@@ -28,7 +28,7 @@ def centred(nodes: Floats) -> Floats:
 
 
 def modes_at(places: Floats) -> Floats:
-    """Return translations, then infinitesimal rotations about the origin, shape (n_dof, 3 or 6).
+    """Return translations, then infinitesimal rotations about the origin [m], shape (n_dof, 3 or 6).
 
     `places` are positions about the origin, shape (n_nodes, dim).
     """

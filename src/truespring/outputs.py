@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from truespring.errors import TruespringError
+from truespring.errors import OutputError
 
 #: Subfolder of the output folder for the results of a run that has not ended.
 UNFINISHED = "truespring-unfinished"
@@ -25,7 +25,7 @@ class Output:
     with a summary has all files of that run. If a run is killed, the results of the previous run remain, or the
     summary is missing; if a file cannot be moved, the results of the previous run remain unchanged.
 
-    Raises TruespringError if another run is writing to the folder, OSError if the folder cannot be written.
+    Raises OutputError if another run is writing to the folder, OSError if the folder cannot be written.
     """
 
     def __init__(self, folder: Path, summary: str) -> None:
@@ -92,7 +92,7 @@ class Output:
 class Lock:
     """Create and lock a folder until `release` or the end of the process.
 
-    Raises TruespringError if another run has locked it. Does nothing on systems without such locks.
+    Raises OutputError if another run has locked it. Does nothing on systems without such locks.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -141,7 +141,7 @@ def _locked(folder: Path) -> int | None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(descriptor)
-        raise TruespringError(
+        raise OutputError(
             f"{folder}: another run is writing to this folder: wait until it ends, or choose another --out"
         ) from None
     except OSError:

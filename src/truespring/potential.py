@@ -61,7 +61,9 @@ class Stressed(Potential, Protocol):
     """
 
     def stress(self, positions: Floats) -> Floats:
-        """Return the stress conjugate to the strain: tension [N] of each spring, stress [Pa] at each Gauss point."""
+        """Return the stress conjugate to the strain: tension [N], shape (n_springs,), or stress [Pa] at Gauss points.
+
+        The shape of the latter is (components, n_elements, n_points)."""
         ...
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:

@@ -110,7 +110,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":
-        """For each kind of elements their numbers, and a problem of these elements alone without supports and loads."""
+        """For each kind of elements their numbers, shape (n,), and a problem of them without supports and loads."""
         if self.mesh.element != MIXED:
             return ((np.arange(len(self.mesh.elements)), self),)
         return tuple(
@@ -129,7 +129,7 @@ class Problem:
         )
 
     def of_elements(self, value: Callable[[Material], float]) -> Floats:
-        """Return `value` of the material of each element, shape (n_elements,)."""
+        """Return `value` of the material of each element, shape (n_elements,), in the unit of `value`."""
         return np.array([value(material) for material in self.materials])[self.material_numbers]
 
     @cached_property

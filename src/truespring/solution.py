@@ -114,7 +114,7 @@ class Solution:
     Attributes:
         problem: the problem that was solved.
         label: name in figures and tables.
-        kind: "springs", "fem", or the format of the file that it was read from.
+        kind: kind of the model, such as "springs" or "calculix", see Model.kind; of a file its format, such as "frd".
         states: equilibria in the order of the path, the unloaded state first; of a file with one level, that alone.
         best: if a level was not reached, the state of least residual there (not an equilibrium), else None.
         status, warnings: how it ended, and limits to its validity.

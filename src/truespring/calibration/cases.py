@@ -90,12 +90,15 @@ class LoadCase:
 
     @cached_property
     def levels(self) -> Floats:
-        """Load factors of the solver's steps, shape (n,)."""
+        """Load factors of the solver's steps [-], shape (n,)."""
         return np.arange(1, self.solver.load_steps + 1) / self.solver.load_steps
 
     @cached_property
     def field(self) -> "tuple[Solution, Ints] | None":
-        """The reference on the nodes of the problem, and the nodes that it covers (n,); None if not a full field."""
+        """The reference on the nodes of the problem, and the nodes that it covers, shape (n,).
+
+        None if not a full field.
+        """
         if self.reference is None or not self.reference.states:
             return None
         if self.reference.problem.mesh.element == "line" or not self.reference.whole.fills:

@@ -37,7 +37,7 @@ class Curve:
     probe: int = 0
 
     def at(self, load_factor: float) -> Iterator[tuple[str, Ints, Floats]]:
-        """Yield quantity, axes (m,) and values (m,) at a level, interpolated linearly between measured ones."""
+        """Yield quantity, axes and values at a level [m or N], shape (m,) each, interpolated between measured ones."""
         if load_factor <= self.load_factors[-1] * (1 + 1e-9):
             columns = [np.interp(load_factor, self.load_factors, column) for column in self.values.T]
             yield self.quantity, self.axes, np.array(columns)

@@ -74,7 +74,7 @@ def _at_level(unknowns: Unknowns, case: LoadCase, state: State, level: float) ->
 
 
 def fit_full_field(system: Equations, regularisation: float) -> Floats:
-    """Return the unknowns c >= 0 that minimise |A c - b|^2 / |b|^2 + regularisation^2 |c - 1|^2 / n, shape (n,).
+    """Return the unknowns c >= 0 that minimise |A c - b|^2 / |b|^2 + regularisation^2 |c - 1|^2 / n [-], shape (n,).
 
     Non-negative least squares (Lawson and Hanson 1974) with Tikhonov regularisation toward the rule.
     """

@@ -84,7 +84,7 @@ class Objective:
         return found
 
     def residuals(self, values: Floats) -> Floats:
-        """Return the residuals whose squared norm is 2 J, shape (n_data + n,); infinite without an equilibrium."""
+        """Return the residuals whose squared norm is 2 J [-], shape (n_data + n,); infinite without an equilibrium."""
         seen = self._seen(values)
         pull = self.regularisation * (values - 1) / np.sqrt(len(values))
         if seen is None:
@@ -99,7 +99,7 @@ class Objective:
         return float(residuals @ residuals / 2) if np.isfinite(residuals).all() else np.inf
 
     def gradient(self, values: Floats) -> Floats:
-        """Return dJ/dc by the adjoint method, with one linear system per level, shape (n,).
+        """Return dJ/dc [-], shape (n,), by the adjoint method, with one linear system per level.
 
         With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
         K lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends on
@@ -125,7 +125,7 @@ class Objective:
         return total
 
     def jacobian(self, values: Floats) -> Floats:
-        """Return the derivative of `residuals`, with one linear system per unknown and level, shape (n_data + n, n)."""
+        """Return the derivative of `residuals` [-], shape (n_data + n, n): one linear system per unknown and level."""
         seen = self._seen(values)
         if seen is None:
             raise ModelError("there is no equilibrium at these unknowns, so no derivative")

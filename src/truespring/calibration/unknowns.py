@@ -51,7 +51,7 @@ class Unknowns:
 
     @property
     def start(self) -> Floats:
-        """The rule: all ones, shape (n,)."""
+        """The rule: all ones [-], shape (n,)."""
         return np.ones(len(self))
 
     def model(self, values: Floats, label: str = "springs (calibrated)") -> PrescribedSprings:

@@ -5,11 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.cli.moduli import print_moduli
-from truespring.cli.printing import console, print_each, print_file, reserve, writing
+from truespring.cli.printing import console, print_each, print_file, reserve, say, writing
 from truespring.cli.verb import CONVERGED, Verb, add_studies
+from truespring.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from truespring.study import Study
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -18,32 +21,52 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="folder for the picture of supports and loads, default: out; none with --quiet or --json",
+        help="folder for the picture of supports and loads, default: out if it can be written; none with --quiet "
+        "or --json",
     )
 
 
 def _run(options: argparse.Namespace) -> int:
     from truespring.study import plan, read_studies, realised_moduli
-    from truespring.study.picture import write_picture
 
     studies = read_studies(options.study)
     screen = console(options)
-    if options.out is None and not screen.quiet:
-        options.out = Path("out")
-    if options.out is not None:
+    required = options.out is not None
+    drawn = required or not screen.quiet
+    if required:
         reserve(options, studies)
+    else:
+        options.out = Path("out")
     plans = {study.stem: plan(study) for study in studies}
     for study in studies:
         _print_plan(screen, plans[study.stem])
         if not screen.quiet:
             print_moduli(screen, study.stem, realised_moduli(study), options.verbose)
-        if options.out is not None:
-            with writing(options.out):
-                picture = write_picture(study, options.out)
-            print_file(options, "picture", picture)
+        if drawn:
+            _draw(options, study, required)
     if options.json:
         print_each(plans)
     return CONVERGED
+
+
+def _draw(options: argparse.Namespace, study: "Study", required: bool) -> None:
+    """Write the picture of a study and print its path.
+
+    If its folder cannot be written, raise OutputError for a `required` picture; else print a note.
+    """
+    from truespring.study.picture import write_picture
+
+    try:
+        if not required:  # else the folder was reserved before
+            reserve(options, [study])
+        with writing(options.out):
+            picture = write_picture(study, options.out)
+    except OutputError as error:
+        if required:
+            raise
+        say(f"note: {study.stem}: no picture: {error}")
+    else:
+        print_file(options, "picture", picture)
 
 
 def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:

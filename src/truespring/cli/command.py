@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from truespring.cli.parser import parse
-from truespring.cli.printing import say
+from truespring.cli.printing import StandardOutputError, say, standard_output
 from truespring.cli.verb import CLOSED_PIPE, CONVERGED, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT
 from truespring.errors import TruespringError, one_line
 from truespring.report.command import command_line
@@ -30,21 +30,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # from the parser, after it has printed the help or an error
         code = end.code if isinstance(end.code, int) else CONVERGED
     try:
-        sys.stdout.flush()
-    except OSError as error:
-        failed = _output_failed(error)
+        with standard_output():
+            sys.stdout.flush()
+    except StandardOutputError as error:
+        failed = _output_failed(error.reason)
         return code or failed
     return code
 
 
-def _output_failed(error: OSError) -> int:
+def _output_failed(reason: OSError) -> int:
     """Return the exit code for an error of standard output, and redirect further output to the null device.
 
     Print the error, except for a closed pipe: its reader, such as `head`, needs no more.
     """
-    closed = isinstance(error, BrokenPipeError)
+    closed = isinstance(reason, BrokenPipeError)
     if not closed:
-        say(f"standard output cannot be written: {error.strerror}")
+        say(f"standard output cannot be written: {reason.strerror}")
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
     return CLOSED_PIPE if closed else NOT_CONVERGED
@@ -70,10 +71,10 @@ def _run_verb(arguments: list[str]) -> int:
         return NOT_CONVERGED
     except KeyboardInterrupt:
         return INTERRUPTED
+    except StandardOutputError as error:
+        return _output_failed(error.reason)
     except OSError as error:
-        if error.filename is None:  # an error of a stream; errors of files have a file name
-            return _output_failed(error)
-        say(f"{error.filename}: {error.strerror}")
+        say(f"{error.filename or type(error).__name__}: {error.strerror or one_line(str(error))}")
         return NOT_CONVERGED
     except Exception as error:
         if sys.flags.dev_mode:  # with python -X dev show the traceback

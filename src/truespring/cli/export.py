@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from truespring.cli.printing import console, print_each, progress, reserve, say, writing
+from truespring.cli.printing import console, print_each, progress, reserve, say, show, writing
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, one_of
 
 
@@ -42,7 +42,7 @@ def _run(options: argparse.Namespace) -> int:
             written = export_study(study, options.to, options.out, options.model, advance)
         for one in written:
             if options.quiet and not options.json:
-                print(*one.files, sep="\n")
+                show(*one.files)
             screen.print(f"{study.stem}: {one.target}: {', '.join(map(str, one.files))}", soft_wrap=True)
         screen.print("\n".join(written[0].sentences), soft_wrap=True)
         if not written[0].converged:

@@ -93,4 +93,6 @@ MAP = Verb(
         "truespring map strip.toml",
         "truespring map strip.toml --load bend --rule isotropic --range depth=1:4",
     ),
+    threads="threads of the linear algebra of each worker, default: 1 with --workers above 1 or --scheduler, else all "
+    "cores",
 )

@@ -6,7 +6,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from truespring.cli.printing import print_json
+from truespring.cli.printing import print_json, show
 from truespring.cli.verb import CONVERGED, Verb, one_of
 from truespring.errors import TruespringError
 
@@ -62,10 +62,10 @@ def _run(options: argparse.Namespace) -> int:
     if options.json:
         print_json({"files": [str(file) for file in written]})
     elif options.quiet:
-        print(study)
+        show(study)
     else:
-        print(*(f"written: {file}" for file in written), sep="\n")
-        print(f"next:    truespring check {study}\n         truespring verify {study}")
+        show(*(f"written: {file}" for file in written))
+        show(f"next:    truespring check {study}", f"         truespring verify {study}")
     return CONVERGED
 
 

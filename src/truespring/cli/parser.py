@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from truespring.cli import calibrate, check, compare, converge, export, maps, moduli, new, solve, sweep, table1, tables
-from truespring.cli.verb import COMMON, Verb
+from truespring.cli.printing import show
+from truespring.cli.verb import Verb, add_common
 from truespring.errors import nearest
 
 #: The verbs in the order of the help, most used first.
@@ -66,7 +67,7 @@ class _PrintCompletion(argparse.Action):
             for action in one._actions:
                 if action.type is Path or action.dest in ("study", "case", "held_out", "source"):
                     action.complete = shtab.FILE  # type: ignore[attr-defined]
-        print(shtab.complete(whole, shell))
+        show(shtab.complete(whole, shell))
         parser.exit()
 
 
@@ -93,12 +94,10 @@ def build_parser(filled: Collection[str]) -> tuple[Parser, dict[str, Parser]]:
             description=f"{verb.summary[:1].upper()}{verb.summary[1:]}.",
             epilog=_epilog(verb.examples),
         )
-        one.set_defaults(run=verb.run, json=False, quiet=False, verbose=False, threads=None)
+        one.set_defaults(run=verb.run)
         if name in filled:
             verb.add(one)
-            for shared in verb.common:
-                options, more = COMMON[shared]
-                one.add_argument(*options, **more)
+            add_common(one, verb)
         verbs[name] = one
     return parser, verbs
 

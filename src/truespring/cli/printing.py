@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truespring.errors import TruespringError
+from truespring.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,6 +20,33 @@ if TYPE_CHECKING:
 _EVERY = 10.0
 
 
+class StandardOutputError(Exception):
+    """Standard output cannot be written: its reader has closed the pipe, or the disk is full.
+
+    Attributes:
+        reason: the error of the stream.
+    """
+
+    def __init__(self, reason: OSError) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+@contextmanager
+def standard_output() -> Iterator[None]:
+    """Convert an OSError to a StandardOutputError; only writes to standard output belong into the block."""
+    try:
+        yield
+    except OSError as error:
+        raise StandardOutputError(error) from None
+
+
+def show(*lines: object) -> None:
+    """Print lines on standard output, whatever the options are."""
+    with standard_output():
+        print(*lines, sep="\n")
+
+
 def say(text: str) -> None:
     """Print a line on standard error; ignore errors of writing."""
     with suppress(OSError):
@@ -28,7 +55,7 @@ def say(text: str) -> None:
 
 def print_json(value: Any) -> None:
     """Print a value as JSON on standard output."""
-    print(json.dumps(value, indent=2, allow_nan=False))
+    show(json.dumps(value, indent=2, allow_nan=False))
 
 
 def print_each(values: dict[str, Any]) -> None:
@@ -41,7 +68,11 @@ def console(options: argparse.Namespace) -> "Console":
     from rich.console import Console
 
     class Plain(Console):
-        """A console that raises BrokenPipeError for `main` to handle."""
+        """A console that raises StandardOutputError for `main` to handle."""
+
+        def print(self, *parts: Any, **style: Any) -> None:
+            with standard_output():
+                super().print(*parts, **style)
 
         def on_broken_pipe(self) -> None:
             raise  # the exception being handled
@@ -52,23 +83,23 @@ def console(options: argparse.Namespace) -> "Console":
 def print_file(options: argparse.Namespace, what: str, file: object) -> None:
     """Print the path of a report or another file; with --quiet only the path, with --json nothing."""
     if not options.json:
-        print(file if options.quiet else f"{what}: {file}")
+        show(file if options.quiet else f"{what}: {file}")
 
 
 @contextmanager
 def writing(out: Path) -> Iterator[None]:
-    """Convert an OSError to a TruespringError that names --out."""
+    """Convert an OSError to an OutputError that names --out."""
     try:
         yield
     except OSError as error:
         place = error.filename or out
-        raise TruespringError(f"--out {out}: {place} cannot be written: {error.strerror}") from None
+        raise OutputError(f"--out {out}: {place} cannot be written: {error.strerror}") from None
 
 
 def reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> None:
     """Lock the output folders of studies, or --out without studies, until the command ends.
 
-    Raises TruespringError if a folder cannot be written or another run has locked it.
+    Raises OutputError if a folder cannot be written or another run has locked it.
     """
     from truespring.outputs import Lock
 

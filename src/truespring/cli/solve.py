@@ -1,14 +1,13 @@
 """The verbs `verify` and `solve`: solve every model of a study, with or without comparison and report."""
 
 import argparse
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truespring.cli.moduli import print_moduli
-from truespring.cli.printing import console, print_each, print_file, progress, reserve, writing
+from truespring.cli.printing import console, print_each, print_file, progress, reserve, say, writing
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, add_timeout
 
 if TYPE_CHECKING:
@@ -78,13 +77,10 @@ def print_failures(result: "Result", out: Path, shown: bool) -> None:
     """Print on standard error which models did not converge and, unless `shown` before, their warnings."""
     for name, path in result.paths.items():
         if str(path.status) not in ("converged", "read"):
-            print(
-                f"truespring: {result.stem}: model '{name}' is {path.status}; "
-                f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}",
-                *(f"truespring:   {warning}" for warning in path.warnings if not shown),
-                sep="\n",
-                file=sys.stderr,
-            )
+            reached = f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}"
+            say(f"{result.stem}: model '{name}' is {path.status}; {reached}")
+            for warning in () if shown else path.warnings:
+                say(f"  {warning}")
 
 
 VERIFY = Verb(

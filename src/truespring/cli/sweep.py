@@ -97,4 +97,5 @@ SWEEP = Verb(
         'truespring sweep strip.toml --vary "material.poisson=0:0.45:10"',
         'truespring sweep strip.toml --vary "material.young=4 kPa,8 kPa" --vary "mesh.elements=[8,2],[16,4]"',
     ),
+    threads="threads of the linear algebra of each worker, default: 1",
 )

@@ -22,7 +22,8 @@ class Verb:
         add: adds the arguments to a parser; called only for the verb of a command line, so it may import tables.
         run: runs the verb and returns its exit code.
         examples: command lines at the end of the verb's help, on the studies that `truespring new KIND` writes.
-        common: the options in COMMON that have an effect on the verb.
+        common: the options in COMMON that the verb's help lists; the verb accepts the others, without effect.
+        threads: help text of --threads.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Verb:
     run: Callable[[argparse.Namespace], int]
     examples: tuple[str, ...]
     common: tuple[str, ...] = ("json", "quiet", "threads")
+    threads: str = "threads of the linear algebra, default: all cores"
 
 
 def positive(text: str) -> int:
@@ -71,7 +73,7 @@ def one_of(names: Iterable[str]) -> dict[str, Any]:
     return {"type": known, "choices": allowed}
 
 
-#: Options that several verbs share, by attribute of the parsed options.
+#: Options that every verb accepts, by attribute of the parsed options.
 COMMON: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "json": (("--json",), {"action": "store_true", "help": "print only one JSON object on standard output"}),
     "quiet": (
@@ -82,11 +84,15 @@ COMMON: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         ("-v", "--verbose"),
         {"action": "store_true", "help": "print the effective moduli of springs as a table, not in one line"},
     ),
-    "threads": (
-        ("--threads",),
-        {"type": positive, "metavar": "N", "help": "threads of the linear algebra, default: all cores"},
-    ),
+    "threads": (("--threads",), {"type": positive, "metavar": "N"}),
 }
+
+
+def add_common(parser: argparse.ArgumentParser, verb: Verb) -> None:
+    """Add the options in COMMON; the help omits those without effect on the verb."""
+    for name, (options, more) in COMMON.items():
+        help_text = verb.threads if name == "threads" else more["help"]
+        parser.add_argument(*options, **{**more, "help": help_text if name in verb.common else argparse.SUPPRESS})
 
 
 def add_studies(parser: argparse.ArgumentParser) -> None:

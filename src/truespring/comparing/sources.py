@@ -25,6 +25,7 @@ from truespring.reactions import SupportForce, torque_axes
 from truespring.reference import Placing, format_of, placed, read_record, read_shell, read_stl
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
+from truespring.study.schema.models import MODEL_KINDS
 
 #: Called with the source that is read or solved, and the share of the work done.
 Progress = Callable[[str, float], None]
@@ -170,13 +171,19 @@ def _of_folder(source: Source, advance: Callable[[float], None]) -> Solution:
     return replace(
         path,
         kind=saved["kind"],
-        has_springs=saved["kind"] == "springs",
+        has_springs=bool(saved.get("has_springs", _of_springs(saved["kind"]))),
+        lines=str(saved.get("lines", path.lines)),
         element=saved.get("element"),
         status=Status(saved["status"]),
         states=tuple(states),
         warnings=warnings,
         held=held,
     )
+
+
+def _of_springs(kind: str) -> bool:
+    """Return whether a kind of model consists of springs, for folders of 0.1, which do not state it."""
+    return kind in MODEL_KINDS and MODEL_KINDS[kind].of_springs
 
 
 def _held(path: Solution, body: Path) -> Bools | None:

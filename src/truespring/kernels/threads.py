@@ -77,7 +77,7 @@ def run_on(ranges: list[tuple[int, int]], function: Callable[..., Any], *argumen
 
 
 def writable(array: Array) -> Array:
-    """Return a contiguous, writable array: numba compiles a kernel again for read-only arrays."""
+    """Return a contiguous, writable array, same shape and unit: numba compiles again for read-only arrays."""
     writable: Array = np.require(array, requirements=["C", "W"])
     return writable
 

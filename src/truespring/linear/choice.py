@@ -29,14 +29,17 @@ class Tangent(Protocol):
         ...
 
     def solve(self, right: Floats, accuracy: float = 1e-12) -> Floats:
-        """Return x of tangent x = right, shape (n_nodes, dim), with a relative residual of at most `accuracy`.
+        """Return x of tangent x = right [m], shape (n_nodes, dim), with a relative residual of at most `accuracy`.
 
         Raises IndefiniteError if an iterative solver finds a direction of negative curvature.
         """
         ...
 
     def lowest_mode(self) -> Floats | None:
-        """Return a mode of a negative eigenvalue, largest component +1, shape (n_nodes, dim); None if not available."""
+        """Return a mode of a negative eigenvalue, largest component +1 [-], shape (n_nodes, dim).
+
+        None if not available.
+        """
         ...
 
 

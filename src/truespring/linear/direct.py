@@ -176,7 +176,7 @@ class Factorisation:
         return self.factors.negative_eigenvalues
 
     def solve(self, right: Floats, accuracy: float = 0.0) -> Floats:
-        """Return x of tangent x = right, shape (n_nodes, dim); `accuracy` has no effect."""
+        """Return x of tangent x = right [m], shape (n_nodes, dim); `accuracy` has no effect."""
         return self._whole(self.factors.solve(self.scale * right.ravel()[self.free]))
 
     def _whole(self, values: Floats) -> Floats:
@@ -186,14 +186,14 @@ class Factorisation:
         return whole
 
     def lowest_mode(self) -> Floats:
-        """Return the eigenvector of a negative eigenvalue, largest component +1, shape (n_nodes, dim).
+        """Return the eigenvector of a negative eigenvalue, largest component +1 [-], shape (n_nodes, dim).
 
         The negative eigenvalue nearest to zero; the lowest one for at most ten unknowns.
         """
         return self._mode("SA", lambda values: int(values.argmin()))
 
     def nearest_mode(self) -> Floats:
-        """Return the eigenvector of the eigenvalue nearest to zero, largest component +1, shape (n_nodes, dim)."""
+        """Return the eigenvector of the eigenvalue nearest to zero, largest component +1 [-], shape (n_nodes, dim)."""
         return self._mode("LM", lambda values: int(np.abs(values).argmin()))
 
     def _mode(self, which: Any, chosen: Callable[[Floats], int]) -> Floats:

@@ -107,7 +107,7 @@ class Preconditioned:
         return self.coarse.cycle(self.level, self.turns, r)
 
     def solve(self, right: Floats, accuracy: float = 1e-10) -> Floats:
-        """Return x of tangent x = right, shape (n_nodes, dim), with a relative residual of at most `accuracy`.
+        """Return x of tangent x = right [m], shape (n_nodes, dim), with a relative residual of at most `accuracy`.
 
         Raises IndefiniteError if a direction of negative curvature is found, SlowError if the accuracy is not reached;
         the coarse levels are then rebuilt for the next tangent.

@@ -183,7 +183,9 @@ class Hierarchy:
         return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
 
     def cycle(self, finest: Level, turns: Floats, residual: Floats) -> Floats:
-        """Return an approximate solution of A z = residual by one V-cycle, shape (n_nodes, dim), until the next cycle.
+        """Return an approximate solution z [m] of A z = residual by one V-cycle, shape (n_nodes, dim).
+
+        The next cycle overwrites it.
 
         `turns` are the rotations of the nodes, shape (n_nodes, dim, dim).
         """

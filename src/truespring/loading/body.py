@@ -44,7 +44,7 @@ class Body(NamedTuple):
         return whole, self.second_order.shares(whole)
 
     def shares(self, on: Selection) -> tuple[Ints, Floats]:
-        """Return the loaded nodes, ascending, and the share of each in a uniform load, both of shape (n,)."""
+        """Return the loaded nodes, ascending, and the share of each in a uniform load [-], both of shape (n,)."""
         covered = covering(self.mesh, on)
         if self.second_order is None or covered is None:
             return shares(self.mesh, on)

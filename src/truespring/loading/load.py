@@ -93,7 +93,10 @@ class Load(ABC):
 
     @property
     def vector(self) -> Floats | None:
-        """The vector that `turned` rotates, shape (dim,); None for a load that rotates with the body."""
+        """The vector that `turned` rotates, shape (dim,), in the unit of the load.
+
+        None for a load that rotates with the body.
+        """
         return None
 
     def moved_to(self, on: Selection) -> Self:

@@ -42,7 +42,7 @@ class CellShape:
 
     @cached_property
     def places(self) -> Floats:
-        """Reference coordinates of the nodes, shape (n_nodes, dim)."""
+        """Reference coordinates of the nodes [-], shape (n_nodes, dim)."""
         middles = [self.corners[list(few)].mean(axis=0) for few in self.between]
         return np.concatenate([self.corners, np.reshape(middles, (-1, self.dim))])
 
@@ -71,7 +71,7 @@ class CellShape:
     def smallest_jacobian(self, places: Floats) -> Floats:
         """Return the smallest Jacobian determinant of each cell [m^dim], shape (n,).
 
-        `places` are the positions of their nodes [m], shape (n, n_nodes, dim). The Jacobian is taken at the nodes and
+        `places` has the positions of their nodes [m], shape (n, n_nodes, dim). The Jacobian is taken at the nodes and
         at Gauss points; a cell is folded where it is not positive.
         """
         smallest = np.full(len(places), np.inf)

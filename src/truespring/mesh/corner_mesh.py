@@ -15,7 +15,7 @@ from truespring.mesh.mesh import Mesh
 
 
 def corner_mesh(grid: Grid) -> tuple[Mesh, Ints]:
-    """Return a mesh of the corners of a grid's cells, and the grid point of each of its nodes, ascending.
+    """Return a mesh of the corners of a grid's cells, and the grid point of each of its nodes, ascending, shape (n,).
 
     Cells become first-order elements. If corners of a cell coincide, all cells are divided into triangles or
     tetrahedra, consistently on shared faces. A surface becomes the lines of its edges; points become the minimum
@@ -93,7 +93,7 @@ def _spanning_lines(points: Floats) -> Ints:
     shortest = 1e-12 * max(float(length.max()), np.finfo(float).tiny)  # a length of zero means that there is no line
     length = np.maximum(length, shortest)
     low, high = np.minimum(start, end), np.maximum(start, end)
-    _, first = np.unique(low * n_points + high, return_index=True)  # both points of a pair may list it
+    _, first = np.unique(low * n_points + high, return_index=True)  # a pair may be listed by both of its points
     graph = sparse.coo_array((length[first], (low[first], high[first])), shape=(n_points, n_points))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
     return np.stack([tree.row, tree.col], axis=1).astype(np.int64)

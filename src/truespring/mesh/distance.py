@@ -9,7 +9,7 @@ from truespring.arrays import Floats, Ints
 # Size of blocks of rows times columns: limits the memory.
 _BLOCK = 250_000
 
-# Places of a facet at which its distance is taken, as shares of its corners, and their weights in a mean square.
+# Points of a facet at which its distance is evaluated, as fractions of its corners, and their weights in a mean square.
 # Of a segment nine by the composite Simpson rule, of a triangle corners, middles of edges and centre (exact to degree
 # three): exact where the distance is linear along it.
 _ALONG = np.linspace(0, 1, 9)
@@ -30,11 +30,11 @@ class Gap(NamedTuple):
 def gap(mine: Floats, theirs: Floats) -> Gap:
     """Return the distance between two surfaces, taken in both directions.
 
-    `mine` and `theirs` are the corners of their facets [m], shape (n, 2, 2) or (n, 3, 3). Distances are taken at nine
-    places of each segment, at seven of each triangle.
+    `mine` and `theirs` are the corners of their facets [m], shape (n, 2, 2) or (n, 3, 3). Distances are evaluated
+    at nine points of each segment and seven of each triangle.
     """
     if np.array_equal(mine, theirs):
-        return Gap(0.0, 0.0)  # exactly, which feet of perpendiculars are not
+        return Gap(0.0, 0.0)  # exactly; projected points are not
     apart = np.concatenate([_apart(mine, theirs), _apart(theirs, mine)])
     size = np.concatenate([_sizes(mine), _sizes(theirs)])
     mean = np.average(apart**2 @ _WEIGHTS[mine.shape[1]], weights=size) if size.any() else (apart**2).mean()
@@ -103,7 +103,7 @@ def _to_segments(points: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def blocks(rows: Ints, n_columns: int) -> list[Ints]:
-    """Divide rows into blocks that limit the memory for `n_columns` numbers per row."""
+    """Divide rows into blocks, shape (n,) each, that limit the memory for `n_columns` numbers per row."""
     size = max(1, _BLOCK // n_columns)
     return [rows[first : first + size] for first in range(0, len(rows), size)]
 

@@ -43,7 +43,10 @@ def facet_columns(elements: Ints, kind: str) -> Ints:
 
 
 def facet_keys(facets: Ints) -> list[Ints]:
-    """Return the sorted nodes of facets, given and returned as columns; if a corner is repeated, repeat the largest."""
+    """Return the sorted nodes of facets, given and returned as columns of shape (n,).
+
+    If a corner is repeated, repeat the largest.
+    """
     ordered = ascending(facets)
     if len(ordered) < _QUADRILATERAL:
         return ordered

@@ -1,4 +1,4 @@
-"""Forms: elements that a translation carries into each other, node by node, are of one form."""
+"""Forms: elements are of one form if a translation maps them onto each other, node by node."""
 
 from dataclasses import dataclass
 
@@ -8,10 +8,10 @@ from truespring.arrays import Floats, Ints
 from truespring.mesh.corners import corners_in_slices
 from truespring.mesh.rows import distinct_rows
 
-# Places in elements that differ by less than this share of the mean element's size are the same.
+# Positions in elements that differ by less than this fraction of the mean element size are equal.
 _SAME_PLACE = 1e-5
 
-# Coordinates that come from the same formula differ by so many roundings of the largest of them, and few more.
+# Equal coordinates computed by one formula differ by at most about this many rounding errors of the largest one.
 _ROUNDINGS = 32
 
 
@@ -40,7 +40,7 @@ class Forms:
 
     @property
     def few(self) -> bool:
-        """Whether what is computed of one element of each form and handed to the others is exact and saves work."""
+        """Whether computing one element of each form and copying it to the others is exact and saves work."""
         return self.exact and 4 * len(self.first) <= len(self.of)
 
 
@@ -74,8 +74,8 @@ def find_forms(nodes: Floats, elements: Ints) -> Forms:
 
 
 def rounded(places: Floats, size: float) -> Ints:
-    """Return places [m] in elements of a size [m] as integers, the same for those that count as the same.
+    """Return positions [m] in elements of a size [m] as integers of the same shape, equal for equal positions.
 
-    The offset keeps places on the border of two roundings, as halves and quarters lie, on one side.
+    The offset rounds halves and quarters, which lie between two integers, to the same side.
     """
     return np.asarray(np.rint(places / (size * _SAME_PLACE) + 0.3137).astype(np.int64))

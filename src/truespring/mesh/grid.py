@@ -41,7 +41,7 @@ class Interpolation:
     outside: Bools
 
     def carry(self, values: Floats) -> Floats:
-        """Return interpolated values, shape (n_places, ...); `values` at the points have shape (n_points, ...)."""
+        """Return interpolated `values`, shape (n_points, ...) in any unit, as shape (n_places, ...)."""
         return np.asarray(self.weights @ values)
 
 
@@ -65,7 +65,7 @@ class Grid:
             frozen = {}
             for kind, cells in self.cells.items():
                 if kind not in CELL_SHAPES:
-                    raise MeshError(f"cells of kind '{kind}' are not read; {', '.join(CELL_SHAPES)} are")
+                    raise MeshError(f"cells of kind '{kind}' are not supported; supported: {', '.join(CELL_SHAPES)}")
                 frozen[kind] = frozen_ints(cells, (None, len(CELL_SHAPES[kind].powers)), f"cells of kind {kind}")
                 if cells.size and not 0 <= frozen[kind].min() <= frozen[kind].max() < len(self.points):
                     raise MeshError(
@@ -150,7 +150,7 @@ class _Bins:
     """Regular grid of boxes with the cells whose bounding box intersects each."""
 
     def __init__(self, nodes: Floats, tolerance: float) -> None:
-        """Take the nodes of each cell, shape (n_cells, k, dim), and how far around it places belong to it [m]."""
+        """Store the nodes of each cell, shape (n_cells, k, dim), and the tolerance around its bounding box [m]."""
         lower, upper = nodes.min(axis=1), nodes.max(axis=1)
         size = upper - lower
         # The nodes of a curved cell do not quite span it.

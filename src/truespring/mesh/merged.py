@@ -38,7 +38,7 @@ def mixed_table(cells: Mapping[str, Ints]) -> Ints:
 
 
 def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
-    """Return for each kind in a table the numbers of its elements, ascending, and their nodes, each once.
+    """Return for each kind in a table its elements, ascending, shape (n,), and their distinct nodes, shape (n, k).
 
     Raises MeshError if the repeated corners of an element match no kind.
     """
@@ -60,14 +60,17 @@ def unmerged(elements: Ints) -> dict[str, tuple[Ints, Ints]]:
 
 
 def kinds_in(elements: Ints, kind: str) -> list[tuple[str, Ints, Ints]]:
-    """Return name, element numbers and element nodes of each kind in a table; `kind` is a kind or "mixed"."""
+    """Return name, elements, shape (n,), and their nodes, shape (n, k), of each kind in a table.
+
+    `kind` is a kind or "mixed".
+    """
     if kind != MIXED:
         return [(kind, np.arange(len(elements)), elements)]
     return [(name, numbers, own) for name, (numbers, own) in unmerged(elements).items()]
 
 
 def mirrored(elements: Ints, kind: str, which: Bools) -> Ints:
-    """Return a table with the elements `which` in the node order of their mirror images; `kind` may be "mixed"."""
+    """Return the table, shape (n_elements, k), with elements `which` in mirrored node order; `kind` may be "mixed"."""
     found = elements.copy()
     for name, numbers, own in kinds_in(elements, kind):
         here = which[numbers]
@@ -83,7 +86,7 @@ def repeats(elements: Ints) -> Bools:
 
 
 def turned(elements: Ints) -> Ints:
-    """Return a table with elements rotated so that repeated corners are placed as in `ElementKind.merged`.
+    """Return the table, shape (n_elements, 4 or 8), with repeated corners rotated to those of `ElementKind.merged`.
 
     Programs write wedges and pyramids as bricks with repeated corners, in various places. Elements that match no kind
     are unchanged.

@@ -124,9 +124,7 @@ class Mesh:
         self._refuse(
             smallest <= -least, "elements", "inverted: their corner Jacobian is negative", lambda: self.centres
         )
-        self._refuse(
-            ~(smallest > least), "elements", "degenerate: flat or with nodes that coincide", lambda: self.centres
-        )
+        self._refuse(~(smallest > least), "elements", "degenerate: flat or with coincident nodes", lambda: self.centres)
         if self.element != "line":  # springs may be parallel
             twice = np.ones(len(self.elements), dtype=bool)
             for numbers, part in self.blocks:
@@ -135,7 +133,7 @@ class Mesh:
 
     def _checked_middles(self, middles: Floats) -> Floats:
         if self.element not in ("triangle", "tetrahedron"):
-            raise MeshError(f"middles are for triangles and tetrahedra, not for {self.element} elements")
+            raise MeshError(f"middles are supported for triangles and tetrahedra, not for {self.element} elements")
         try:
             frozen = frozen_floats(middles, (len(self.edges), self.dim), "middles")
         except ValueError as error:
@@ -145,7 +143,7 @@ class Mesh:
         places = np.concatenate([self.nodes[self.elements], frozen[of_elements]], axis=1)
         shape = CELL_SHAPES["triangle6" if self.element == "triangle" else "tetra10"]
         folded = shape.smallest_jacobian(places) <= 0
-        self._refuse(folded, "elements", "folded by the nodes in the middle of their edges", lambda: self.centres)
+        self._refuse(folded, "elements", "folded by their mid-edge nodes", lambda: self.centres)
         return frozen
 
     @property
@@ -174,7 +172,7 @@ class Mesh:
         for name, facets in self.facet_groups.items():
             given = np.asarray(facets)
             if given.ndim != 2 or given.shape[1:] != (2,) or not np.issubdtype(given.dtype, np.integer):
-                raise MeshError(f"facet group '{name}' = {facets!r}: rows of element and local facet are expected")
+                raise MeshError(f"facet group '{name}' = {facets!r}: must have rows of element and local facet")
             there, last = n_facets(self.elements, self.element), len(self.elements) - 1
             beyond = not len(given) or (given < 0).any() or (given[:, 0] > last).any()
             if beyond or (given[:, 1] >= there[given[:, 0]]).any():
@@ -192,7 +190,7 @@ class Mesh:
         """The entry of ELEMENT_KINDS; raises MeshError for a mesh of several kinds."""
         if self.element == MIXED:
             raise MeshError(
-                f"this is for elements of one kind, the mesh has {self.kinds} elements: springs and fem take several"
+                f"this needs elements of one kind, the mesh has {self.kinds} elements: springs and fem support several"
             )
         return ELEMENT_KINDS[self.element]
 
@@ -232,7 +230,7 @@ class Mesh:
 
     @property
     def cells(self) -> dict[str, Ints]:
-        """Elements by key of CELL_SHAPES, in the order of `blocks`."""
+        """Elements by key of CELL_SHAPES, shape (n, k) each, in the order of `blocks`."""
         return {part.kind.vtk: part.elements for _, part in self.blocks}
 
     @property
@@ -271,7 +269,7 @@ class Mesh:
         return self.means(self.nodes)
 
     def means(self, values: Floats) -> Floats:
-        """Return the means of nodal values, shape (n_nodes, ...), over each element, shape (n_elements, ...)."""
+        """Return the means over elements, shape (n_elements, ...), of nodal values of shape (n_nodes, ...)."""
         total = np.zeros((len(self.elements), *values.shape[1:]))
         for numbers, part in self.blocks:
             own = np.zeros((len(numbers), *values.shape[1:]))
@@ -427,7 +425,7 @@ def _groups(groups: Mapping[str, Ints], n_there: int, what: str) -> Mapping[str,
     for name, numbers in groups.items():
         given = np.asarray(numbers)
         if given.ndim != 1 or not np.issubdtype(given.dtype, np.integer):
-            raise MeshError(f"{what} group '{name}' = {numbers!r}: a list of {what} numbers is wanted")
+            raise MeshError(f"{what} group '{name}' = {numbers!r}: must be a list of {what} numbers")
         members = np.unique(given.astype(np.int64))
         if not members.size or members[0] < 0 or members[-1] >= n_there:
             raise MeshError(f"{what} group '{name}' is empty or has a number that no {what} has: 0 to {n_there - 1}")

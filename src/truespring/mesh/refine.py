@@ -67,7 +67,7 @@ def refined(mesh: Mesh) -> Mesh:
     except MeshError:
         if mesh.middles is None:
             raise
-        note = "divided along straight edges: parts of the curved ones would be folded"
+        note = "divided along straight edges: with curved edges, some parts would be folded"
         return _refined(replace(mesh, middles=None, notes=(*mesh.notes, note)))
 
 
@@ -198,7 +198,7 @@ def _division(element: str) -> _Division:
             return _Division(kind.edges + kind.facets[:1], children)
         case "quadrilateral" | "hexahedron":
             return _of_cube(element)
-    raise MeshError(f"a mesh of {element} elements cannot be refined: a network is as fine as its springs are")
+    raise MeshError(f"a mesh of {element} elements cannot be refined: the springs of a network cannot be divided")
 
 
 def _of_one(kind: str, children: tuple[tuple[int, ...], ...]) -> tuple[tuple[str, tuple[int, ...]], ...]:

@@ -54,7 +54,7 @@ def distinct_rows(columns: Ints | Sequence[Ints]) -> Distinct:
 
 
 def ascending(columns: Ints | Sequence[Ints]) -> list[Ints]:
-    """Return the columns of the table with each row sorted."""
+    """Return the columns of the table, shape (n_rows,) each, with each row sorted."""
     ordered = list(columns)
     for turn in range(len(ordered)):  # odd-even transposition sort
         for left in range(turn % 2, len(ordered) - 1, 2):

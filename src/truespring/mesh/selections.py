@@ -55,7 +55,7 @@ Selection = str | Plane | Box | Near | Sequence[int]
 
 
 def select(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the selected nodes, ascending, shape (n,); raise MeshError if there is none."""
+    """Return the numbers of the selected nodes, ascending, shape (n,); raise MeshError if no node is selected."""
     match on:
         case str() if on in mesh.node_groups:
             return mesh.node_groups[on]
@@ -72,7 +72,7 @@ def select(mesh: Mesh, on: Selection) -> Ints:
 
 
 def select_elements(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the selected elements, ascending, shape (n,); raise MeshError if there is none.
+    """Return the numbers of the selected elements, ascending, shape (n,); raise MeshError if no element is selected.
 
     `on` is an element group of the mesh, a Box that contains their centres, or element numbers.
     """
@@ -83,7 +83,7 @@ def select_elements(mesh: Mesh, on: Selection) -> Ints:
             groups = ", ".join(mesh.element_groups) or "this mesh has none"
             raise MeshError(
                 f"'{on}' is no group of elements{nearest(on, mesh.element_groups)}; groups: {groups}; "
-                "a box takes the elements whose centres it holds"
+                "a box selects the elements whose centres it contains"
             )
         case Box(lower, upper):
             return _in_box(mesh, lower, upper, mesh.centres, "element with its centre")
@@ -117,7 +117,7 @@ def _plane(mesh: Mesh, axis: str, value: float) -> Ints:
 def _in_box(mesh: Mesh, lower: tuple[float, ...], upper: tuple[float, ...], places: Floats, what: str) -> Ints:
     if len(lower) != mesh.dim or len(upper) != mesh.dim:
         low, high = (", ".join(f"{axis}{end}" for axis in AXES[: mesh.dim]) for end in ("min", "max"))
-        raise MeshError(f"a box takes two corners of {mesh.dim} coordinates each: [[{low}], [{high}]]")
+        raise MeshError(f"a box has two corners of {mesh.dim} coordinates each: [[{low}], [{high}]]")
     if any(low > high for low, high in zip(lower, upper, strict=True)):
         raise MeshError(f"box from {list(lower)} to {list(upper)} m: the first corner must be the lower one")
     slack = _TOLERANCE * mesh.diameter
@@ -135,7 +135,7 @@ def _numbers(numbers: Sequence[int], n_there: int, what: str) -> Ints:
     found = np.unique(np.asarray(numbers)) if isinstance(numbers, Sequence | np.ndarray) else np.zeros(0)
     if not found.size or not np.issubdtype(found.dtype, np.integer):
         raise MeshError(
-            f"{numbers!r} selects no {what}: give a side such as 'left', a point such as 'right-middle', "
+            f"{numbers!r} selects no {what}: use a side such as 'left', a point such as 'right-middle', "
             "Plane('x', 0.0), Box((0.0, 0.0), (1.0, 1.0)), Near((0.0, 0.0)) or numbers"
         )
     if found[0] < 0 or found[-1] >= n_there:
@@ -191,13 +191,13 @@ def named_facets(mesh: Mesh, on: Selection) -> Ints | None:
 
 
 def loaded(mesh: Mesh, on: Selection) -> Ints:
-    """Return the numbers of the nodes that a load acts on, ascending; for a facet group the nodes of its facets."""
+    """Return the nodes that a load acts on, ascending, shape (n,); for a facet group the nodes of its facets."""
     facets = named_facets(mesh, on)
     return select(mesh, on) if facets is None else np.unique(facets)
 
 
 def shares(mesh: Mesh, on: Selection) -> tuple[Ints, Floats]:
-    """Return the nodes that a load acts on and their fractions of a uniform load, both of shape (n,), sum 1.
+    """Return the nodes that a load acts on and their fractions of a uniform load [-], both of shape (n,), sum 1.
 
     Consistent with linear elements: by the measures of the cells that carry the load (`covering`). Equal for nodes
     without such cells.
@@ -251,7 +251,7 @@ def facets_within(mesh: Mesh, on: Selection) -> Ints:
 
     For a facet group they are its facets, on the boundary or inside; for other selections the boundary facets whose
     nodes are all selected. In a table with quadrilaterals, triangles repeat their last corner. Raises MeshError if
-    there is none.
+    no facet is selected.
     """
     named = named_facets(mesh, on)
     if named is not None:
@@ -262,14 +262,17 @@ def facets_within(mesh: Mesh, on: Selection) -> Ints:
     found = mesh.boundary[inside[mesh.boundary].all(axis=1)] if mesh.element != "line" else mesh.boundary[:0]
     if not len(found):
         raise MeshError(
-            f"the {len(nodes)} node{'s' * (len(nodes) != 1)} selected make no part of the boundary's surface: "
+            f"the {len(nodes)} node{'s' * (len(nodes) != 1)} selected contain no complete facet of the boundary: "
             "select a side, or all nodes of a face"
         )
     return found
 
 
 def outer_facets(mesh: Mesh, on: Selection) -> Ints:
-    """Return `facets_within`; raise MeshError if one lies between two elements, where a pressure has no side."""
+    """Return `facets_within`, shape (n, 2 to 4).
+
+    Raise MeshError if one lies between two elements, where a pressure has no outer side.
+    """
     facets = facets_within(mesh, on)
     within = np.zeros(mesh.n_nodes, dtype=bool)
     within[facets] = True
@@ -282,6 +285,6 @@ def outer_facets(mesh: Mesh, on: Selection) -> Ints:
     if inner:
         raise MeshError(
             f"{inner} of {len(facets)} facets of '{on}' lie inside the body, between two elements, where a pressure "
-            "has no side to press on: select facets of the boundary, or give a traction, which has a direction"
+            "has no outer side: select facets of the boundary, or use a traction, which has a direction"
         )
     return facets

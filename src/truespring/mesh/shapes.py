@@ -12,8 +12,8 @@ from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.mesh.mesh import Mesh
 from truespring.mesh.rows import ascending, distinct_rows
 
-#: What a rectangle and a box may be made of: two triangles a rectangle; six tetrahedra, two wedges or six pyramids a
-#: box, or the body-centred-cubic lattice, whose `elements` count its cubic cells.
+#: The elements of a rectangle and of a box: two triangles per rectangle; six tetrahedra, two wedges or six pyramids
+#: per box, or the body-centred-cubic lattice, whose `elements` count its cubic cells.
 PLANE_ELEMENTS = ("quadrilateral", "triangle")
 SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron", "wedge", "pyramid")
 
@@ -21,8 +21,8 @@ SOLID_ELEMENTS = ("hexahedron", "tetrahedron", "bcc-tetrahedron", "wedge", "pyra
 #: other one, or each in turn, so that no direction is preferred.
 DIAGONALS = ("right", "left", "alternating")
 
-# What a solve takes at its peak for each node [bytes]: by multigrid in proportion to the size of the body, in the
-# plane and in space. Where a factorisation would take more it is not chosen.
+# Peak memory of a solve per node [bytes], in 2D and in 3D: that of multigrid, which grows linearly with the number of
+# nodes. A factorisation that would need more is not selected.
 _BYTES_A_NODE = {2: 2560, 3: 10240}
 
 _FLATTEST = 1e3
@@ -36,7 +36,7 @@ def rectangle(
     Args:
         size: length along x and y [m].
         elements: number of rectangles along x and y.
-        element: "quadrilateral", or "triangle": two a rectangle.
+        element: "quadrilateral", or "triangle": two per rectangle.
         diagonal: how triangles halve it, one of DIAGONALS.
 
     Raises MeshError for sizes that are not positive, counts below one, elements flatter than
@@ -45,7 +45,7 @@ def rectangle(
     _known(element, PLANE_ELEMENTS, "element")
     _known(diagonal, DIAGONALS, "diagonal")
     if element != "triangle" and diagonal != DIAGONALS[0]:
-        raise MeshError(f"diagonal = '{diagonal}' is for triangles, the elements are {element}s")
+        raise MeshError(f"diagonal = '{diagonal}' applies to triangles only, the elements are {element}s")
     lengths, counts = _checked(size, elements, "rectangle", "xy")
     nodes, cells = _grid(lengths, counts)
     if element == "quadrilateral":
@@ -62,9 +62,9 @@ def box(size: Sequence[float], elements: Sequence[int], element: str = "hexahedr
     Args:
         size: length along x, y and z [m].
         elements: number of cells along x, y and z.
-        element: "hexahedron"; "tetrahedron", six a cell, all about the same body diagonal; "bcc-tetrahedron", the
+        element: "hexahedron"; "tetrahedron", six per cell, all around the same body diagonal; "bcc-tetrahedron", the
             body-centred-cubic lattice with a node in the middle of each cell and of each face of the outside;
-            "wedge", two a cell, their triangles across z; or "pyramid", six a cell about a node in its middle.
+            "wedge", two per cell, their triangles across z; or "pyramid", six per cell around a node in its middle.
 
     Raises MeshError as `rectangle` does.
     """
@@ -142,7 +142,7 @@ def refuse_too_large(n_nodes: int, dim: int) -> None:
     if needed > there:
         raise MeshError(
             f"a mesh of {n_nodes:,} nodes needs about {needed / 2**30:,.0f} GiB to be solved, "
-            f"this machine has {there / 2**30:,.1f} GiB: take fewer elements"
+            f"this machine has {there / 2**30:,.1f} GiB: use fewer elements"
         )
 
 
@@ -172,8 +172,8 @@ def _checked(
 def _values(values: Sequence[float], name: str, shape: str, axes: str) -> tuple[float, ...]:
     if len(values) != len(axes):
         along = f"{', '.join(axes[:-1])} and {axes[-1]}"
-        raise MeshError(f"{name} = {list(values)}: a {shape} takes {len(axes)} values, along {along}")
+        raise MeshError(f"{name} = {list(values)}: a {shape} has {len(axes)} values, along {along}")
     try:
         return tuple(float(value) for value in values)
     except (TypeError, ValueError):
-        raise MeshError(f"{name} = {list(values)}: numbers are expected, lengths in metres") from None
+        raise MeshError(f"{name} = {list(values)}: must be numbers, lengths in metres") from None

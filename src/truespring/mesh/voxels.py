@@ -36,7 +36,7 @@ def read_voxels(file: str | Path, label: int | str, edge: float | None = None, u
     """
     scale = unit_of(unit, "length", f"{file}: unit", MeshError)
     if edge is not None and not (math.isfinite(edge) and edge > 0):
-        raise MeshError(f"{file}: edge = {edge:g} m: the edge of the cubes must be above 0")
+        raise MeshError(f"{file}: edge = {edge:g} m: the edge of the cubes must be positive")
     labels = read_labels(file)
     try:
         return _mesh(labels, label, edge, scale)
@@ -52,8 +52,8 @@ def _mesh(labels: Labels, label: int | str, edge: float | None, scale: float) ->
     filled, sides = (inside, spacing) if edge is None else (_resampled(inside, spacing, edge), np.full(3, edge))
     if not filled.any():
         raise MeshError(
-            f"cubes of {edge:g} m are too large: none is filled by half with label {label}, "
-            f"{' by '.join(f'{side:.3g}' for side in inside.shape * spacing)} m large"
+            f"cubes of {edge:g} m are too large: no cube is filled by more than half with label {label}, "
+            f"which measures {' by '.join(f'{side:.3g}' for side in inside.shape * spacing)} m"
         )
     filled, notes = _largest_part(filled, label)
     refuse_too_large(int(filled.sum()), 3)
@@ -65,7 +65,7 @@ def _mesh(labels: Labels, label: int | str, edge: float | None, scale: float) ->
     places = corner + (nodes * sides) @ labels.direction.T
     thin = [axis for axis, count in zip("xyz", np.ptp(nodes, axis=0), strict=True) if count == 1]
     if thin:
-        notes.append(f"one cube thick along its {' and '.join(thin)} axis: its bending stiffness is wrong")
+        notes.append(f"only one cube thick along its {' and '.join(thin)} axis: its bending stiffness is wrong")
     return Mesh(places, elements, "hexahedron", notes=(*labels.notes, *notes))
 
 
@@ -94,7 +94,7 @@ def _largest_part(filled: Bools, label: int | str) -> tuple[Bools, list[str]]:
     sizes = np.bincount(parts.ravel())[1:]
     left = int(sizes.sum() - sizes.max())
     note = (
-        f"label {label} has {n_parts} parts that no face joins: the largest has {sizes.max()} cubes, "
+        f"label {label} has {n_parts} parts that share no face: the largest has {sizes.max()} cubes, "
         f"{left} of the others {'is' if left == 1 else 'are'} left out"
     )
     return parts == sizes.argmax() + 1, [note]

@@ -47,7 +47,10 @@ class Block:
 
     @cached_property
     def coupled(self) -> tuple[Floats, Floats]:
-        """Blocks of the stiffness matrix: between surface nodes, and from surface to inner nodes [N/m]."""
+        """Blocks of the stiffness matrix [N/m]: between surface nodes, and from surface to inner nodes.
+
+        Shapes (n_surface * dim, n_surface * dim) and (n_surface * dim, n_inside * dim).
+        """
         W = self.following
         return self.stiffness + self.kappa * (W.T @ W), -self.kappa * W.T
 

@@ -186,7 +186,7 @@ class FemPotential:
         return self._everywhere(lambda first, last: self._respond(self._points(positions, first, last)).stress)
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """Return the stress extrapolated linearly along `step` [m] with the elasticity of the law [Pa], as `stress`."""
+        """Return the stress [Pa], shape as `stress`, extrapolated along `step` [m] by the elasticity of the law."""
 
         def extrapolated(first: int, last: int) -> Floats:
             at = self._points(positions, first, last)
@@ -322,7 +322,7 @@ class FemPotential:
 
 
 def determinant(F: Floats) -> Floats:
-    """Return the determinant of tensors, axes (i, j, ...) to (...)."""
+    """Return the determinant of tensors of axes (i, j, ...), axes (...), in their unit to the power of dim."""
     if len(F) == 2:
         return np.asarray(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     minors = [F[1, j] * F[2, k] - F[1, k] * F[2, j] for j, k in ((1, 2), (2, 0), (0, 1))]

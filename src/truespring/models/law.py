@@ -65,7 +65,7 @@ class Constants:
 
     @property
     def lam_plane(self) -> float | Floats:
-        """The first Lamé constant of the plane [Pa]: 2 lam mu / (lam + 2 mu) in plane stress, lam otherwise.
+        """The first Lamé constant in the plane [Pa], shape as lam: 2 lam mu / (lam + 2 mu) in plane stress, else lam.
 
         A law that is quadratic in its strain accounts for the third direction by using it instead of lam.
         """

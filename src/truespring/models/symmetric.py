@@ -20,30 +20,30 @@ def dimensions(tensor: Floats) -> int:
 
 
 def identity(tensor: Floats) -> Floats:
-    """Return the identity with as many axes as a symmetric tensor, axes (component, 1, ...)."""
+    """Return the identity [-] with as many axes as a symmetric tensor, axes (component, 1, ...)."""
     ones = np.arange(len(tensor)) < dimensions(tensor)
     return ones.astype(np.float64).reshape(-1, *[1] * (tensor.ndim - 1))
 
 
 def trace(tensor: Floats) -> Floats:
-    """Return the trace of a symmetric tensor, axes (...)."""
+    """Return the trace of a symmetric tensor, axes (...), in its unit."""
     return np.asarray(tensor[: dimensions(tensor)].sum(axis=0))
 
 
 def contracted(left: Floats, right: Floats) -> Floats:
-    """Return left : right over the last tensor axis of `left` and the one of `right`, shear counted twice."""
+    """Return left : right over the last tensor axis of `left`, shear counted twice: axes of `left` without it."""
     dim = dimensions(right)
     total = sum((1 if at < dim else 2) * left[..., at, :, :] * component for at, component in enumerate(right))
     return np.asarray(total)
 
 
 def outer(left: Floats, right: Floats) -> Floats:
-    """Return the product left_ij right_kl, axes (component, component, ...)."""
+    """Return the product left_ij right_kl, axes (component, component, ...); units multiply."""
     return np.asarray(left[:, None] * right[None])
 
 
 def swapped(tensor: Floats) -> Floats:
-    """Return tensor_im tensor_jn + tensor_in tensor_jm, axes (component ij, component mn, ...)."""
+    """Return tensor_im tensor_jn + tensor_in tensor_jm, axes (component ij, component mn, ...), in its unit squared."""
     at = voigt_places(dimensions(tensor))
     pairs = voigt_pairs(dimensions(tensor))
     result = np.empty((len(pairs), *tensor.shape))
@@ -55,12 +55,12 @@ def swapped(tensor: Floats) -> Floats:
 
 
 def dyad(a: Floats, b: Floats) -> Floats:
-    """Return the symmetric tensor a_i b_j + a_j b_i of two vectors, axes (direction, ...)."""
+    """Return the symmetric tensor a_i b_j + a_j b_i of two vectors, axes (direction, ...); units multiply."""
     return np.stack([a[i] * b[j] + a[j] * b[i] for i, j in voigt_pairs(len(a))])
 
 
 def determinant(tensor: Floats) -> Floats:
-    """Return the determinant of a symmetric tensor, axes (...)."""
+    """Return the determinant of a symmetric tensor, axes (...), in its unit to the power of dim."""
     if len(tensor) == 3:
         xx, yy, xy = tensor
         return np.asarray(xx * yy - xy**2)
@@ -69,7 +69,7 @@ def determinant(tensor: Floats) -> Floats:
 
 
 def inverted(tensor: Floats) -> Floats:
-    """Return the inverse of a symmetric tensor, axes (component, ...); not finite if singular."""
+    """Return the inverse of a symmetric tensor [1 / its unit], axes (component, ...); not finite if singular."""
     if len(tensor) == 3:
         xx, yy, xy = tensor
         return _ratio(np.stack([yy, xx, -xy]), determinant(tensor))

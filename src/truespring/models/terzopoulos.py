@@ -71,7 +71,7 @@ class Terzopoulos(Model):
             yield np.broadcast_to(here[:, None] * share, (len(cells), len(one.corners)))
 
     def elasticity(self, problem: Problem) -> Floats:
-        """Return the elasticity matrix of the body under a uniform strain [Pa], in Voigt's order, (3, 3) or (6, 6).
+        """Return the elasticity matrix under a uniform strain [Pa], in Voigt's order, shape (3, 3) or (6, 6).
 
         It is diagonal, C_ii = 8 eta_ii and C_ij,ij = 4 eta_ij, times the factors of the boundary.
         """

@@ -82,5 +82,7 @@ class VolumeSprings:
         return self.network.cells
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring, without the term."""
+        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of springs, shape (n_springs,) each.
+
+        The volume term is not included."""
         return self.network.cell_fields(positions)

@@ -11,7 +11,7 @@ from truespring.mesh.files.contents import places
 from truespring.opening import open_file
 from truespring.reference.record import Level, Record
 
-# Larger coordinates are taken as damaged; the square is still finite.
+# Larger coordinates count as damaged; the square is still finite.
 _FAR = 1e30
 
 

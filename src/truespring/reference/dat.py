@@ -63,7 +63,7 @@ def _deck(file: Path, mesh: Path | None) -> Contents:
     deck = file.with_suffix(".inp") if mesh is None else mesh
     if mesh is None and not deck.is_file():
         raise ReferenceFileError(
-            f"{file} has no nodes and elements: put the deck {deck.name} into the same folder, or give it (--mesh)"
+            f"{file} has no nodes and elements: put the deck {deck.name} into the same folder, or use --mesh DECK"
         )
     if deck.suffix.lower() != ".inp":
         raise ReferenceFileError(f"{deck}: nodes and elements of {file.name} are read from its deck, a .inp file")
@@ -105,7 +105,7 @@ class _Printed:
             if b"\0" in line:
                 scan.refuse("not a .dat file of CalculiX: it is binary, not text")
             if not line.endswith(b"\n"):
-                scan.refuse(f"the file is cut off: {scan.shown(line)} has no line end")
+                scan.refuse(f"the file is truncated: {scan.shown(line)} has no line end")
             if _MODE.fullmatch(line):
                 is_mode = True
             elif head := _HEAD.fullmatch(line):
@@ -124,7 +124,7 @@ class _Printed:
             scan.refuse(f"{scan.shown(head[3])} is not a time")
         increment = self._increment(time, is_mode, (quantity, name))
         if scan.line().strip():
-            scan.refuse(f"an empty line is expected below the title of {quantity}")
+            scan.refuse(f"the title of {quantity} must be followed by an empty line")
         match quantity:
             case "displacements":
                 self._add_displacement(increment, name)
@@ -146,7 +146,7 @@ class _Printed:
     def _total(self, quantity: str, width: int) -> Floats:
         line = self._scan.line()
         if not line.endswith(b"\n"):
-            self._scan.refuse(f"the file is cut off: {width} numbers of {quantity} are expected")
+            self._scan.refuse(f"the file is truncated: {width} numbers of {quantity} are expected")
         return np.asarray(self._scan.columns([line], 6, (width, _REAL_WIDTH, "float"))[0][0])
 
     def _add_displacement(self, increment: _Increment, name: str) -> None:
@@ -170,18 +170,18 @@ class _Printed:
         known = self._sets.get(name.upper())
         if known is not None and len(numbers) != len(known):
             scan.refuse(
-                f"{what} has {len(known)} nodes in the deck, {len(numbers)} are printed: the file is cut off, or "
+                f"{what} has {len(known)} nodes in the deck, {len(numbers)} are printed: the file is truncated, or "
                 "belongs to another deck"
             )
         if not len(numbers):
-            scan.refuse(f"{what} has no rows: the file is cut off")
+            scan.refuse(f"{what} has no rows: the file is truncated")
 
     def _rows(self, lines: Sequence[bytes], more: bool) -> tuple[Ints, Floats]:
         scan = self._scan
         if not more:  # the last line read is the blank one after the table
             scan.line_number -= 1
         if not lines[-1].endswith(b"\n"):
-            scan.refuse(f"the file is cut off: {scan.shown(lines[-1])} has no line end")
+            scan.refuse(f"the file is truncated: {scan.shown(lines[-1])} has no line end")
         nodes, values = scan.columns(list(lines), 0, (1, _ID_WIDTH, "int"), (3, _REAL_WIDTH, "float"))
         scan.line_number += not more
         return nodes[:, 0], values

@@ -1,7 +1,7 @@
 """CalculiX results in .frd files: the displacement of every increment; text in short and long format, and binary.
 
 Source: "Result Format" in the CalculiX GraphiX manual, https://www.dhondt.de, and files of CalculiX 2.20. The
-libraries that were tried keep all fields in memory, and read damaged values as zeros.
+available libraries keep all fields in memory and read damaged values as zeros.
 """
 
 from array import array
@@ -91,12 +91,12 @@ class _Result:
         scan = self._scan
         line = scan.line()
         if not line.startswith(_BEGINNINGS):
-            scan.refuse(f"not a .frd file of CalculiX: it begins with {scan.shown(line)}, not with '1C'")
+            scan.refuse(f"not a .frd file of CalculiX: it must begin with '1C', not with {scan.shown(line)}")
         while line and not self._is_whole:
             self._take(line)
             line = b"" if self._is_whole else scan.line()
         if self._is_open:
-            scan.refuse("the file is cut off in the header of a result")
+            scan.refuse("the file is truncated in the header of a result")
         scan.done()
         return self._gathered()
 
@@ -116,7 +116,7 @@ class _Result:
             case key if key[:5] == b" 9999":
                 self._is_whole = True
             case key if key[:5] != b"    1":
-                cut = "" if line.endswith(b"\n") else ": the file is cut off"
+                cut = "" if line.endswith(b"\n") else ": the file is truncated"
                 scan.refuse(f"{scan.shown(line)} is not a record of a .frd file{cut}")
 
     def _read_nodes(self, line: bytes) -> None:
@@ -137,7 +137,7 @@ class _Result:
             self._scan.refuse(f"{self._scan.shown(line)} does not give the number of rows")
         self._refuse_form(form)
         if count < 1:
-            self._scan.refuse(f"{self._scan.shown(line)} announces {count} rows")
+            self._scan.refuse(f"{self._scan.shown(line)} states {count} rows")
         return count, form
 
     def _refuse_form(self, form: int) -> None:
@@ -147,7 +147,7 @@ class _Result:
     def _rows(self, count: int, form: int, width: int, what: str = "") -> Iterator[tuple[Ints, Floats]]:
         """Yield node numbers and values, shapes (n,) and (n, width), up to the end of the block.
 
-        A text block may have more rows than announced, up to its end mark; fewer are an error.
+        A text block may have more rows than stated, up to its end mark; fewer are an error.
         """
         scan = self._scan
         for left in range(count, 0, -CHUNK):
@@ -179,13 +179,13 @@ class _Result:
         """Return the next row of a block, empty at its end mark; raise ReferenceFileError for any other line."""
         line = self._scan.line()
         if not line.startswith((b" -1", b" -3")):
-            why = f"follows {self._scan.shown(line)}" if line else "the file is cut off"
+            why = f"follows {self._scan.shown(line)}" if line else "the file is truncated"
             self._scan.refuse(f"after {done} rows {why}: a block must end with -3")
         return line if line.startswith(b" -1") else b""
 
     def _note_count(self, what: str, announced: int, there: int) -> None:
         if what and there != announced:
-            self._notes.append(f"{what}: {announced} are announced, {there} were found and read")
+            self._notes.append(f"{what}: {announced} are stated, {there} were found and read")
 
     def _refuse_others(self, lines: list[bytes], expected: int, before: int, count: int) -> None:
         """Raise ReferenceFileError if a line is not a row, or lines are missing."""
@@ -193,9 +193,9 @@ class _Result:
         for place, line in enumerate(lines):
             if not line.startswith(b" -1"):
                 where = scan.line_number - len(lines) + 1 + place
-                scan.refuse(f"{count} rows are announced, after {before + place} follows {scan.shown(line)}", where)
+                scan.refuse(f"{count} rows are stated, after {before + place} follows {scan.shown(line)}", where)
         if len(lines) < expected:
-            scan.refuse(f"the file is cut off: {count} rows are announced, {before + len(lines)} were found")
+            scan.refuse(f"the file is truncated: {count} rows are stated, {before + len(lines)} were found")
 
     def _read_elements(self, line: bytes) -> None:
         count, form = self._announced(line)
@@ -208,7 +208,7 @@ class _Result:
     def _text_elements(self, form: int) -> Iterator[tuple[int, list[int]]]:
         """Yield type and nodes of the elements up to the end mark.
 
-        For composite shells CalculiX announces one element per shell, and writes one per layer.
+        For composite shells CalculiX counts one element per shell and writes one per layer.
         """
         done = 0
         while head := self._further(done):
@@ -230,14 +230,14 @@ class _Result:
         except ValueError:
             code = -1
         if code < 0:
-            cut = "" if head.endswith(b"\n") else ": the file is cut off"
+            cut = "" if head.endswith(b"\n") else ": the file is truncated"
             scan.refuse(f"{scan.shown(head)} is not an element{cut}")
         length = width * self._n_nodes(code)
         text = b""
         while len(text) < length:
             line = scan.line()
             if not line.startswith(b" -2") or not line.endswith(b"\n") or not line[3:].strip():
-                scan.refuse(f"{scan.shown(line)} is not a row of an element's nodes, or the file is cut off")
+                scan.refuse(f"{scan.shown(line)} is not a row of an element's nodes, or the file is truncated")
             text += line[3:].rstrip()
         try:
             nodes = [int(text[place : place + width]) for place in range(0, len(text), width)]
@@ -266,7 +266,7 @@ class _Result:
         self._refuse_form(form)
         components = scan.lines(n_components)
         if len(components) < n_components or not all(one.startswith(b" -5") for one in components):
-            scan.refuse(f"{n_components} rows '-5' are expected below {scan.shown(line)}, or the file is cut off")
+            scan.refuse(f"{n_components} rows '-5' are expected below {scan.shown(line)}, or the file is truncated")
         width = sum(one[33:38].strip() in (b"", b"0") for one in components)  # others are not written
         if name == b"DISP":
             self._read_displacement(count, form, width, time, head)
@@ -300,16 +300,16 @@ class _Result:
     def _gathered(self) -> Record:
         file = self._scan.file
         if self._nodes is None:
-            raise ReferenceFileError(f"{file} has no nodes: is the file cut off?")
+            raise ReferenceFileError(f"{file} has no nodes: is the file truncated?")
         if not self._levels:
-            cut = "" if self._is_whole else " and no end mark 9999 (was the run stopped, or the file cut off?)"
+            cut = "" if self._is_whole else " and no end mark 9999 (was the run stopped, or the file truncated?)"
             raise ReferenceFileError(f"{file} has no displacement{cut}: request it by *NODE FILE with a line U")
         levels, notes = without_modes(self._levels, self._is_mode)
         notes += tuple(self._notes)
         if not self._is_whole:
             notes += (
                 "there is no end mark 9999: the run was stopped, and its last increment may not be an equilibrium; or "
-                "the file was cut off",
+                "the file was truncated",
             )
         numbers, points = self._nodes
         cells = {}

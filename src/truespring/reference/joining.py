@@ -33,8 +33,8 @@ def joined(record: Record) -> Record:
         apart = max(apart, float(np.nanmax(gap, initial=0.0)) / largest)
     if apart > _ALIKE:
         note = (
-            f"{n_twins} of {len(used)} points share their place with another one and move apart, by up to "
-            f"{apart:.2g} of the largest displacement: they were not joined, and faces between them count as surface"
+            f"{n_twins} of {len(used)} points coincide with another one and separate, by up to "
+            f"{apart:.2g} of the largest displacement: they were not merged, and faces between them count as surface"
         )
         return replace(record, notes=(*record.notes, note))
     kept = np.ones(len(record.points), dtype=bool)
@@ -50,6 +50,6 @@ def joined(record: Record) -> Record:
         names=tuple(name for name, stays in zip(record.names, kept, strict=False) if stays),
         notes=(
             *record.notes,
-            f"{n_twins} of {len(used)} points share their place with another one and move with it: they were joined",
+            f"{n_twins} of {len(used)} points coincide with another one and move with it: they were merged",
         ),
     )

@@ -64,22 +64,22 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
         if data.unknown:
             data.raise_unknown()
         raise ReferenceFileError(
-            f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or give a second "
-            f"file with the markers at rest (--undeformed); the first line may be: {_FORM}"
+            f"{file}: there is no displacement: add columns {', '.join(f'u{axis}' for axis in axes)}, or add a second "
+            f"file with the undeformed markers (--undeformed); the first line may be: {_FORM}"
         )
     if undeformed is not None and moved:
         raise ReferenceFileError(f"{file} has the displacement in column u{moved[0]}: leave undeformed out")
     if moved and moved != axes:
         if data.unknown:
             data.raise_unknown()
-        raise ReferenceFileError(f"{file}:1: places have {', '.join(axes)}, displacements u{', u'.join(moved)}")
+        raise ReferenceFileError(f"{file}:1: positions have {', '.join(axes)}, displacements u{', u'.join(moved)}")
     groups = _levels(data)
     rest = data if undeformed is None else _columns(undeformed)
     rest_rows = groups[0][1] if undeformed is None else np.arange(rest.n_rows)
     rest_axes = [axis for axis in _AXES if axis in rest.columns]
     if rest_axes != axes:
         raise ReferenceFileError(
-            f"{file}:1: places have {', '.join(axes)}, those in {undeformed} {', '.join(rest_axes)}"
+            f"{file}:1: positions have {', '.join(axes)}, those in {undeformed} {', '.join(rest_axes)}"
         )
     names, points = _names(rest, rest_rows, undeformed or file), _in_space(rest, axes)[rest_rows]
     places = _in_space(data, axes)
@@ -107,14 +107,14 @@ def _notes(data: Columns, file: Path) -> tuple[str, ...]:
     having = [name for name in _LENGTHS if name in data.columns and data.units[name]]
     notes = []
     if data.unknown:
-        notes.append(f"columns that are not read: {', '.join(head.strip() for head in data.unknown)}")
+        notes.append(f"ignored columns: {', '.join(head.strip() for head in data.unknown)}")
     if without and having:
         if {name[0] for name in without}.isdisjoint(name[0] for name in having) and _are_halves(without, having):
             raise ReferenceFileError(
-                f"{file}:1: column {having[0]} is in {data.units[having[0]]}, {without[0]} has no unit: are these "
-                f"metres, too? Write {without[0]} [m], or {without[0]} [{data.units[having[0]]}]"
+                f"{file}:1: column {having[0]} is in {data.units[having[0]]}, {without[0]} has no unit: is it in "
+                f"metres? Write {without[0]} [m], or {without[0]} [{data.units[having[0]]}]"
             )
-        notes.append(f"columns without a unit were taken in metres: {', '.join(without)}")
+        notes.append(f"columns without a unit are in metres: {', '.join(without)}")
     return tuple(notes)
 
 
@@ -148,8 +148,8 @@ def _names(data: Columns, rows: Ints, file: Path) -> tuple[str, ...]:
     for row in rows.tolist():
         if texts[row] in first:
             raise ReferenceFileError(
-                f"{file}:{data.line(row)}: marker '{texts[row]}' is there twice, first in line "
-                f"{data.line(first[texts[row]])}: several levels need a column load_factor"
+                f"{file}:{data.line(row)}: marker '{texts[row]}' is defined twice, first in line "
+                f"{data.line(first[texts[row]])}: use a column load_factor for several levels"
             )
         first[texts[row]] = row
     return tuple(first)
@@ -163,7 +163,9 @@ def _in_order(
     if bool(names) != ("marker" in data.columns):
         raise ReferenceFileError(f"{file}:1: only one of both files has a column marker: add it to both, or to none")
     if not names and len(rows) != n_markers:
-        raise ReferenceFileError(f"{file}: {len(rows)} markers are {level}, {n_markers} at rest: give them names")
+        raise ReferenceFileError(
+            f"{file}: {len(rows)} markers are {level}, {n_markers} are undeformed: add a column marker with their names"
+        )
     if not names:
         return rows
     own = _names(data, rows, file)
@@ -181,4 +183,6 @@ def _refuse_other_rest(data: Columns, places: Floats, points: Floats, rows: Ints
     other = (places != points).any(axis=1) & np.isfinite(points).all(axis=1)
     if other.any():
         where = data.line(int(rows[other.argmax()]))
-        raise ReferenceFileError(f"{file}:{where}: this marker rests elsewhere than in the first level")
+        raise ReferenceFileError(
+            f"{file}:{where}: the undeformed position of this marker differs from that in the first level"
+        )

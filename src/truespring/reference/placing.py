@@ -44,12 +44,12 @@ class Placing:
         letters = [axis.removeprefix("-") for axis in self.axes]
         if sorted(letters) != list(AXES):
             raise ReferenceFileError(
-                f"axes = {','.join(self.axes)}: x, y and z are expected in some order, each with or without a minus"
+                f"axes = {','.join(self.axes)}: must be x, y and z in any order, each with or without a minus"
             )
         if self.load_factor is not None and not 0 < self.load_factor <= 1:
-            raise ReferenceFileError(f"load_factor = {self.load_factor:g} is not above 0 and at most 1")
+            raise ReferenceFileError(f"load_factor = {self.load_factor:g} must be above 0 and at most 1")
         if self.full_time is not None and not (math.isfinite(self.full_time) and self.full_time > 0):
-            raise ReferenceFileError(f"full_time = {self.full_time:g} is not above 0")
+            raise ReferenceFileError(f"full_time = {self.full_time:g} must be above 0")
         _ = self.scale, self.joules
 
     @property
@@ -94,13 +94,13 @@ def placed(record: Record, placing: Placing, label: str) -> Solution:
     # Energies in VTK files are truespring's own, in joules; others are in the file's units.
     joules = 1.0 if record.kind in ("vtu", "pvd") else placing.joules
     states = [
-        told_state(
+        known_state(
             mesh, grid.points, move[order, :dim], factor, math.nan if level.energy is None else joules * level.energy
         )
         for level, move, factor in zip(record.levels, moves, factors, strict=True)
     ]
     if len(states) > 1 and factors[0] > 0:
-        states.insert(0, told_state(mesh, grid.points, np.zeros(grid.points.shape), 0.0, energy=0.0))
+        states.insert(0, known_state(mesh, grid.points, np.zeros(grid.points.shape), 0.0, energy=0.0))
     return Solution(
         problem=Problem(mesh, stated=False),
         label=label,
@@ -128,7 +128,7 @@ def _without_unknown(record: Record) -> tuple[Record, list[str]]:
         names=tuple(name for name, there in zip(record.names, known, strict=False) if there),
     ), [
         f"the displacement of {(~known).sum()} of {len(known)} points is unknown: they were left out, and {n_left} "
-        "cells that have them"
+        "cells with them"
     ]
 
 
@@ -146,13 +146,13 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
     if placing.load_factor is not None:
         if len(times) > 1:
             raise ReferenceFileError(
-                f"{record.file} has {len(times)} levels, a load factor is for a file of one: give the time of full "
+                f"{record.file} has {len(times)} levels, a load factor needs a file with one: set the time of full "
                 "load (--full-time) if its times are not load factors"
             )
         return [placing.load_factor], []
     if any(later <= earlier for earlier, later in itertools.pairwise(times)) or times[0] < 0:
         factors = [(number + 1) / len(times) for number in range(len(times))]
-        return factors, [f"its {len(times)} levels have no ascending times and were taken as equal shares of the load"]
+        return factors, [f"its {len(times)} levels have no ascending times and count as equal fractions of the load"]
     last = times[-1]
     if placing.full_time is not None:
         if last > placing.full_time * (1 + 1e-6):
@@ -162,13 +162,13 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
         return [_rounded(time / placing.full_time) for time in times], []
     if last <= 1 + 1e-6:
         short = (
-            [] if last >= 1 - 1e-6 else [f"it ends at time {last:.6g}, which was taken as load factor: full load is 1"]
+            [] if last >= 1 - 1e-6 else [f"it ends at time {last:.6g}, which is used as load factor: full load is 1"]
         )
         return [_rounded(time) for time in times], short
     if len(times) == 1:
-        return [1.0], [f"its only level, of time {last:.6g}, was taken as full load"]
+        return [1.0], [f"its only level, of time {last:.6g}, is used as full load"]
     return [_rounded(time / last) for time in times], [
-        f"its times {times[0]:.6g} to {last:.6g} were taken as load factors {times[0] / last:.6g} to 1, the last as "
+        f"its times {times[0]:.6g} to {last:.6g} are used as load factors {times[0] / last:.6g} to 1, the last as "
         "full load; change this by --full-time"
     ]
 
@@ -202,7 +202,7 @@ def _picked(grid: Grid, order: Ints) -> Grid:
     return Grid(grid.points[order], {kind: number[cells] for kind, cells in grid.cells.items()})
 
 
-def told_state(
+def known_state(
     mesh: Mesh,
     points: Floats,
     displacement: Floats,

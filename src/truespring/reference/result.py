@@ -29,7 +29,7 @@ class Format(NamedTuple):
     Attributes:
         recognises: returns whether the beginning of a file is that of the format.
         read: returns the record of a file; takes the file, a callback for progress, and `options`.
-        options: which of `field`, `undeformed`, `mesh` it takes.
+        options: which of `field`, `undeformed`, `mesh` apply to it.
         unnoticed: when a truncated file is read without an error; empty if any truncation is an error.
         is_marked: whether every file of the format is recognised by its content.
     """
@@ -46,9 +46,11 @@ _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
 #: Formats by lower-case suffix; if several recognise a file, the one with its suffix is used, else the first.
 READERS: MappingProxyType[str, Format] = MappingProxyType(
     {
-        ".frd": Format(is_frd, read_frd, unnoticed="truncated after a level it is a run that stopped; a note says so"),
+        ".frd": Format(
+            is_frd, read_frd, unnoticed="truncated after a level it reads as a run that stopped, with a note"
+        ),
         ".dat": Format(
-            is_dat, read_dat, frozenset({"mesh"}), unnoticed="truncated after a table it is a run that stopped"
+            is_dat, read_dat, frozenset({"mesh"}), unnoticed="truncated after a table it reads as a run that stopped"
         ),
         **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
         ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
@@ -113,7 +115,7 @@ def read_result(
         field, undeformed, mesh, reading: see read_record.
 
     The solution has a mesh of the corners of the file's cells, no loads and no supports; `all_positions` of its states
-    includes the further nodes of the cells. Raises ReferenceFileError if the file cannot be read or has no body.
+    includes the further nodes of the cells. Raises ReferenceFileError if the file cannot be read or contains no body.
     """
     placing = Placing(unit, tuple(axes), tuple(shift), load_factor, force_unit, full_time)
     record = read_record(file, field=field, undeformed=undeformed, mesh=mesh, reading=reading)
@@ -142,12 +144,12 @@ def read_record(
     """
     file = Path(file)
     if file.is_dir():
-        raise ReferenceFileError(f"{file} is a folder: give the result file itself")
+        raise ReferenceFileError(f"{file} is a folder: use the result file in it")
     key = format_of(file)
     if key is None:
         raise ReferenceFileError(
-            f"{file}: a result ends in {', '.join(READERS)}, not in '{file.suffix}'"
-            f"{nearest(file.suffix.lower(), READERS)}, and what it begins with is none of these formats: "
+            f"{file}: the suffix of a result is {', '.join(READERS)}, not '{file.suffix}'"
+            f"{nearest(file.suffix.lower(), READERS)}, and its content has none of these formats: "
             "convert it to VTK"
         )
     options = {
@@ -158,7 +160,7 @@ def read_record(
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() - READERS[key].options:
         others = ", ".join(other for other, form in READERS.items() if name in form.options)
-        raise ReferenceFileError(f"{file}: {name} is not for {key} files, but for {others}")
+        raise ReferenceFileError(f"{file}: {name} does not apply to {key} files, only to {others}")
     if not (key == ".dat" and file.is_file()):  # the reader reports empty files
         refuse_unreadable(file)
     try:
@@ -166,6 +168,6 @@ def read_record(
     except ReferenceFileError as error:
         if not READERS[key].is_marked or _is_recognised(file, key):
             raise
-        raise ReferenceFileError(f"{error}; it does not begin like {listed_keys(READERS, key)} either") from None
+        raise ReferenceFileError(f"{error}; its content does not match {listed_keys(READERS, key)} either") from None
     record = joined(record)
     return replace(record, notes=(*read_as(key, file.suffix), *record.notes))

@@ -37,7 +37,7 @@ _MOST_SETS, _KIND, _N_SETS, _END, _LONG_END = 3, 7, 8, 9, 22
 _POINTERS = slice(10, 16)  # to result sets, times, steps, elements, nodes, geometry
 _HIGH = (40, 41, 42, 44, 45, 46)  # their upper words
 _MODES = (1, 2)  # buckling and modal analysis
-_AGAIN = "copy it again from where Ansys wrote it"
+_AGAIN = "copy it again from the folder in which Ansys wrote it"
 
 
 def is_rst(head: bytes) -> bool:
@@ -60,7 +60,7 @@ def read_rst(file: Path, reading: Reading | None = None) -> Record:
     """
     refuse_unreadable(file)
     if importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None:
-        raise ReferenceFileError(f"{file}: results of Ansys need a library more: pip install 'truespring[ansys]'")
+        raise ReferenceFileError(f"{file}: results of Ansys need a further library: pip install 'truespring[ansys]'")
     n_sets, is_mode = _header(file)
     with tempfile.TemporaryDirectory() as name:
         _run(file, Path(name), n_sets, reading)
@@ -76,22 +76,20 @@ def _header(file: Path) -> tuple[int, bool]:
     if len(words) < 3 or words[0] != 100 or words[2] != _RESULTS:
         raise ReferenceFileError(f"{file} is no .rst file of Ansys: its first words are not 100 and 12")
     if len(words) < _WORDS:
-        raise ReferenceFileError(f"{file} is cut off in its header: {_AGAIN}")
+        raise ReferenceFileError(f"{file} is truncated in its header: {_AGAIN}")
     length, size = int(words[_LENGTH]), file.stat().st_size
     head = np.where(
         np.arange(_WORDS - _HEAD) < length, words[_HEAD:_WORDS], 0
     )  # words missing in an older header are 0
     end = int(head[_LONG_END] % 2**32 + (head[_LONG_END + 1] << 32)) or int(head[_END])
     if 4 * end > size:
-        raise ReferenceFileError(
-            f"{file} is cut off: its header announces {4 * end:,} bytes, it has {size:,}: {_AGAIN}"
-        )
+        raise ReferenceFileError(f"{file} is truncated: its header states {4 * end:,} bytes, it has {size:,}: {_AGAIN}")
     pointers = head[_POINTERS] % 2**32 + (head[list(_HIGH)] << 32)
     n_sets = int(head[_N_SETS])
     if not 0 <= n_sets <= head[_MOST_SETS] <= size or (pointers < 0).any() or (pointers >= end).any():
         raise ReferenceFileError(f"{file} is damaged in its header: {_AGAIN}")
     if not n_sets:
-        raise ReferenceFileError(f"{file} holds no result set: was it solved?")
+        raise ReferenceFileError(f"{file} has no result set: was it solved?")
     return n_sets, int(head[_KIND]) in _MODES
 
 
@@ -101,7 +99,7 @@ def _run(file: Path, folder: Path, n_sets: int, reading: Reading | None) -> None
 
     size = file.stat().st_size
     patience, memory = _PATIENCE + _SLOWEST * size, _MEMORY + _MEMORY_PER_BYTE * size
-    with (folder / "said.txt").open("wb") as said:
+    with (folder / "log.txt").open("wb") as said:
         command = [sys.executable, "-P", "-c", _CHILD, str(file.resolve()), str(folder)]
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
     try:
@@ -120,16 +118,16 @@ def _run(file: Path, folder: Path, n_sets: int, reading: Reading | None) -> None
             except psutil.Error:
                 continue  # it has just ended
             if used > memory:
-                raise ReferenceFileError(f"{file} is damaged: reading it took {used >> 20} MiB: {_AGAIN}")
+                raise ReferenceFileError(f"{file} is damaged: reading it needed {used >> 20} MiB: {_AGAIN}")
     finally:
         process.kill()
         process.wait()
-    if (folder / "refused.txt").exists():
-        raise ReferenceFileError(f"{file}: {(folder / 'refused.txt').read_text(encoding='utf-8')}")
+    if (folder / "error.txt").exists():
+        raise ReferenceFileError(f"{file}: {(folder / 'error.txt').read_text(encoding='utf-8')}")
     if process.returncode:
-        lines = (folder / "said.txt").read_text(encoding="utf-8", errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "its reader was ended")
-        raise ReferenceFileError(f"{file} is damaged, or of a kind that is not read ({last[:200]}): {_AGAIN}")
+        lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "its reader was terminated")
+        raise ReferenceFileError(f"{file} is damaged or not supported ({last[:200]}): {_AGAIN}")
     if reading:
         reading(1.0)
 
@@ -150,7 +148,7 @@ def _record(file: Path, folder: Path, is_mode: bool) -> Record:
     if n_empty:
         notes += (f"{n_empty} elements of types without volume were left out",)
     if n_lost:
-        notes += (f"{n_lost} cells lack some of the nodes between their corners: they are taken by their corners",)
+        notes += (f"{n_lost} cells lack some of their mid-edge nodes and are reduced to their corners",)
     placed = {name: row[nodes] for name, nodes in cells.items()}
     return Record(file, "rst", points[own], placed, kept, tuple(map(str, numbers[own].tolist())), notes)
 
@@ -159,13 +157,13 @@ def _record(file: Path, folder: Path, is_mode: bool) -> Record:
 
 
 def unpack(file: str, folder: str) -> None:
-    """Read a file by the library; write its arrays to a folder: mesh.npz, set000000.npy, ..., or refused.txt."""
+    """Read a file by the library; write its arrays to a folder: mesh.npz, set000000.npy, ..., or error.txt."""
     from ansys.mapdl import reader
 
     result = reader.read_binary(file)
     why = _why_not(result)
     if why:
-        (Path(folder) / "refused.txt").write_text(why, encoding="utf-8")
+        (Path(folder) / "error.txt").write_text(why, encoding="utf-8")
         return
     grid = result.grid
     numbers = np.asarray(grid.point_data["ansys_node_num"], dtype=np.int64)
@@ -187,9 +185,9 @@ def _why_not(result: Any) -> str:
     if not hasattr(result, "nodal_solution"):
         return "this is no result file of Ansys"
     if result.n_sector > 1:
-        return "results of a sector of a cyclic body are not read: expand them in Ansys"
+        return "results of a sector of a cyclic body are not supported: expand them in Ansys"
     if not {"UX", "UY", "UZ"} & set(result.result_dof(0)):
-        return f"it holds {', '.join(result.result_dof(0))}, no displacement"
+        return f"it has {', '.join(result.result_dof(0))}, no displacement"
     return ""
 
 

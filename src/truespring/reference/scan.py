@@ -63,15 +63,15 @@ class Scan:
         while line := self.line():
             if line.startswith(mark):
                 return
-        self.refuse(f"the file is cut off: '{mark.decode().strip()}' is expected at the end of a block")
+        self.refuse(f"the file is truncated: '{mark.decode().strip()}' is expected at the end of a block")
 
     def values(self, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
-        """Return the next binary values, shape (count,)."""
+        """Return the next binary values, shape (count,), in the file's unit."""
         self._is_binary = True
         data = self._stream.read(dtype.itemsize * count)
         self._tell()
         if len(data) < dtype.itemsize * count:
-            self.refuse(f"the file is cut off: {dtype.itemsize * count} bytes are expected, {len(data)} were found")
+            self.refuse(f"the file is truncated: {dtype.itemsize * count} bytes are expected, {len(data)} were found")
         return np.frombuffer(data, dtype)
 
     def is_at(self, *beginnings: bytes) -> bool:
@@ -110,7 +110,7 @@ class Scan:
         wrong = ~_BLANK[table[:, end:]].all(axis=1) | (table == 0).any(axis=1)
         if table.shape[1] < end or wrong.any():
             place = int(wrong.argmax())
-            self.refuse(f"{self.shown(lines[place])} is no row of this block", first + place)
+            self.refuse(f"{self.shown(lines[place])} is not a row of this block", first + place)
         found = []
         for count, width, kind in blocks:
             fields = np.ascontiguousarray(table[:, begins : begins + count * width]).view(f"S{width}")
@@ -139,10 +139,10 @@ class Scan:
             found = _WRITTEN.findall(text)
             number = line[begins : begins + id_width].strip()
             if not line.endswith(b"\n"):
-                self.refuse(f"{self.shown(line)} has no line end: the file is cut off", first + place)
+                self.refuse(f"{self.shown(line)} has no line end: the file is truncated", first + place)
             if not number.isdigit() or len(found) != count or b"".join(found) != text:
                 self.refuse(
-                    f"{self.shown(line)} is no row of this block: a node and {count} numbers are expected, with "
+                    f"{self.shown(line)} is not a row of this block: expected a node and {count} numbers, with "
                     "exponents of two or three digits; write the results again, in CalculiX also by *NODE OUTPUT",
                     first + place,
                 )
@@ -153,7 +153,7 @@ class Scan:
         for place, line in enumerate(lines):
             if len(line) != len(lines[0]):
                 why = f"{self.shown(line)} is shorter or longer than the row before"
-                self.refuse(why + ("" if line.endswith(b"\n") else ": the file is cut off"), first + place)
+                self.refuse(why + ("" if line.endswith(b"\n") else ": the file is truncated"), first + place)
 
     def _converted(self, fields: NDArray[Any], kind: str, first: int) -> NDArray[Any]:
         try:
@@ -164,7 +164,7 @@ class Scan:
         for (row, column), field in np.ndenumerate(fields):
             number = _number(field, kind)
             if number is None:
-                self.refuse(f"{self.shown(field)} is no number", first + row)
+                self.refuse(f"{self.shown(field)} is not a number", first + row)
             numbers[row, column] = number
         return numbers
 

@@ -13,15 +13,15 @@ from truespring.mesh.joining import distinct_points
 from truespring.mesh.selections import AXES
 from truespring.opening import read_file
 from truespring.problem import Problem
-from truespring.reference.placing import Placing, told_state, unproven
+from truespring.reference.placing import Placing, known_state, unproven
 
-# All shares of a body's diameter.
+# Fractions of a body's diameter.
 _SAME_POINT = 1e-6  # vertices this near are one point: text files carry six digits or more
 _FLAT = 1e-6  # a body this thin lies in a plane
-_OUTSIDE = 1e-3  # a node this far off the undeformed body still belongs to it: chords of a curved side
+_OUTSIDE = 1e-3  # a node this far from the undeformed body still belongs to it: chords of a curved side
 _SAME_BODY = 1e-2  # boxes that differ by more are of different bodies
 
-# No load makes a body so much larger or smaller: a unit is wrong (1 inch, 1 cm or 1 mm taken for 1 m, or back).
+# No load changes the size of a body this much: a unit is wrong (inch, cm or mm read as m, or the reverse).
 _WRONG_UNIT = 10.0
 
 _EXPORT_AGAIN = "export the body again as STL, ASCII or binary"
@@ -38,7 +38,7 @@ def read_stl(
 ) -> Solution:
     """Read the deformed body of `problem` from an STL file, ASCII or binary.
 
-    The body lies in a plane of constant z, or is a solid that is thin along z, of which the upper face is taken.
+    The body lies in a plane of constant z, or is a solid that is thin along z, of which the upper face is used.
 
     Args:
         problem: the problem that the other program solved, possibly on another mesh.
@@ -55,7 +55,7 @@ def read_stl(
     file = Path(file)
     mesh = problem.mesh
     if mesh.dim != 2 or mesh.kind.dim != 2:
-        raise ReferenceFileError(f"{file}: an STL file is compared with a plane body of elements, not with this mesh")
+        raise ReferenceFileError(f"{file}: an STL file can be compared with a plane body of elements only")
     try:
         placing = Placing(unit, axes, shift, load_factor)
     except ReferenceFileError as error:
@@ -84,10 +84,10 @@ def read_stl(
     )
 
 
-def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution:
+def read_shell(file: Path, placing: Placing, problem: Problem | None) -> Solution:
     """Read a deformed surface in space from an STL file, ASCII or binary.
 
-    Returns a solution of kind "stl" with a shell and no states, for the problem `beside`, or without one for a mesh of
+    Returns a solution of kind "stl" with a shell and no states, for the given problem, or without one for a mesh of
     the edges. Raises ReferenceFileError if the file cannot be read.
     """
     facets = read_facets(file, placing)
@@ -95,7 +95,9 @@ def read_shell(file: Path, placing: Placing, beside: Problem | None) -> Solution
     points, triangles = facets.reshape(-1, 3)[first], numbers.reshape(-1, 3)
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)]
-    problem = Problem(corner_mesh(Grid(points, {"triangle": triangles}))[0], stated=False) if beside is None else beside
+    problem = (
+        Problem(corner_mesh(Grid(points, {"triangle": triangles}))[0], stated=False) if problem is None else problem
+    )
     factor = 1.0 if placing.load_factor is None else placing.load_factor
     return Solution(
         problem=problem,
@@ -133,7 +135,7 @@ def read_facets(file: Path, placing: Placing) -> Floats:
 
 def _bytes(file: Path) -> bytes:
     if file.is_dir():
-        raise ReferenceFileError(f"{file} is a folder: give the STL file itself")
+        raise ReferenceFileError(f"{file} is a folder: use the STL file in it")
     data = read_file(file, ReferenceFileError)
     if not data.strip():
         raise ReferenceFileError(f"{file} is empty: {_EXPORT_AGAIN}")
@@ -151,14 +153,14 @@ def _face(facets: Floats, file: Path) -> Bools:
     if size[2] > 1.01 * size[thin]:
         raise ReferenceFileError(
             f"{file}: the body measures {_box(size)} m and is thinnest along {AXES[thin]}, the problem lies in x "
-            "and y: export the body turned so that z is its thickness, or only its face of constant z"
+            "and y: export the body rotated so that z is its thickness, or only its face of constant z"
         )
     normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
     if size[2] <= _FLAT * np.linalg.norm(size):
         upwards = normals[:, 2] > 0
         two_sided = abs(normals[:, 2].sum()) < 1e-3 * np.abs(normals[:, 2]).sum()  # a shell with both its sides
         return np.asarray(upwards if two_sided else np.ones(len(facets), dtype=bool))
-    lies = np.abs(normals[:, 2]) > 0.5 * np.linalg.norm(normals, axis=1)  # whichever way the facets turn
+    lies = np.abs(normals[:, 2]) > 0.5 * np.linalg.norm(normals, axis=1)  # in either orientation of the facets
     above = facets[:, :, 2].mean(axis=1) > (lower[2] + upper[2]) / 2
     _refuse_no_solid(facets, lies & above, lies & ~above, file)
     return np.asarray(lies & above)
@@ -192,7 +194,9 @@ def _matched(
             "or leave undeformed out"
         )
     if np.array_equal(rest, deformed):
-        raise ReferenceFileError(f"{file} and {rest_file} hold the same shape: export one with, one without the load")
+        raise ReferenceFileError(
+            f"{file} and {rest_file} have the same shape: export one with and one without the load"
+        )
     face = _face(rest, rest_file)
     before, after = rest[face, :, :2].reshape(-1, 2), deformed[face, :, :2].reshape(-1, 2)
     first, numbers = distinct_vertices(before)
@@ -200,9 +204,9 @@ def _matched(
     worst = int(spread.argmax())
     if spread[worst] > 10 * _SAME_POINT * np.linalg.norm(np.ptp(after, axis=0)):
         raise ReferenceFileError(
-            f"the vertex of {rest_file} at {_box(before[worst])} m goes to two places in {file}, "
+            f"the vertex of {rest_file} at {_box(before[worst])} m moves to two positions in {file}, "
             f"{_box(after[worst])} and {_box(after[first][numbers][worst])} m: the files list their facets in "
-            "different orders; export both in one order, or leave undeformed out"
+            "different orders; export both in the same order, or leave undeformed out"
         )
     triangles = numbers.reshape(-1, 3)
     return (
@@ -212,7 +216,10 @@ def _matched(
 
 
 def distinct_vertices(places: Floats) -> tuple[Ints, Ints]:
-    """Number distinct places, nearly equal ones as one; return the first row of each, and the number of each row."""
+    """Number distinct positions.
+
+    Return the first row of each, shape (n_distinct,), and the number of each row, (n,).
+    """
     return distinct_points(places, _SAME_POINT * float(np.linalg.norm(np.ptp(places, axis=0))))
 
 
@@ -245,7 +252,7 @@ def _state(problem: Problem, rest: Surface, surface: Surface, file: Path, unit: 
     displacement = (shares[:, :, None] * moved).sum(axis=1)
     level = surface.load_factor
     loads = problem.loading.force(mesh.nodes + displacement, level).sum(axis=0) if problem.stated else None
-    return told_state(mesh, mesh.nodes, displacement, level, applied_force=loads)
+    return known_state(mesh, mesh.nodes, displacement, level, applied_force=loads)
 
 
 def _unit_warnings(mesh: Mesh, surface: Surface, unit: str) -> list[str]:
@@ -263,8 +270,8 @@ def _state_warnings(problem: Problem, rest: Surface, state: State, file: Path) -
     if off.max() > _SAME_BODY * np.abs(state.displacement).max() + _SAME_POINT * mesh.diameter:
         node = int(off.max(axis=1).argmax())
         warnings.append(
-            f"node {node} at {_box(mesh.nodes[node])} m is held by a support, the files move it by "
-            f"{off.max():.4g} m against that: other supports, another load_factor, or facets in different orders"
+            f"node {node} at {_box(mesh.nodes[node])} m is held by a support, but moves in the files by "
+            f"{off.max():.4g} m in a held direction: check supports, load_factor and the order of the facets"
         )
     if state.area_ratio <= 0:
         warnings.append(

@@ -33,7 +33,7 @@ def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path |
     """
     if undeformed is None:
         raise ReferenceFileError(
-            f"{file}: a deformed STL file alone has no displacement: give the undeformed body, too (undeformed)"
+            f"{file}: a deformed STL file alone has no displacement: add the undeformed body (undeformed)"
         )
     for one in (file, undeformed):
         refuse_unreadable(one)
@@ -51,9 +51,9 @@ def read_stl_pair(file: Path, reading: Reading | None = None, undeformed: Path |
     worst = int(spread.argmax())
     if spread[worst] > _APART * np.linalg.norm(np.ptp(after, axis=0)):
         raise ReferenceFileError(
-            f"the vertex of {undeformed} at {before[worst].tolist()} goes to two places in {file}, "
+            f"the vertex of {undeformed} at {before[worst].tolist()} moves to two positions in {file}, "
             f"{after[worst].tolist()} and {after[first][numbers][worst].tolist()}: the files list their facets in "
-            "different orders; export both in one order"
+            "different orders; export both in the same order"
         )
     triangles = numbers.reshape(-1, 3)
     a, b, c = triangles.T

@@ -61,13 +61,13 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
     for time, members in itertools.groupby(parts, lambda part: part.time):
         files = [part.file for part in members]
         grid = one_grid([_grid(one) for one in files])
-        displacement, told = _displacement(grid, field, files[0])
+        displacement, remarks = _displacement(grid, field, files[0])
         cells = _cells(grid, files[0])
         record = Record(files[0], kind, grid.points, cells, (Level(time, displacement, _energy(grid)),))
         first = first or record
         _refuse_other_mesh(record, first)
         levels += record.levels
-        notes += [note for note in (*grid.notes, *told) if note not in notes]
+        notes += [note for note in (*grid.notes, *remarks) if note not in notes]
         n_read += len(files)
         if reading:
             reading(n_read / len(parts))
@@ -87,39 +87,41 @@ def _series(file: Path) -> tuple[list[_Part], list[str]]:
     try:
         root = root_of(read_file(file, ReferenceFileError))
     except MeshError as error:
-        raise ReferenceFileError(f"{file} is no .pvd file, or not a whole one: {error}") from None
+        raise ReferenceFileError(f"{file} is no .pvd file, or an incomplete one: {error}") from None
     entries = root.findall("Collection/DataSet")
     if not entries:
-        raise ReferenceFileError(f"{file} names no file: a VTKFile of type Collection with DataSets is expected")
+        raise ReferenceFileError(f"{file} refers to no file: expected a VTKFile of type Collection with DataSets")
     parts: list[_Part] = []
     known: set[tuple[float, str]] = set()
     for number, entry in enumerate(entries, 1):
-        told = f"{file}: DataSet {number}"
-        time = _time(entry.get("timestep", str(number)), told)
+        place = f"{file}: DataSet {number}"
+        time = _time(entry.get("timestep", str(number)), place)
         name = entry.get("file", "")
         if Path(name).suffix.lower() not in VTK_FORMATS:
-            raise ReferenceFileError(f"{told} names '{name[:80]}'; files that end in {', '.join(VTK_FORMATS)} are read")
-        one = file_beside(file.parent, name, ReferenceFileError, f"{told} ")
+            raise ReferenceFileError(
+                f"{place} refers to '{name[:80]}', which is not supported; supported: {', '.join(VTK_FORMATS)}"
+            )
+        one = file_beside(file.parent, name, ReferenceFileError, f"{place} ")
         part = entry.get("part", "0")
         if (time, part) in known:
             raise ReferenceFileError(
-                f"{file}: time {time:g} is there twice: merge the parts of the body into one grid, or give each "
+                f"{file}: time {time:g} is defined twice: merge the parts of the body into one grid, or give each "
                 "a different part (part=)"
             )
         known.add((time, part))
         parts.append(_Part(time, part, one))
     ordered = sorted(parts, key=lambda part: part.time)  # parts of one time keep their order
     is_other = [part.time for part in ordered] != [part.time for part in parts]
-    return ordered, [f"the times of {file.name} do not ascend: they were put in order"] if is_other else []
+    return ordered, [f"the times of {file.name} do not ascend and were sorted"] if is_other else []
 
 
-def _time(text: str, told: str) -> float:
+def _time(text: str, place: str) -> float:
     try:
         time = float(text)
     except ValueError:
         time = math.nan
     if not math.isfinite(time):
-        raise ReferenceFileError(f'{told} has timestep="{text[:40]}", which is no finite number')
+        raise ReferenceFileError(f'{place} has timestep="{text[:40]}", which is not a finite number')
     return time
 
 
@@ -141,13 +143,14 @@ def _cells(grid: Grid, file: Path) -> dict[str, Ints]:
     for name, nodes in cells.items():
         if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(grid.points):
             raise ReferenceFileError(
-                f"{file}: a {name} names points {nodes.min()} to {nodes.max()}, there are 0 to {len(grid.points) - 1}"
+                f"{file}: a {name} refers to points {nodes.min()} to {nodes.max()}, there are 0 to "
+                f"{len(grid.points) - 1}"
             )
     return cells
 
 
 def _displacement(grid: Grid, field: str | None, file: Path) -> tuple[Floats, list[str]]:
-    """Return the displacement in the file's unit, shape (n_points, 3), and a note if it was read by components."""
+    """Return the displacement in the file's unit, shape (n_points, 3), and a note if it was read from components."""
     vectors = {
         name: values for name, values in grid.point_arrays.items() if values.ndim == 2 and values.shape[1] in (2, 3)
     }
@@ -162,8 +165,8 @@ def _displacement(grid: Grid, field: str | None, file: Path) -> tuple[Floats, li
         raise ReferenceFileError(f"{file}: there is no vector '{field}'{nearest(field, vectors)}; {there}")
     known = [name for name in vectors if name.lower() in DISPLACEMENTS] if field is None else [field]
     if len(known) != 1:
-        which = f"{' and '.join(known)} may all be the displacement" if known else "none is called displacement"
-        raise ReferenceFileError(f"{file}: {there}, {which}: name the right one by field (--field)")
+        which = f"{' and '.join(known)} may all be the displacement" if known else "none has the name displacement"
+        raise ReferenceFileError(f"{file}: {there}, {which}: select one by field (--field)")
     displacement = np.zeros((len(grid.points), 3))
     displacement[:, : vectors[known[0]].shape[1]] = vectors[known[0]]
     return displacement, []
@@ -189,9 +192,9 @@ def _refuse_other_mesh(record: Record, first: Record) -> None:
         return
     if not np.array_equal(record.points, first.points):
         raise ReferenceFileError(
-            f"{record.file}: its points are not those of {first.file.name}: all files of a series must have one mesh, "
-            "at rest: save it before it is warped by the displacement"
+            f"{record.file}: its points differ from those of {first.file.name}: all files of a series must have one "
+            "undeformed mesh: save it before it is warped by the displacement"
         )
     same = record.cells.keys() == first.cells.keys()
     if not same or any(not np.array_equal(nodes, first.cells[name]) for name, nodes in record.cells.items()):
-        raise ReferenceFileError(f"{record.file}: its cells are not those of {first.file.name}")
+        raise ReferenceFileError(f"{record.file}: its cells differ from those of {first.file.name}")

@@ -18,7 +18,7 @@ VTK_NAMES: Mapping[int, str] = {
 }
 #: VTK types of vertices.
 VTK_POINTS = (1, 2)
-#: VTK type of no cell: Ansys' reader assigns it to elements without volume, such as contact elements.
+#: VTK type of no cell: the reader of Ansys files assigns it to elements without volume, such as contact elements.
 VTK_EMPTY = 0
 
 _CORNERS = {name: len(shape.corners) for name, shape in CELL_SHAPES.items() if name == shape.base}
@@ -29,7 +29,10 @@ _NAMES = {(_KINDS[shape.base], len(shape.places)): name for name, shape in CELL_
 
 
 def named(blocks: Iterable[Cells], file: Path) -> dict[str, Ints]:
-    """Return the nodes of cells by key of CELL_SHAPES, without vertices; raise if a kind is not supported."""
+    """Return the nodes of cells by key of CELL_SHAPES, shape (n, k), without vertices.
+
+    Raise if a kind is not supported.
+    """
     found: dict[str, list[Ints]] = {}
     for block in blocks:
         if block.kind == "vertex":
@@ -37,7 +40,8 @@ def named(blocks: Iterable[Cells], file: Path) -> dict[str, Ints]:
         name = _NAMES.get((block.kind, block.nodes.shape[1]))
         if name is None:
             raise ReferenceFileError(
-                f"{file}: a {block.kind} of {block.nodes.shape[1]} nodes is not read; {', '.join(_NAMES.values())} are"
+                f"{file}: a {block.kind} of {block.nodes.shape[1]} nodes is not supported; supported: "
+                f"{', '.join(_NAMES.values())}"
             )
         found.setdefault(name, []).append(block.nodes)
     return {name: np.concatenate(nodes) for name, nodes in found.items()}
@@ -48,7 +52,8 @@ def refuse_unknown(types: Ints, file: Path) -> None:
     for number in np.unique(types).tolist():
         if number not in VTK_NAMES and number not in VTK_POINTS:
             raise ReferenceFileError(
-                f"{file}: cells of VTK's type {number} are not read; {', '.join(dict.fromkeys(VTK_NAMES.values()))} are"
+                f"{file}: cells of VTK's type {number} are not supported; supported: "
+                f"{', '.join(dict.fromkeys(VTK_NAMES.values()))}"
             )
 
 
@@ -74,7 +79,7 @@ def sized(types: Ints, offsets: Ints, connectivity: Ints, is_made: Bools, file: 
         nodes = connectivity[offsets[members, None] + np.arange(size)]
         name = base if size == _CORNERS[base] else f"{base}{size}"
         if name not in VTK_NAMES.values():
-            raise ReferenceFileError(f"{file}: a {base} of {size} nodes is not read")
+            raise ReferenceFileError(f"{file}: a {base} of {size} nodes is not supported")
         lost = np.asarray(is_made[nodes].any(axis=1))
         n_lost += int(lost.sum())
         found.setdefault(name, []).append(nodes[~lost])

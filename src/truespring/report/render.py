@@ -169,7 +169,7 @@ def read_job(file: Path) -> list[Shot]:
 
 
 def rgb(color: str) -> Floats:
-    """Return red, green and blue, 0 ... 1, of a colour #rrggbb, shape (3,)."""
+    """Return red, green and blue [-], 0 to 1, of a colour #rrggbb, shape (3,)."""
     return np.array([int(color[start : start + 2], 16) for start in (1, 3, 5)]) / 255
 
 

@@ -22,7 +22,7 @@ _MOST_SPRINGS = 20_000
 
 
 def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
-    """Return the nodes that a view of the paths `shown` draws: of the surface, of lines, the probe; ascending, (n,)."""
+    """Return the nodes that a view of the paths `shown` draws, ascending, shape (n,): surface, lines, probe."""
     kept = np.zeros(result.problem.mesh.n_nodes, dtype=bool)
     kept[facets_of(result.problem.mesh)] = True
     kept[result.probe] = True

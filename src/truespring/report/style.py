@@ -48,7 +48,7 @@ def figure_style() -> Iterator[None]:
 
 
 def error_colors(shares: Floats) -> Floats:
-    """Return the colours of distances, shares 0 ... 1 of the largest: red, green, blue, shape (..., 3)."""
+    """Return the colours of distances, shares 0 ... 1 of the largest: red, green, blue [-], shape (..., 3)."""
     import matplotlib
 
     light, dark = _ERROR_RANGE

@@ -32,6 +32,8 @@ def _model(path: Solution, probe: int) -> dict[str, Any]:
     values = {
         "kind": path.kind,
         "label": path.label,
+        "has_springs": path.has_springs,
+        "lines": path.lines,
         "status": str(path.status),
         "load_factor": path.load_factor,
         "newton_iterations": path.newton_iterations,

@@ -74,7 +74,7 @@ def rims(facets: Ints) -> Ints:
 
 
 def outline(points: Floats, facets: Ints, silhouette: bool = False) -> Ints:
-    """Return the sharp edges of a surface, with `silhouette` also those between visible and hidden facets, (n, 2)."""
+    """Return the sharp edges of a surface, shape (n, 2); with `silhouette` also its edges against hidden facets."""
     edges = edges_of(facets)
     if not len(edges):
         return edges

@@ -20,7 +20,7 @@ View = Callable[[Floats], Floats]
 
 
 def plane_view(points: Floats) -> Floats:
-    """Return the points of a plane body unchanged."""
+    """Return the points of a plane body [m], shape (n, 2), unchanged."""
     return points
 
 

@@ -302,7 +302,10 @@ class Watch:
 def stepped(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
 ) -> Floats | None:
-    """Return the solution of tangent x = right, shape (n_nodes, dim); None if the tangent is not positive definite."""
+    """Return the solution of tangent x = right [m], shape (n_nodes, dim).
+
+    None if the tangent is not positive definite.
+    """
     if not np.isfinite(tangent.data.sum()):
         return None
     try:

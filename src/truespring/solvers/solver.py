@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from inspect import isclass, signature
 from typing import Any
 
 from truespring.arrays import Floats, Ints
@@ -10,6 +11,9 @@ from truespring.conditions import Loading
 from truespring.errors import ProblemError
 from truespring.potential import Potential
 from truespring.solvers.balance import Equilibrium, Reporter
+
+# The arguments of `follow`, in order.
+_FOLLOW = "potential, loading, report, geometry"
 
 
 def _admits_all(positions: Floats) -> bool:
@@ -81,10 +85,39 @@ class Solver:
 
 
 def as_solver(given: Any) -> Solver:
-    """Return a solver, or any object with a method `follow`, as a Solver; raise ProblemError for other objects."""
+    """Return a solver, or any object with a method `follow`, as a Solver.
+
+    Raises ProblemError for other objects, and if `follow` does not take the four arguments of `Solver.follow`.
+    """
     if not callable(getattr(given, "follow", None)):
         raise ProblemError(
             f"{given!r} is not a solver; allowed: Newton(), DisplacementControl(...), ArcLength(...) or an object with "
-            "a method follow(potential, loading, report, geometry)"
+            f"a method follow({_FOLLOW})"
         )
+    if isclass(given):
+        raise ProblemError(f"{given.__name__} is a class, not a solver: pass an object, such as {given.__name__}(...)")
+    if not isinstance(given, Solver):
+        _check_follow(given)
     return completed(given, Solver)
+
+
+def _check_follow(given: Any) -> None:
+    """Raise ProblemError if `given.follow` does not take the arguments of `Solver.follow`, by position."""
+    try:
+        arguments = signature(given.follow)
+    except ValueError:  # a compiled function may have none
+        return
+    expected = _FOLLOW.split(", ")
+    misplaced = [
+        name for name, right in zip(arguments.parameters, expected, strict=False) if name in {*expected} - {right}
+    ]
+    try:
+        arguments.bind(*expected)
+        reason = f"'{misplaced[0]}' is at another place" if misplaced else ""
+    except TypeError as error:
+        reason = str(error)
+    if reason:
+        raise ProblemError(
+            f"{type(given).__name__} has follow{arguments}: {reason}; define follow(self, {_FOLLOW}), which is called "
+            "with four positional arguments"
+        )

@@ -2,30 +2,22 @@
 
 import math
 import tempfile
-import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from truespring.errors import TruespringError
-from truespring.outputs import Lock, Output
-from truespring.report.drawing import Figures, sheets
-from truespring.report.rows import table_of
+from truespring.outputs import Lock
 from truespring.report.summary import summary
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
-from truespring.sweeping.figures import sweep_figures
 from truespring.sweeping.plan import Plan, Point, digests, make_plan
 from truespring.sweeping.pool import Failure, Note, Pool, require_dask
+from truespring.sweeping.result import Sweep, write_sweep
 from truespring.sweeping.store import CONVERGED, FAILED, Store
-from truespring.sweeping.table import rows_of, write_table
 from truespring.sweeping.values import make_changes, read_points
-
-if TYPE_CHECKING:
-    import polars
 
 #: Called with the number of finished points, of failed ones, and of all.
 Progress = Callable[[int, int, int], None]
@@ -33,69 +25,6 @@ Progress = Callable[[int, int, int], None]
 
 # A worker is killed after twice the time limit of all models of a point, plus this [s].
 _GRACE = 30.0
-
-
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """The results of a sweep.
-
-    Attributes:
-        plan: the study and its points.
-        records: of each point, by name, in the order of the plan.
-        n_before: number of points solved by earlier runs.
-        notes: messages on duplicate points and existing records.
-    """
-
-    plan: Plan
-    records: Mapping[str, Mapping[str, Any]]
-    n_before: int
-    notes: tuple[str, ...]
-
-    @cached_property
-    def rows(self) -> list[dict[str, Any]]:
-        """One row per point, sorted by the varied values."""
-        return rows_of(self.plan.keys, self.records.values())
-
-    @property
-    def n_failed(self) -> int:
-        """Number of points without a complete result."""
-        return sum(record["status"] == FAILED for record in self.records.values())
-
-    @property
-    def converged(self) -> bool:
-        """Whether every model of every point reached full load through stable equilibria."""
-        return not self.n_failed
-
-    def table(self) -> "polars.DataFrame":
-        """Return `rows` as a table of polars."""
-        return table_of(self.rows)
-
-    def figures(self) -> Figures:
-        """Return the figures by the stem of their files; `png()` and `svg()` return the bytes of a file."""
-        drawn = sweep_figures(self.plan.keys, self.rows)
-        return sheets((f"sweep_{number}", sheet) for number, sheet in enumerate(drawn, 1))
-
-    def write(self, out: str | Path, command: str | None = None) -> dict[str, Path]:
-        """Write sweep.csv, sweep.parquet and report.html into `out`; return the paths by file name.
-
-        `command` is the command line that repeats the run, for the report.
-        """
-        folder = write_sweep(self, Path(out), command).parent
-        return {name: folder / name for name in ("sweep.csv", "sweep.parquet", "report.html")}
-
-    def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the table, which `ts.sweep` returned in 0.1, with a DeprecationWarning."""
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return getattr(self._as_table(f".{name}"), name)
-
-    def __getitem__(self, key: Any) -> Any:
-        return self._as_table(f"[{key!r}]")[key]
-
-    def _as_table(self, access: str) -> "polars.DataFrame":
-        text = f"ts.sweep(...){access} is deprecated, use ts.sweep(...).table(){access}"
-        warnings.warn(text, DeprecationWarning, stacklevel=3)
-        return self.table()
 
 
 def sweep(
@@ -288,18 +217,3 @@ def _notes(plan: Plan, found: Mapping[str, Mapping[str, Any]], records: Mapping[
 def _is_of(record: Mapping[str, Any], plan: Plan) -> bool:
     """Return whether a record has the varied keys of a plan."""
     return set(record["values"]) == set(plan.keys)
-
-
-def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:
-    """Write sweep.csv, sweep.parquet and report.html; return the first.
-
-    `command` is the command line that repeats the run, for the report.
-    """
-    from truespring.sweeping.page import render_sweep
-
-    page = render_sweep(done.plan.text.file, done.plan.text.document.get("title"), done.plan.keys, done.rows, command)
-    with Output(out, "sweep.csv") as output:
-        write_table(done.rows, output.staging)
-        (output.staging / "report.html").write_text(page, encoding="utf-8")
-        output.publish()
-    return out / "sweep.csv"

@@ -62,7 +62,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     Entry("FEM", "squares, cubes; neo-Hookean", lambda d, nu: Fem("neo-hookean", "linear")),
     Entry("FEM", "squares, cubes; linear", lambda d, nu: Fem("linear", "linear")),
-    Entry("Terzopoulos", "his boundary", lambda d, nu: Terzopoulos("paper"), chief=True),
+    Entry("Terzopoulos", "boundary of the paper", lambda d, nu: Terzopoulos("paper"), chief=True),
     Entry("Terzopoulos", "trapezoidal boundary", lambda d, nu: Terzopoulos("trapezoid")),
     Entry("MSM", "Lloyd; least squares on cubes", lambda d, nu: _lloyd(d), chief=True),
     Entry("MSM", "isotropic", lambda d, nu: Springs(rule="isotropic")),
@@ -73,7 +73,7 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("BEM + MSM", "isotropic springs", lambda d, nu: BemSprings(block=_half(d), rule="isotropic"), chief=True),
     Entry(
         "BEM + MSM",
-        "isotropic springs, block that turns",
+        "isotropic springs, corotated block",
         lambda d, nu: BemSprings(block=_half(d), rule="isotropic", corotated=True),
         dims=(2,),
     ),

@@ -107,9 +107,9 @@ def _moduli_error(entry: Entry, dim: int, ratio: float) -> float:
     assert section is not None
     lam, mu = section.lame_within(lame)
     n_normal = dim
-    wanted = 2 * mu * np.eye(len(found))
-    wanted[:n_normal, :n_normal] += lam
-    return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+    exact = 2 * mu * np.eye(len(found))
+    exact[:n_normal, :n_normal] += lam
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
 def _block(entry: Entry, dim: int, ratio: float) -> Problem:
@@ -144,12 +144,12 @@ def _small(entry: Entry, size: Size) -> tuple[float | None, float, float]:
     """Return the root-mean-square error at the small load [-], that of the end [-], and the time of the solve [ms]."""
     problem = cantilever(size, entry.element(size.dim), SMALL)
     path = solve(problem, entry.model(size.dim, POISSON[size.dim]), Newton(load_steps=1))
-    wanted = reference(size.dim, large=False)
+    known = reference(size.dim, large=False)
     if path.status is not Status.CONVERGED:
         return None, np.inf, np.inf
-    found, given = (end_displacement(one, one.states[-1]) for one in (path, wanted))
+    found, given = (end_displacement(one, one.states[-1]) for one in (path, known))
     error = float(np.linalg.norm(found - given) / np.linalg.norm(given))
-    return compare(path, wanted).rms_error, error, 1e3 * path.seconds
+    return compare(path, known).rms_error, error, 1e3 * path.seconds
 
 
 def to_one_percent(entry: Entry, dim: int = 2) -> dict[str, float | int | None]:

@@ -47,7 +47,10 @@ def _of_dim(rows: list[Row], dim: int, figure: str) -> Iterator[str]:
     yield f"![Four measures of each method]({figure})"
     yield ""
     chief = {row["method"]: row for row in rows if row["dim"] == dim and row["chief"]}
-    yield "Printed and measured sign, separated by a colon, for the entries in bold below. Differences are in bold."
+    yield (
+        "Each cell has the printed and the measured sign of the entry in bold below, as printed : measured. "
+        "Differences are in bold."
+    )
     yield ""
     yield "| | " + " | ".join(METHODS) + " |"
     yield "|---" * (1 + len(METHODS)) + "|"
@@ -101,7 +104,7 @@ def _time(row: Row) -> str:
     if row.get("solve_ms") is None:
         return "no stable state"
     steps = f", {row['load_steps']} steps" if row["load_steps"] != 1 else ""
-    setup = f" ({_number(row['setup_ms'], 2)} of it set up)" if row["setup_ms"] > 0.2 * row["solve_ms"] else ""
+    setup = f" ({_number(row['setup_ms'], 2)} for the setup)" if row["setup_ms"] > 0.2 * row["solve_ms"] else ""
     return f"{_number(row['solve_ms'], 2)}{steps}{setup}"
 
 
@@ -143,17 +146,17 @@ def _definitions(table: Mapping[str, Any]) -> Iterator[str]:
     yield "* solve: time from the mesh to the equilibrium at a deflection of half the length, best of three."
     yield "* force: time of one evaluation of the internal force there."
     yield (
-        "* 1 % from: the coarsest mesh from which on the error of the end displacement at small load is below 1 %, up "
-        "to 32 elements deep, and the time of its solve."
+        "* 1 % from: the coarsest mesh such that it and all finer ones, up to 32 elements deep, have an error of the "
+        "end displacement below 1 % at small load, and the time of its solve."
     )
     yield (
         "* error of moduli: relative difference between the elasticity matrix for uniform strains and that of the "
         "material, in the Frobenius norm."
     )
-    yield "* small load, fine mesh: root-mean-square nodal error at a deflection of 0.0067 of the length."
+    yield "* small load, fine mesh: root-mean-square nodal error there at a deflection of 0.0067 of the length."
     yield (
-        "* within 5 % up to: the largest deflection up to which the end is within 5 % of neo-Hookean FEM, with all "
-        "states stable."
+        "* within 5 % up to: the largest deflection, through stable states only, up to which the displacement of the "
+        "end differs from neo-Hookean FEM by at most 5 %."
     )
     yield ""
     yield "Signs:"

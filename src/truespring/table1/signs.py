@@ -21,8 +21,8 @@ MEANING = {
         "neither"
     ),
     "large deflection": (
-        "+ if the end is within 5 % of converged neo-Hookean FEM up to a deflection of half the length, - if not up to "
-        "a fifth"
+        "+ if the end is within 5 % of converged neo-Hookean FEM up to a deflection of half the length, - if not even "
+        "to a fifth"
     ),
 }
 
@@ -113,23 +113,23 @@ IF = {
     ),
     ("results accuracy", "BEM + MSM"): ("if the springs were few compared with the boundary elements."),
     ("results accuracy", "mass-tensor"): (
-        "to finer meshes: triangles and tetrahedra of first order are too stiff in bending."
+        "on finer meshes: triangles and tetrahedra of first order are too stiff in bending."
     ),
     ("large deflection", "FEM"): (
         "to a law that resists compression: the solution ends with St. Venant-Kirchhoff, but not with neo-Hookean."
     ),
     ("large deflection", "Terzopoulos"): ("if it were linear. The metric tensor is not, it follows any rotation."),
     ("large deflection", "MSM"): (
-        "to squares three or four deep, where the bending stiffness of Lloyd's springs is accurate. On finer meshes "
-        "and on cubes their error is above 5 % at any load; that of the isotropic rule in 2D is not."
+        "on meshes of squares three or four deep, where the bending stiffness of Lloyd's springs is accurate. On "
+        "finer meshes and on cubes their error is above 5 % at any load; that of the isotropic rule in 2D is not."
     ),
     ("large deflection", "HEML"): (
-        "to a limit above half the length: with the St. Venant-Kirchhoff law the solution ends between half the length "
-        "and the whole, as that of finite elements does."
+        "if the limit were above half the length: with the St. Venant-Kirchhoff law, stable solutions end at a "
+        "deflection between half and all of the length, as do those of finite elements."
     ),
     ("large deflection", "BEM + MSM"): (
-        "to a slightly higher limit: with a block that cannot rotate, the error is 5 % at about a quarter of the "
-        "length. A corotated block follows large rotations."
+        "if the limit were slightly higher: with a block that cannot rotate, the error is 5 % at about a quarter of "
+        "the length. A corotated block follows large rotations."
     ),
     ("large deflection", "mass-tensor"): ("to its linear form."),
 }

@@ -114,7 +114,7 @@ def axis_of(name: str, body: Body, ranges: Mapping[str, Range]) -> Axis:
 
 
 def sizes_to(last: float) -> Floats:
-    """Return the sizes of a load at which errors are evaluated, from 0 to `last`, shape (n,)."""
+    """Return the sizes of a load, shape (n,), at which errors are evaluated: from 0 to `last`, in its unit."""
     return np.linspace(0.0, last, _SIZES + 1)
 
 

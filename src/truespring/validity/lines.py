@@ -18,7 +18,7 @@ def polylines(one: Map) -> dict[float, list[Floats]]:
 
 
 def contours(x: Floats, y: Floats, errors: Floats) -> dict[float, list[Floats]]:
-    """Return the lines of errors, shape (n_y, n_x), by error, each a list of polylines, shape (n, 2)."""
+    """Return the lines of errors [-], shape (n_y, n_x), by error: polylines in axis units, shape (n, 2)."""
     from contourpy import contour_generator
 
     made = contour_generator(x, y, np.ma.masked_invalid(errors))

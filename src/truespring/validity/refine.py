@@ -79,7 +79,7 @@ def _between(solved: Ints, values: Values, row: float) -> Values:
 
 
 def crossings(errors: Floats, line: float) -> Floats:
-    """Return where errors, shape (n,), cross a line, as shares of their range, ascending."""
+    """Return where errors, shape (n,), cross a line: ascending fractions of their range [-], shape (n_crossings,)."""
     place = np.arange(len(errors)) / max(len(errors) - 1, 1)
     apart = errors - line
     left, right = apart[:-1], apart[1:]
@@ -152,7 +152,7 @@ class Cells:
         return int(np.searchsorted(LINES, error)) if np.isfinite(error) else -1
 
     def filled(self) -> Floats:
-        """Return the errors of all points, shape (n_y, n_x), interpolated from the corners of their cells."""
+        """Return the errors of all points [-], shape (n_y, n_x), interpolated from the corners of their cells."""
         errors = np.full(self.shape[::-1], np.nan + 0j)
         for left, right, low, high in self._cells:
             x = np.linspace(0, 1, right - left + 1)[None] if right > left else np.zeros((1, 1))

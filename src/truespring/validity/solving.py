@@ -71,7 +71,7 @@ class Solved:
 
     @property
     def levels(self) -> Floats:
-        """The load level of each of `states`, shape (n_states,)."""
+        """The load level of each of `states` [-], shape (n_states,)."""
         levels = np.array([state.level for state in self.states], dtype=np.float64)
         levels[:1] *= SMALL
         return levels

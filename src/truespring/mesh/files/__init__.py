@@ -93,7 +93,7 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
         join: whether to merge coincident nodes; by default only if no two elements share a node.
 
     Returns the mesh, with its groups and notes; node positions in metres. Raises MeshError, with the file and the
-    line of a text file, if the file cannot be read, is damaged or truncated, or holds no body.
+    line of a text file, if the file cannot be read, is damaged or truncated, or contains no body.
     .inp and .vtk files have no end mark: one truncated between two lines may be read without an error; a .inp
     file then mostly has a note about unreferenced nodes.
     """
@@ -103,8 +103,8 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
     key = format_by_head(file.suffix, data, {suffix: form.recognises for suffix, form in FORMATS.items()})
     if key is None:
         raise MeshError(
-            f"{file}: a mesh file ends in {', '.join(FORMATS)}, not in '{file.suffix}', and what this one begins with "
-            f"is none of these formats: {foreign(data) or 'convert it, for example: meshio convert FILE NEW.vtu'}"
+            f"{file}: the suffix of a mesh file is {', '.join(FORMATS)}, not '{file.suffix}', and the content of this "
+            f"one has none of these formats: {foreign(data) or 'convert it, for example: meshio convert FILE NEW.vtu'}"
         )
     form = FORMATS[key]
     try:
@@ -113,7 +113,7 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
         other = "" if form.recognises(data) else foreign(data)
         if other:
             raise MeshError(f"{file}: this is no {key} file: {other}") from None
-        others = "" if form.recognises(data) else f"it does not begin like {listed_keys(FORMATS, key)} either"
+        others = "" if form.recognises(data) else f"its content does not match {listed_keys(FORMATS, key)} either"
         raise MeshError("; ".join(filter(None, [f"{file}: {error}", others, form.again]))) from None
     try:
         return replace(contents, notes=(*read_as(key, file.suffix), *contents.notes)).mesh(scale, join)

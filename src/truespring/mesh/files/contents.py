@@ -25,7 +25,7 @@ from truespring.mesh.middles import fitting_middles
 from truespring.mesh.rows import distinct_rows
 
 #: Dimension and corners of each kind of cell in files; every format names the corners first. Those without a
-#: fixed number of corners are here to be refused by name.
+#: fixed number of corners are listed so that error messages can name them.
 CELL_KINDS: dict[str, tuple[int, int]] = {
     "vertex": (0, 1),
     "line": (1, 2),
@@ -41,11 +41,11 @@ CELL_KINDS: dict[str, tuple[int, int]] = {
     "polyhedron": (3, 0),
 }
 
-_SUPPORTED = "a body is made of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
-_DIVIDE = "divide the others into these, as meshers do by an option and ParaView by its filter Tetrahedralize"
+_SUPPORTED = "a body consists of triangles and quadrilaterals, or of tetrahedra, hexahedra, wedges and pyramids"
+_DIVIDE = "divide other cells into these by an option of the mesher, or by ParaView's filter Tetrahedralize"
 
-_AGAIN = "write the file again with the program that made it, or mend it there"
-_MEND = "mend the mesh where it was made (in gmsh: Mesh.Optimize = 1), or leave such elements out"
+_AGAIN = "write the file again with the program that made it, or correct it there"
+_MEND = "correct the mesh in the program that made it (in gmsh: Mesh.Optimize = 1), or remove such elements"
 
 # Coordinates above this are taken as damaged, in any unit; their squares are finite.
 _FAR = 1e30
@@ -78,7 +78,7 @@ class Cells:
 
     @property
     def corners(self) -> Ints:
-        """The nodes at the corners; all nodes of a kind without a fixed number of corners."""
+        """The nodes at the corners, shape (n_cells, corners); all nodes of a kind without a fixed number of corners."""
         return self.nodes[:, : CELL_KINDS[self.kind][1] or None]
 
 
@@ -95,7 +95,8 @@ class Contents:
         facet_groups: facets by name: the number of a cell and the index of its facet in the `facets` of
             ELEMENT_KINDS, shape (n, 2).
         node_lines: line numbers of the nodes in a text file, shape (n,).
-        is_apart: whether the file defines contact between bodies: coincident nodes are joined only if `join` is true.
+        is_apart: whether the file defines contact between bodies: coincident nodes are then merged only if `join` is
+            true.
         notes: remarks about the file for the user.
         hint: if there is no body, how to make the program write one.
     """
@@ -225,7 +226,7 @@ class Contents:
         if n_after == n_before:
             return self
         number = self.node_numbers[first][place]  # of each node, the number of the node that replaces it
-        why = "were joined" if always else "were joined, because no two elements share a node"
+        why = "were joined" if always else "were merged, because no two elements share a node"
         return replace(
             self,
             node_numbers=self.node_numbers[first],
@@ -244,7 +245,7 @@ class Contents:
     def _check_nodes(self) -> None:
         twice = _repeated(self.node_numbers)
         if twice is not None:
-            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is there twice: {_AGAIN}")
+            raise MeshError(f"{_at(self.node_lines, twice)}node {self.node_numbers[twice]} is defined twice: {_AGAIN}")
         lost = ~np.asarray((np.abs(self.points) < _FAR).all(axis=1))
         if lost.any():
             row = int(lost.argmax())
@@ -292,8 +293,8 @@ class Contents:
         between = len(np.setdiff1d(np.concatenate([block.nodes.ravel() for block in high]), self.node_numbers[nodes]))
         if len(_with_middles(body)) == len(high):
             return [
-                f"{count} elements of second order: finite elements take the {between} nodes in the middle of their "
-                "edges, springs and elements of first order the corners alone"
+                f"{count} elements of second order: finite elements use their {between} mid-edge "
+                "nodes, springs and first-order elements only the corners"
             ]
         left = f"{between} nodes between the corners were left out"
         return [f"{count} elements of second order were reduced to their corners; {left}"]
@@ -310,8 +311,7 @@ class Contents:
         if middles is None:
             return mesh
         note = (
-            f"{n_folded} elements of second order are folded by the nodes in the middle of their edges: these edges "
-            "were taken as straight"
+            f"{n_folded} elements of second order are folded by their mid-edge nodes: these edges are straight instead"
         )
         return replace(mesh, middles=middles, notes=(*mesh.notes, *([note] if n_folded else [])))
 
@@ -323,7 +323,7 @@ class Contents:
             return []
         first = int(has_element.argmin())
         return [
-            f"{(~has_element).sum()} of {len(has_element)} nodes are unreferenced (no element has them) and were left "
+            f"{(~has_element).sum()} of {len(has_element)} nodes belong to no element and were left "
             f"out; the first is node {self.node_numbers[first]} at {_place(self.points[first] * scale)} m"
         ]
 
@@ -377,7 +377,7 @@ def _by_kind(cells: Sequence[Cells]) -> list[Cells]:
     numbers = np.concatenate([block.numbers for block in joined] or [np.zeros(0, dtype=np.int64)])
     twice = _repeated(numbers)
     if twice is not None:
-        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is there twice: {_AGAIN}")
+        raise MeshError(f"{_at(_lines(joined), twice)}element {numbers[twice]} is defined twice: {_AGAIN}")
     return joined
 
 
@@ -444,14 +444,14 @@ def _in_their_dimensions(positions: Floats, cells: Cells, hint: str) -> Floats:
     if spans.min() <= _FLAT * np.linalg.norm(spans):
         raise MeshError(
             f"the {kind}s lie in a plane of constant {'xyz'[spans.argmin()]}: "
-            + _joined(hint, "of a plane body z is constant: turn it")
+            + _joined(hint, "a plane body needs a constant z: rotate it")
         )
     raise MeshError(
         f"the {kind}s are a surface in space (z from {z.min():.6g} to {z.max():.6g} m): a shell is not supported; "
         + _joined(
             hint,
-            "a plane body lies in a plane of constant z, a solid one is made of tetrahedra or hexahedra, with which a "
-            "mesher fills a closed surface",
+            "use a plane of constant z for a plane body, or fill a closed surface with tetrahedra or hexahedra by a "
+            "mesher",
         )
     )
 
@@ -477,8 +477,8 @@ def _turned(is_turned: Bools, elements: Ints, kind: str, positions: Floats) -> l
     if over.any():
         first = int((over & is_turned).argmax())
         raise MeshError(
-            f"{is_turned.sum()} of {len(elements)} elements are inverted, and {over.sum()} would lie over each other "
-            f"if these were mirrored; the first is element {first}, counted from 0 in the file's order, at "
+            f"{is_turned.sum()} of {len(elements)} elements are inverted, and {over.sum()} would overlap their "
+            f"neighbours if these were mirrored; the first is element {first}, counted from 0 in the file's order, at "
             f"{_place(positions[elements[first]].mean(axis=0))} m: the mesh is folded there; {_MEND}"
         )
     return [f"{is_turned.sum()} of {len(elements)} elements are inverted in the file and were mirrored"]
@@ -490,7 +490,7 @@ def _made_of_bricks(body: Sequence[Cells]) -> list[str]:
     if not count:
         return []
     kind = ("quadrilateral", "hexahedron")[body[0].dim - 2]
-    return [f"{count} {kind} cell{'s' * (count != 1)} with corners that are one node became what they are"]
+    return [f"{count} {kind} cell{'s' * (count != 1)} with coincident corners became wedges, pyramids or simplices"]
 
 
 def _collapsed(block: Cells) -> Bools:
@@ -510,8 +510,8 @@ def _halved(elements: Ints, kind: str) -> list[str]:
     if not n_whole:
         return []
     return [
-        f"{n_whole} face{'s' * (n_whole != 1)} of four corners {'lie' if n_whole > 1 else 'lies'} on two triangles of "
-        "other elements: joined at the corners, but not between them; pyramids make a joint without gaps"
+        f"{n_whole} quadrilateral face{'s' * (n_whole != 1)} {'lie' if n_whole > 1 else 'lies'} on two triangles of "
+        "other elements: they are joined at the corners, with gaps between; pyramids would close the gaps"
     ]
 
 
@@ -526,9 +526,9 @@ def _coincident(positions: Floats, numbers: Ints) -> list[str]:
     first = twins[0]
     other = next(node for node in nearest[first] if node != first)
     return [
-        f"{len(twins)} of {len(positions)} nodes share their place with another one, the first are nodes "
+        f"{len(twins)} of {len(positions)} nodes coincide with another node, the first are nodes "
         f"{numbers[first]} and {numbers[other]} at {_place(positions[first])} m: the mesh may be torn there; "
-        "join = true joins them"
+        "join = true merges them"
     ]
 
 

@@ -76,13 +76,13 @@ def read_msh(data: bytes) -> Contents:
             case "Elements" | "ELM" if elements is None:
                 elements = _elements_4(source, version, physicals) if version >= (4, 0) else _elements_2(source)
             case "Nodes" | "NOD" | "ParametricNodes" | "Elements" | "ELM":
-                source.refuse(f"${source.section} is there twice: expected the nodes and elements of one mesh")
+                source.refuse(f"${source.section} is defined twice: must contain the nodes and elements of one mesh")
             case _:
                 source.skip_section()
                 continue
         source.end_section()
     if nodes is None or elements is None:
-        raise MeshError(f"there is no section ${'Elements' if nodes else 'Nodes'}: is the file cut off?")
+        raise MeshError(f"there is no section ${'Elements' if nodes else 'Nodes'}: is the file truncated?")
     groups: dict[str, list[Ints]] = {}
     for (dim, number), members in elements[1].items():
         groups.setdefault(names.get((dim, number), names.get((_ANY, number), str(number))), []).extend(members)
@@ -97,7 +97,7 @@ def read_msh(data: bytes) -> Contents:
             for (dim, number), name in names.items()
             if dim != _ANY and (dim, number) not in elements[1]
         ),
-        hint="gmsh saves only what has a physical group: give the body (a volume, or a plane surface) one, or set "
+        hint="gmsh saves only entities in physical groups: add the body (a volume, or a plane surface) to one, or set "
         "Mesh.SaveAll = 1"
         if groups
         else "mesh the volume too: gmsh -3",
@@ -140,14 +140,14 @@ class _Sections(ABC):
             self.refuse(
                 f"expected $End{self.section}, found '{word(line)}': the counts do not match"
                 if line
-                else f"$End{self.section} is missing: the file is cut off"
+                else f"$End{self.section} is missing: the file is truncated"
             )
 
     def count(self) -> int:
         """Return the count on the next line; raise MeshError if the line has anything else."""
         line = self.line()
         if not re.fullmatch(rb"\d{1,18}", line):
-            self.refuse(f"${self.section} begins with a count, not with '{word(line)}'")
+            self.refuse(f"${self.section} must begin with a count, not with '{word(line)}'")
         return int(line)
 
     def known(self, type_: int) -> tuple[str, int]:
@@ -159,12 +159,12 @@ class _Sections(ABC):
     def check_total(self, there: int, announced: int) -> None:
         """Raise MeshError if the blocks of a section do not add up to its count."""
         if there != announced:
-            self.refuse(f"${self.section} announces {announced} entries and has {there}")
+            self.refuse(f"${self.section} states {announced} entries and has {there}")
 
 
 def _unsupported(type_: int) -> str:
     return (
-        f"an element of gmsh's type {type_} is not supported: elements of first and second order are, "
+        f"an element of gmsh's type {type_} is not supported; supported: first and second order: "
         "mesh with Mesh.ElementOrder = 1 or 2"
     )
 
@@ -191,7 +191,7 @@ class _Text(_Sections):
         end = b"$end" + self.section.lower().encode()
         while (line := self.line()).lower() != end:
             if not line:
-                self.refuse(f"$End{self.section} is missing: the file is cut off")
+                self.refuse(f"$End{self.section} is missing: the file is truncated")
 
     def rows(self, count: int) -> tuple[Rows, list[int]]:
         """Return the fields and the numbers of the next `count` lines of the section."""
@@ -236,7 +236,7 @@ class _Text(_Sections):
         values = integers([[*row[:before], *row[before + n_reals :]]], lines, f"${self.section}").tolist()
         groups = values[before + 1 :]
         if len(values) <= before or not 0 <= values[before] <= len(groups):
-            self.refuse("an entity lacks some of its numbers")
+            self.refuse("an entity has too few numbers")
         return values[0], (values[1], values[2]) if is_part else None, groups[: values[before]]
 
     def nodes_2(self) -> _Nodes:
@@ -257,7 +257,7 @@ class _Text(_Sections):
             rows = [_of_version_2(row, line) for row, line in zip(rows, lines, strict=True)]
         for row, line in zip(rows, lines, strict=True):
             if len(row) < 3:
-                raise MeshError(f"line {line}: an element lacks some of its numbers")
+                raise MeshError(f"line {line}: an element has too few numbers")
         values = integers(rows, lines, "$Elements")
         at, width = np.array(lines, dtype=np.int64), np.array([len(row) for row in rows], dtype=np.int64)
         start = np.cumsum(width) - width
@@ -271,7 +271,7 @@ class _Text(_Sections):
                 raise MeshError(
                     f"line {at[wrong[0]]}: "
                     + (
-                        f"an element of gmsh's type {type_} with {n_tags} tags takes {expected} numbers, found "
+                        f"an element of gmsh's type {type_} with {n_tags} tags needs {expected} numbers, found "
                         f"{width[wrong[0]]}"
                         if expected >= 0
                         else _unsupported(type_)
@@ -284,7 +284,7 @@ def _of_version_2(row: Sequence[bytes], line: int) -> Sequence[bytes]:
     """Convert the row of an element from version 1 to 2: add the number of tags, drop the number of nodes."""
     if len(row) < 5 or not row[4].isdigit() or int(row[4]) != len(row) - 5:
         raise MeshError(
-            f"line {line}: an element has {word(b' '.join(row[4:5])) or 'no'} nodes by the count in its line"
+            f"line {line}: an element has {word(b' '.join(row[4:5])) or 'no'} nodes according to the count in its line"
         )
     return [*row[:2], b"2", *row[2:4], *row[5:]]
 
@@ -316,10 +316,10 @@ class _Binary(_Sections):
             self._pass_over()
         except MeshError:  # the content does not fit the section's name
             self._next = begin
-        end = rb"\$End" + re.escape(self.section.encode()) + rb"[ \t\r]*(?:\n|\Z)"  # no line need end before it
+        end = rb"\$End" + re.escape(self.section.encode()) + rb"[ \t\r]*(?:\n|\Z)"  # it may follow without a line end
         found = re.compile(end, re.IGNORECASE).search(self._data, self._next)
         if found is None:
-            self.refuse(f"$End{self.section} is missing: the file is cut off")
+            self.refuse(f"$End{self.section} is missing: the file is truncated")
         self._next = found.end()
 
     def _pass_over(self) -> None:
@@ -418,15 +418,15 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
         if re.match(comments + rb"\$NOD\s", data, re.DOTALL):
             return (1, 0), _Text(data, 0)
         raise MeshError(
-            "this is no .msh file: it begins with $MeshFormat, then version, file type and data size, or with $NOD"
+            "this is no .msh file: it must begin with $MeshFormat, then version, file type and data size, or with $NOD"
         )
     named, file_type, size = (word(field) for field in header.groups())
     numbers = re.fullmatch(r"(\d{1,9})(?:\.(\d{1,9}))?", named)
     version = (int(numbers[1]), int(numbers[2] or 0)) if numbers else (0, 0)
     if version[0] != 2 and version not in ((4, 0), (4, 1)):
-        raise MeshError(f"version {named} of .msh is not read; 1, 2 to 2.2, 4 and 4.1 are")
+        raise MeshError(f"version {named} of .msh is not supported; supported: 1, 2 to 2.2, 4 and 4.1")
     if version == (4, 0) and file_type == "1":
-        raise MeshError(f"version {named} of .msh is read as text, this file is binary")
+        raise MeshError(f"version {named} of .msh is supported as text only, this file is binary")
     if file_type not in ("0", "1") or size not in ("4", "8"):
         raise MeshError(
             f"$MeshFormat: file type {file_type} is not 0 or 1, or data size {size} is not 4 or 8: is the file damaged?"
@@ -438,8 +438,8 @@ def _open(data: bytes) -> tuple[_Version, _Source]:
         one = data[header.end() : header.end() + 4]
         if one not in (b"\1\0\0\0", b"\0\0\0\1"):
             raise MeshError(
-                "$MeshFormat: the binary 1 that gives the byte order is missing: was the file sent as text? Send "
-                "it as binary, or save it as text (Mesh.Binary = 0)"
+                "$MeshFormat: the binary 1 that gives the byte order is missing: was the file transferred as text? "
+                "Transfer it as binary, or save it as text (Mesh.Binary = 0)"
             )
         source = _Binary(data, header.end() + 4, "<" if one[0] else ">", int(size))
     source.end_section()
@@ -458,7 +458,7 @@ def _physical_names(source: _Source) -> dict[_Tag, str]:
         line = source.line()
         found = re.fullmatch(rb'(?:(\d)\s+)?(\d{1,18})\s+"(.*)"', line)  # version 2.0 gives no dimension
         if found is None:
-            source.refuse(f"a physical group is dimension, number and \"name\", not '{word(line)}'")
+            source.refuse(f"a physical group must have dimension, number and \"name\", not '{word(line)}'")
         dim = _ANY if found[1] is None else int(found[1])
         names[dim, int(found[2])] = found[3].decode("utf-8", errors="replace")
     return names

@@ -24,7 +24,7 @@ def format_by_head(suffix: str, head: bytes, formats: Mapping[str, Recognises]) 
 
 def read_as(key: str, suffix: str) -> tuple[str, ...]:
     """Return a note if the format `key` of a file differs from its suffix, else nothing."""
-    ending = f"although its name ends in '{suffix}'" if suffix else "although its name has no ending"
+    ending = f"although its name ends in '{suffix}'" if suffix else "although its name has no suffix"
     return (f"read as a {key} file by its content, {ending}",) if key != suffix.lower() else ()
 
 
@@ -60,11 +60,11 @@ def is_vtk_xml(*kinds: str) -> Recognises:
 def foreign(data: bytes) -> str:
     """Return what a file of an unsupported format is and how to convert it to a mesh; empty if unknown."""
     if data.startswith((b"\x1f\x8b", b"PK\x03\x04")):
-        return "it is packed: unpack it (gunzip, unzip), and name what comes out"
+        return "it is compressed: decompress it (gunzip, unzip) and use the result"
     is_stl = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
     if is_stl or re.match(rb"\s*(?:solid\b.*?\bfacet\s|ply\s|OFF\s)", data[:HEAD], re.DOTALL):
         return (
-            "it holds a surface (as .stl, .ply and .off do), not a body: let a mesher such as gmsh or fTetWild fill it "
-            "with tetrahedra"
+            "it contains a surface (as .stl, .ply and .off do), not a body: fill it by a mesher such as gmsh or "
+            "fTetWild with tetrahedra"
         )
     return ""

@@ -38,13 +38,13 @@ class ImageFormat(NamedTuple):
 
 
 def read_labels(file: str | Path) -> Labels:
-    """Read a label image; raise MeshError, with the file, if it is damaged or holds no labels."""
+    """Read a label image; raise MeshError, with the file, if it is damaged or contains no labels."""
     if str(file).startswith(_PYVISTA):
         return checked(_of_pyvista(str(file).removeprefix(_PYVISTA)))
     file = Path(file)
     form = next((one for suffix, one in IMAGES.items() if file.name.lower().endswith(suffix)), None)
     if form is None:
-        raise MeshError(f"{file}: a label image ends in {', '.join(IMAGES)}, not in '{file.suffix}'")
+        raise MeshError(f"{file}: the suffix of a label image is {', '.join(IMAGES)}, not '{file.suffix}'")
     try:
         return checked(form.read(file))
     except MeshError as error:
@@ -59,16 +59,16 @@ def _npy(file: Path) -> Labels:
     try:
         version = np.lib.format.read_magic(stream)
         if version not in ((1, 0), (2, 0)):
-            raise MeshError(f".npy of version {version[0]}.{version[1]} holds no labels: save an array of integers")
+            raise MeshError(f".npy of version {version[0]}.{version[1]} contains no labels: save an array of integers")
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, is_fortran, dtype = read(stream)
     except (ValueError, TypeError, SyntaxError, tokenize.TokenError, EOFError, OverflowError, RecursionError) as error:
         raise MeshError(f"{wrong} ({str(error).splitlines()[0][:80] if str(error) else 'no header'})") from None
     if dtype.hasobject or dtype.kind not in "iubf":
-        raise MeshError(f"the array holds {dtype}: expected integers, one label per voxel")
+        raise MeshError(f"the array has type {dtype}: must be integers, one label per voxel")
     expected, there = n_voxels(shape) * dtype.itemsize, len(data) - stream.tell()
     if expected != there:
-        raise MeshError(f"its header announces {expected} bytes of voxels, found {there}: is it cut off? {SAVE_ANEW}")
+        raise MeshError(f"its header states {expected} bytes of voxels, found {there}: is it truncated? {SAVE_ANEW}")
     values = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if is_fortran else "C")
     return Labels(values, np.ones(3), np.zeros(3), np.eye(3))
 

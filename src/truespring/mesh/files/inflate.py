@@ -37,7 +37,7 @@ def inflated(data: bytes | memoryview, size: int, method: str) -> bytes:
     if len(found) > size:
         raise ValueError(f"{method} gives more than the expected {size} bytes")
     if not is_ended:
-        raise ValueError(f"cut off: {method} has no end mark, {len(found)} of {size} bytes are there")
+        raise ValueError(f"truncated: {method} has no end mark, {len(found)} of {size} bytes are there")
     if len(found) < size:
         raise ValueError(f"{size} bytes are expected, {method} gives {len(found)}")
     return found
@@ -72,4 +72,4 @@ def _inflated(data: bytes | memoryview, most: int, method: str) -> tuple[bytes, 
 def refuse_too_large(size: int) -> None:
     """Raise ValueError if `size` bytes are more than half of the memory."""
     if size > 2**28 and size > available_memory() // 2:
-        raise ValueError(f"{size / 2**30:.3g} GiB are announced, more than half of the memory")
+        raise ValueError(f"{size / 2**30:.3g} GiB are stated, more than half of the memory")

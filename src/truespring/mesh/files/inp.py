@@ -57,7 +57,7 @@ class _Deck:
     def add(self, card: Card) -> None:
         """Add the mesh data of a card to its scope; raise MeshError if the keyword is not supported."""
         if card.keyword in _UNREAD:
-            raise card.error(f"this is not followed: {_FLAT}")
+            raise card.error(f"this keyword is not supported: {_FLAT}")
         self._is_apart = self._is_apart or card.keyword in _BETWEEN
         match card.keyword:
             case "PART":
@@ -78,7 +78,7 @@ class _Deck:
 
     def _begin_instance(self, card: Card) -> Scope:
         if "LIBRARY" in card.parameters:
-            raise card.error(f"an instance of another run is not read: {_FLAT}")
+            raise card.error(f"an instance of another analysis is not supported: {_FLAT}")
         scopes = {key: scope for key, (scope, _) in self._instances.items()}
         scope = self._begin(card, scopes, self._part(card).instance)
         self._instances[key_of(card.parameters["NAME"])] = scope, read_move(card)
@@ -111,7 +111,7 @@ class _Deck:
             notes.append(f"elements that the body does not need are left out: {counted(left_out)}")
         unused = [part.name for key, part in self._parts.items() if key not in self._used]
         if explicit and unused:
-            notes.append(f"no instance is made of {', '.join(unused)}: left out")
+            notes.append(f"parts without an instance are left out: {', '.join(unused)}")
         return Contents(
             node_numbers=assembly.nodes.numbers,
             points=assembly.nodes.points,
@@ -126,9 +126,9 @@ class _Deck:
 
 def _no_body(assembly: Assembly, left_out: Mapping[str, int]) -> str:
     if not assembly.nodes.numbers.size and not left_out:
-        return "there is no *NODE: is this the whole deck, and does it include the file of its mesh?"
+        return "there is no *NODE: is the deck complete, and does it include the file of its mesh?"
     what = f": {counted(left_out)} {'makes' if sum(left_out.values()) == 1 else 'make'} none" if left_out else ""
-    return f"there is no *ELEMENT of a body{what}; a body is made of {READ}"
+    return f"there is no *ELEMENT of a body{what}; a body consists of {READ}"
 
 
 def _lower(assembly: Assembly) -> Iterator[str]:
@@ -139,7 +139,7 @@ def _lower(assembly: Assembly) -> Iterator[str]:
             lower[block.kind] += len(block.numbers)
     if lower:
         verbs = ("are", "carry") if lower.total() > 1 else ("is", "carries")
-        yield f"{listed(lower)} {verbs[0]} not of the body and only {verbs[1]} sets"
+        yield f"{listed(lower)} {verbs[0]} not part of the body and only {verbs[1]} sets"
 
 
 class _Groups:

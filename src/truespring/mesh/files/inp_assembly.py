@@ -112,9 +112,9 @@ class Assembly:
         for row, other in zip(again.tolist(), first[former].tolist(), strict=True):
             if (nodes.points[row] != nodes.points[other]).any():
                 at = self._lines.at(nodes.places[row])
-                raise MeshError(f"{at}: node {nodes.numbers[row]} is there twice, at two places: take one out")
+                raise MeshError(f"{at}: node {nodes.numbers[row]} is defined twice, at two positions: remove one")
         if again.size:
-            self.notes.append(f"{len(again)} nodes are there twice at one place, and were taken once")
+            self.notes.append(f"{len(again)} nodes are defined twice at the same position and were read once")
             nodes = nodes.of(np.isin(np.arange(len(nodes.numbers)), first))
         return nodes
 
@@ -125,7 +125,7 @@ class Assembly:
         if count:
             first = int(is_kept.argmin())
             self.notes.append(
-                f"{count} reference point{'s' if count > 1 else ''} of the assembly, of no element, left out; the "
+                f"{count} reference point{'s' if count > 1 else ''} of the assembly, in no element, left out; the "
                 f"first is its node {nodes.numbers[first]} at "
                 f"({', '.join(f'{value:.6g}' for value in nodes.points[first])}) in the file's unit"
             )
@@ -140,7 +140,7 @@ class Assembly:
         if not is_first.all():
             row = int(is_first.argmin())
             raise MeshError(
-                f"{self._lines.at(lines[row])}: element {numbers[row]} is there twice: renumber one of them"
+                f"{self._lines.at(lines[row])}: element {numbers[row]} is defined twice: renumber one of them"
             )
         for block in scope.elements:
             unknown = places(nodes.numbers, block.nodes) < 0
@@ -152,7 +152,9 @@ class Assembly:
                     f"{block.nodes[row, unknown[row].argmax()]}, which is not in the file"
                 )
             if lost.any():
-                self.notes.append(f"{lost.sum()} of {lost.size} {block.type} name nodes that are not there: left out")
+                self.notes.append(
+                    f"{lost.sum()} of {lost.size} {block.type} refer to nodes that are not in the file and are left out"
+                )
             yield Elements(block.type, block.kind, *(column[~lost] for column in block[2:]))
 
     # --- sets and names ---------------------------------------------------------------------------
@@ -169,7 +171,10 @@ class Assembly:
         return self.placed[key]
 
     def set_members(self, owner: Placed, kind: str, key: str, within: tuple[int, ...] = ()) -> Ints:
-        """Return the members of a set as numbers of the assembly; `within` are the ids of the sets being resolved."""
+        """Return the members of a set as numbers of the assembly, shape (n,).
+
+        `within` are the ids of the sets being resolved.
+        """
         parts = owner.scope.sets[kind][key]
         if id(parts) in within:  # the set contains itself
             return _joined([])
@@ -218,7 +223,8 @@ class Assembly:
     def named(self, owner: Placed, member: Named, kind: str, within: tuple[int, ...] = ()) -> Ints:
         """Resolve a name to numbers: a number or a set, of the scope or of an instance (INSTANCE.NAME).
 
-        Returns numbers of `kind` (NSET or ELSET); for NSET, elements give their nodes. Raises MeshError if unknown.
+        Returns numbers of `kind` (NSET or ELSET), shape (n,); for NSET, elements give their nodes. Raises
+        MeshError if unknown.
         """
         for scope, name in self._readings(owner, member.name):
             key = found(scope.scope.sets[member.kind], name)
@@ -266,7 +272,10 @@ class Assembly:
         )
 
     def all_elements(self, owner: Placed) -> Ints:
-        """Return the numbers in the assembly of all elements of a scope; for the assembly, those of all scopes."""
+        """Return the numbers in the assembly of all elements of a scope, shape (n,).
+
+        For the assembly, those of all scopes.
+        """
         scopes = [owner] if owner.scope.name else list(self.placed.values())
         return _joined(one.numbers["ELSET"] + one.add["ELSET"] for one in scopes)
 

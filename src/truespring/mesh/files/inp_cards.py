@@ -72,10 +72,10 @@ class Lines:
         Names are relative to the deck's folder, also in included files, as in both programs.
         """
         if self._folder is None:
-            raise MeshError("files are included by a deck that is read from a file")
+            raise MeshError("only a deck that is read from a file can include files")
         path = file_beside(self._folder, name, MeshError, who="the deck ")
         if path in [one for one, _ in self._open]:
-            raise MeshError("this file includes itself: take the line out")
+            raise MeshError("this file includes itself: remove the line")
         if len(self._open) > _DEEPEST or len(self._names) > _MOST:
             raise MeshError(f"files are included {_DEEPEST} deep and {_MOST} times at most: write them into one")
         data = read_file(path, MeshError)
@@ -149,13 +149,13 @@ class Card:
             except MeshError as error:
                 why = f"{self.deck.at(place)}: {what}: expected {expected}"
                 raise (MeshError(why) if self.deck.is_included(place) else error) from None
-        raise AssertionError("a row that is no number was not found again")  # pragma: no cover
+        raise AssertionError("no row without a number was found")  # pragma: no cover
 
 
 def cards(lines: Lines) -> Iterator[Card]:
     """Yield the cards of a deck; raise MeshError if it is not a deck, add a note if it may be truncated.
 
-    A line that begins with * is a keyword, whatever the one before it ended with.
+    A line that begins with * is a keyword, even if the line before ends with a comma.
     """
     card: Card | None = None  # whose data follow
     head: Card | None = None  # whose keyword line may continue
@@ -183,10 +183,10 @@ def cards(lines: Lines) -> Iterator[Card]:
         raise MeshError("there is no keyword such as *NODE")
     yield card
     if in_step:
-        lines.notes.append("a *STEP has no *END STEP: the file may be cut off there, behind its mesh")
+        lines.notes.append("a *STEP has no *END STEP: the file may be truncated after its mesh")
     for place in sorted(lines.open_ends):
         if lines.is_included(place) or not card.keyword.startswith("END"):
-            lines.notes.append(f"{lines.at(place)} is the last one and has no line end: it may be cut off there")
+            lines.notes.append(f"{lines.at(place)} is the last one and has no line end: it may be truncated there")
 
 
 def _follow(card: Card, in_step: bool) -> None:

@@ -156,7 +156,7 @@ class Scope:
 
     def _add_nodes(self, card: Card) -> None:
         if card.parameters.get("SYSTEM", "R").upper() != "R":
-            raise card.error("coordinates that are not rectangular are not read: write them as x, y, z")
+            raise card.error("only rectangular coordinates are supported: write x, y, z")
         split = [(fields(row)[:4], place) for row, place in zip(_rows(card), card.places, strict=True)]
         split = [one for one in split if one[0]]  # a normal may follow the coordinates
         rows, places = [row for row, _ in split], [place for _, place in split]
@@ -164,11 +164,13 @@ class Scope:
         short = [(place, row) for row, place in split if len(row) < width]
         for place, row in short[-1:]:
             if place in card.deck.open_ends:
-                raise card.error(f"{len(row) - 1} coordinates in the last line, which has no end: it is cut off", place)
+                raise card.error(
+                    f"{len(row) - 1} coordinates in the last line, which has no line end: it is truncated", place
+                )
         if short:
             self.notes.append(
                 f"{len(short)} of {len(rows)} nodes have fewer coordinates than others of their *NODE, the first is "
-                f"node {word_of(short[0][1])} in {card.deck.at(short[0][0])}: what is missing was taken as 0"
+                f"node {word_of(short[0][1])} in {card.deck.at(short[0][0])}: missing coordinates are 0"
             )
         numbers = card.integers([row[:1] for row in rows], places, "the number of a node")
         at = [[*(one if one.strip() else b"0" for one in row[1:]), *[b"0"] * (4 - len(row))] for row in rows]
@@ -183,7 +185,7 @@ class Scope:
             _rows(card)
         if type_ is None and is_of_a_body(name):
             what = ", axisymmetric," if "AX" in name else ""
-            raise card.error(f"TYPE={name[:40]} ({len(card.rows)} lines){what} is not read: mesh the body by {READ}")
+            raise card.error(f"TYPE={name[:40]} ({len(card.rows)} lines){what} is not supported; supported: {READ}")
         if type_ is None or dimension(type_.kind) == 1:
             numbers = self._add_lines(card, name, type_)
         else:
@@ -240,9 +242,9 @@ class Scope:
         self.names.setdefault(key_of(name), bare(name))
         surface = self.surfaces.setdefault(key_of(name), Surface(type_ == "NODE"))
         if type_ not in ("NODE", "ELEMENT"):
-            surface.unread = f"TYPE={type_[:40]} is not read"
+            surface.unread = f"TYPE={type_[:40]} is not supported"
         elif "COMBINE" in parameters or "CROP" in parameters:
-            surface.unread = "surfaces made of others are not read"
+            surface.unread = "surfaces combined from others are not supported"
         kind = "NSET" if surface.of_nodes else "ELSET"
         for row, place in zip(card.rows, card.places, strict=True):
             on, *labels = [decoded(one).strip() for one in fields(row)] or [""]
@@ -276,7 +278,7 @@ def word_of(row: list[bytes]) -> str:
 
 def _rows(card: Card) -> list[bytes]:
     if not card.rows:
-        raise card.error("there are no lines of data below: is the file cut off?")
+        raise card.error("there are no lines of data below: is the file truncated?")
     return card.rows
 
 
@@ -307,7 +309,7 @@ def _whole_elements(card: Card, name: str, n_nodes: int) -> tuple[Ints, Ints]:
             places.append(place)
     for row, place in zip(rows, places, strict=True):
         if len(row) != width:
-            why = f"an element of {name} takes {width} numbers, found {len(row)}"
+            why = f"an element of {name} needs {width} numbers, found {len(row)}"
             raise MeshError(f"{card.deck.at(place)}: {why}")
     return card.integers(rows, places, "an element").reshape(-1, width), np.array(places, dtype=np.int64)
 
@@ -315,7 +317,7 @@ def _whole_elements(card: Card, name: str, n_nodes: int) -> tuple[Ints, Ints]:
 def _range(card: Card, row: bytes, place: int) -> Range:
     values = [*card.integers([fields(row)], [place], "GENERATE").tolist(), 1]
     if len(values) not in (3, 4) or values[1] < values[0] or values[2] < 1:
-        raise card.error("GENERATE takes a first number, a last number and a step", place)
+        raise card.error("GENERATE needs a first number, a last number and a step", place)
     return Range(values[0], values[1], values[2], place)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from truespring.arrays import Bools, Floats
 from truespring.errors import MeshError, nearest
 
-# The most labels listed in a message.
+# Maximum number of labels listed in a message.
 _MANY = 30
 
 # The cosine between axes: above the first, e.g. by rounded headers, they are made perpendicular, with a note; above
-# the second the image is sheared.
+# the second the image is sheared, which is an error.
 _UPRIGHT, _SHEARED = 1e-5, 1e-2
 
 
@@ -57,7 +57,7 @@ class Labels(NamedTuple):
         exact = [one for one in self.segments if one.name == name]
         same = exact or [one for one in self.segments if one.name.casefold() == name.casefold()]
         if len({(one.layer, one.value) for one in same}) > 1:
-            raise MeshError(f"{len(same)} segments are called '{name}': give a label; there are {self._listed()}")
+            raise MeshError(f"{len(same)} segments have the name '{name}': use a label; there are {self._listed()}")
         if not same:
             known = [one.name for one in self.segments]
             why = nearest(name, known) if known else ", the image has no names"
@@ -77,10 +77,10 @@ class Labels(NamedTuple):
 
     def _listed(self) -> str:
         if self.segments:
-            told = [f"{one.value} ('{one.name[:40]}')" for one in self.segments]
+            found = [f"{one.value} ('{one.name[:40]}')" for one in self.segments]
         else:
-            told = [str(value) for value in np.unique(self.values).tolist()]
-        return ", ".join(told[:_MANY]) + (", ..." if len(told) > _MANY else "")
+            found = [str(value) for value in np.unique(self.values).tolist()]
+        return ", ".join(found[:_MANY]) + (", ..." if len(found) > _MANY else "")
 
 
 def checked(labels: Labels) -> Labels:
@@ -94,10 +94,12 @@ def checked(labels: Labels) -> Labels:
         whole = np.isfinite(values).all() and (values == np.rint(values)).all()
         whole = whole and float(np.abs(values).max()) < 2**53
         if not whole:
-            raise MeshError("the image holds fractions, not labels: it was blurred or interpolated; segment it first")
+            raise MeshError(
+                "the image has fractional values, not labels: it was blurred or interpolated; segment it first"
+            )
         values = values.astype(np.int64)
     elif values.dtype.kind not in "iub":
-        raise MeshError(f"the image holds {values.dtype}: expected integers, one label per voxel")
+        raise MeshError(f"the image has type {values.dtype}: must be integers, one label per voxel")
     if not (np.isfinite(labels.spacing).all() and (labels.spacing > 0).all()):
         raise MeshError(f"spacing = {labels.spacing.tolist()}: each must be positive")
     if not np.isfinite(labels.origin).all():
@@ -111,13 +113,13 @@ def _upright(labels: Labels) -> Labels:
     off = float(np.abs(cosines).max()) if np.isfinite(cosines).all() else np.inf
     if off > _SHEARED:
         raise MeshError(
-            f"the axes of the image are not perpendicular: the cosine between two is {off:.2g}, up to {_SHEARED:g} is "
-            "accepted; a sheared image has no cubes: resample it onto perpendicular axes (3D Slicer: Resample "
-            "Scalar/Vector/DWI Volume, by nearest neighbour)"
+            f"the axes of the image are not perpendicular: the cosine between two is {off:.2g}, at most {_SHEARED:g} "
+            "is allowed: resample the image onto perpendicular axes (3D Slicer: Resample Scalar/Vector/DWI Volume, "
+            "by nearest neighbour)"
         )
     left, _, right = np.linalg.svd(labels.direction)
-    told = (
+    note = (
         f"the axes of the image are not quite perpendicular, the cosine between two is {off:.2g}: the nearest "
-        "perpendicular ones were taken"
+        "perpendicular axes were used"
     )
-    return labels._replace(direction=left @ right, notes=(*labels.notes, *([told] if off > _UPRIGHT else [])))
+    return labels._replace(direction=left @ right, notes=(*labels.notes, *([note] if off > _UPRIGHT else [])))

@@ -36,7 +36,7 @@ _MATRIX = ("TransformMatrix", "Rotation", "Orientation")
 _ORIGIN = ("Offset", "Position", "Origin")
 _SPACING = ("ElementSpacing", "ElementSize")
 _ORDER = ("BinaryDataByteOrderMSB", "ElementByteOrderMSB")
-# Keys that the geometry depends on: a key close to one of these is taken as damaged.
+# Keys that define the geometry: a key similar to one of these counts as damaged.
 _READ = (
     *("ObjectType", "NDims", "DimSize", "ElementType", "ElementDataFile", "ElementNumberOfChannels", "HeaderSize"),
     *("BinaryData", "CompressedData", "CompressedDataSize", *_MATRIX, *_ORIGIN, *_SPACING, *_ORDER),
@@ -60,7 +60,10 @@ def read_metaimage(file: Path) -> Labels:
     shape = counts(header.get("DimSize", ""), n_axes, "DimSize")
     code = header.get("ElementType", "").upper()
     if code not in _TYPES:
-        raise MeshError(f"ElementType is '{code[:40]}'; {', '.join(_TYPES)} are read, one number a voxel")
+        raise MeshError(
+            f"ElementType is '{code[:40]}', which is not supported; supported: {', '.join(_TYPES)}, one number per "
+            "voxel"
+        )
     if header.get("ElementNumberOfChannels", "1") != "1":
         raise MeshError(
             f"ElementNumberOfChannels is {header['ElementNumberOfChannels'][:20]}: expected one label per voxel"
@@ -136,11 +139,11 @@ def _values(header: dict[str, str], stored: list[bytes], dtype: np.dtype[Any], s
 
 def _inflated(header: dict[str, str], stored: list[bytes], dtype: np.dtype[Any], shape: tuple[int, ...]) -> Values:
     if len(stored) != 1:
-        raise MeshError("compressed voxels in several files are not read: save them into one, as .mha")
+        raise MeshError("compressed voxels in several files are not supported: save them into one file, .mha")
     data = stored[0]
     size = counts(header.get("CompressedDataSize", str(len(data))), 1, "CompressedDataSize")[0]
     if size != len(data):
-        raise MeshError(f"CompressedDataSize is {size}, {len(data)} bytes are there: is it cut off? {SAVE_ANEW}")
+        raise MeshError(f"CompressedDataSize is {size}, {len(data)} bytes are there: is it truncated? {SAVE_ANEW}")
     return inflated_values(data, dtype, shape, "zlib")
 
 

@@ -41,10 +41,10 @@ _MILLIMETRES = {0: 1.0, 1: 1e3, 2: 1.0, 3: 1e-3}
 # The axes of NIfTI point right, anterior and superior (RAS), those of DICOM, ITK and here left and posterior (LPS).
 _TO_LPS = np.diag([-1.0, -1.0, 1.0])
 _LPS = (
-    "NIfTI's places are RAS, with x to the right and y to the front; here they are LPS, as in DICOM and ITK: x and y "
-    "have the other sign than in nibabel or FSL"
+    "coordinates of NIfTI are RAS (x to the right, y to the front), here they are LPS as in DICOM and ITK: x and y "
+    "have the opposite sign of those in nibabel and FSL"
 )
-_NOWHERE = "its header has no places of voxels (qform and sform are 0): the first one is at the origin"
+_NOWHERE = "its header has no position of the voxels (qform and sform are 0): the first voxel is at the origin"
 # Positions and spacings that differ by more than this, relative to the voxel, are reported.
 _SAME = 1e-2
 
@@ -84,9 +84,9 @@ def _header(begin: bytes) -> tuple[Any, _Order]:
             if header["magic"] == b"ni1" or header["magic"][:3] == b"ni2":
                 raise MeshError(f"its voxels are in another file (.hdr and .img): {SAVE_ANEW}, as .nii or .nii.gz")
             if header["magic"] != _MAGIC[size]:
-                raise MeshError(f"the mark of NIfTI in its header is damaged; {SAVE_ANEW}")
+                raise MeshError(f"the magic string in its header is damaged; {SAVE_ANEW}")
             return header, order
-    raise MeshError(f"this is no NIfTI image: its header is none, or is cut off; {SAVE_ANEW}")
+    raise MeshError(f"this is no NIfTI image, or its header is truncated; {SAVE_ANEW}")
 
 
 def _shape(dim: Any) -> tuple[int, ...]:
@@ -103,7 +103,7 @@ def _shape(dim: Any) -> tuple[int, ...]:
 def _dtype(header: Any) -> np.dtype[Any]:
     code = int(header["datatype"])
     if code not in _TYPES:
-        raise MeshError(f"voxels of NIfTI's type {code} are no labels: save them as whole numbers of 8 or 16 bits")
+        raise MeshError(f"voxels of NIfTI's type {code} are no labels: save them as integers of 8 or 16 bits")
     dtype = np.dtype(_TYPES[code])
     if int(header["bitpix"]) != 8 * dtype.itemsize:
         raise MeshError(
@@ -149,14 +149,13 @@ def _places(header: Any) -> tuple[Floats, Floats, list[str]]:
         raise MeshError(f"the header's {field} is not finite or is singular; {SAVE_ANEW}")
     notes = [_NOWHERE if field == "pixdim" else _LPS]
     if field == "sform" and by_q is not None and not _same(rows, by_q):
-        notes.append("its header has two transforms, qform and sform, that differ: sform was taken, as nibabel does")
+        notes.append("its header has two transforms, qform and sform, that differ: sform is used, as in nibabel")
     norms = np.linalg.norm(matrix[:, :3], axis=0)
     if (np.abs(norms - sides) <= _SAME * norms).all():
         norms = sides
     else:
         notes.append(
-            f"its header has two spacings, {_listed(sides)} (pixdim) and {_listed(norms)} ({field}): the latter "
-            "was taken"
+            f"its header has two spacings, {_listed(sides)} (pixdim) and {_listed(norms)} ({field}): the latter is used"
         )
     return _TO_LPS @ (unit * matrix), unit * norms, notes
 

@@ -1,7 +1,7 @@
 """Read label images in the NRRD format: .nrrd, .nhdr with the voxels in another file, .seg.nrrd of 3D Slicer.
 
 Source: https://teem.sourceforge.net/nrrd/format.html; of segmentations
-https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html: segments that overlap stand in
+https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html: overlapping segments are
 layers along a first axis of kind "list".
 """
 
@@ -77,7 +77,7 @@ def read_nrrd(file: Path) -> Labels:
     sizes = counts(_required(fields, "sizes"), n_axes, "sizes")
     kind = _required(fields, "type").lower()
     if kind not in _TYPES:
-        raise MeshError(f"voxels of type '{kind[:40]}' are no labels: save them as whole numbers of 8 or 16 bits")
+        raise MeshError(f"voxels of type '{kind[:40]}' are no labels: save them as integers of 8 or 16 bits")
     dtype = np.dtype(_TYPES[kind])
     if dtype.itemsize > 1 and fields.get("encoding", "").lower() not in _TEXTS:
         dtype = dtype.newbyteorder(_endian(_required(fields, "endian")))
@@ -93,14 +93,14 @@ def read_nrrd(file: Path) -> Labels:
 def _header(data: bytes) -> tuple[dict[str, str], dict[str, str], int]:
     """Return the fields, the key-value pairs, and the length of the header, which ends with a blank line [bytes]."""
     if not re.match(rb"NRRD000[1-9]\r?\n", data):
-        raise MeshError(f"this is no NRRD image: it begins with NRRD and the version of the format; {SAVE_ANEW}")
+        raise MeshError(f"this is no NRRD image: it must begin with NRRD and the version of the format; {SAVE_ANEW}")
     fields: dict[str, str] = {}
     keys: dict[str, str] = {}
     begin = data.index(b"\n") + 1
     while begin < len(data):
         end = data.find(b"\n", begin, _LONGEST) + 1
         if not end:
-            raise MeshError(f"its header is cut off; {SAVE_ANEW}")
+            raise MeshError(f"its header is truncated; {SAVE_ANEW}")
         line = data[begin:end].decode("utf-8", errors="replace").rstrip("\r\n")
         begin = end
         if not line:
@@ -121,7 +121,7 @@ def _header(data: bytes) -> tuple[dict[str, str], dict[str, str], int]:
             raise MeshError(f"the header has a line '{line[:40]}', which is no field of NRRD; {SAVE_ANEW}")
         keys[key.strip()] = value.strip()
     if "data file" not in fields:
-        raise MeshError(f"its header is cut off: it ends with a blank line, the voxels follow; {SAVE_ANEW}")
+        raise MeshError(f"its header is truncated: a blank line must end it, before the voxels; {SAVE_ANEW}")
     return fields, keys, len(data)
 
 
@@ -165,11 +165,11 @@ def _skipped(fields: Mapping[str, str], data: bytes) -> bytes:
 def _values(fields: Mapping[str, str], data: bytes, dtype: np.dtype[Any], sizes: tuple[int, ...]) -> Values:
     encoding = _required(fields, "encoding").lower()
     if encoding not in _ENCODINGS:
-        raise MeshError(f"the encoding '{encoding[:40]}' is not read; {', '.join(_ENCODINGS)} are")
+        raise MeshError(f"the encoding '{encoding[:40]}' is not supported; supported: {', '.join(_ENCODINGS)}")
     skip = int(numbers(fields.get("byte skip", "0"), 1, "byte skip")[0])
     if encoding in _METHODS:
         if skip < 0:
-            raise MeshError("'byte skip' below 0 is for the encoding raw alone")
+            raise MeshError("'byte skip' below 0 is allowed for the encoding raw only")
         return inflated_values(data, dtype, sizes, _METHODS[encoding], skip)
     if skip == -1:
         skip = max(0, len(data) - n_voxels(sizes) * dtype.itemsize)
@@ -209,7 +209,8 @@ def _places(fields: Mapping[str, str], is_place: Any) -> tuple[Floats, Floats, F
         signs[: min(dim, 2)] = _SPACES[space][:dim]
     elif space:
         raise MeshError(
-            f"the space '{space[:40]}' is not read; {', '.join(name for name in _SPACES if '-' in name)} are"
+            f"the space '{space[:40]}' is not supported; supported: "
+            f"{', '.join(name for name in _SPACES if '-' in name)}"
         )
     if "space directions" in fields:
         axes = np.array([_vector(text, dim) for text in re.findall(_VECTOR, fields["space directions"])]).T

@@ -18,7 +18,7 @@ SAVE_ANEW = "copy it again, or save it again from 3D Slicer or ITK-SNAP"
 def n_voxels(shape: tuple[int, ...]) -> int:
     """Return the number of voxels of a shape; raise MeshError if an axis is empty."""
     if not shape or min(shape) < 1:
-        raise MeshError(f"the header gives the axes {list(shape)} voxels: each needs one at least")
+        raise MeshError(f"the header gives axes of {list(shape)} voxels: each needs at least one")
     count = 1
     for one in shape:
         count *= one
@@ -29,7 +29,7 @@ def raw_values(data: bytes | memoryview, dtype: np.dtype[Any], shape: tuple[int,
     """Return an array of `shape` from data whose first axis runs fastest; raise MeshError if the size is wrong."""
     expected = n_voxels(shape) * dtype.itemsize
     if len(data) != expected:
-        which = "it is cut off" if len(data) < expected else "it is longer than it should be"
+        which = "it is truncated" if len(data) < expected else "it is too long"
         size = " x ".join(map(str, shape))
         raise MeshError(
             f"{which}: {size} voxels of {dtype.itemsize} bytes are {expected} bytes, found {len(data)}; {SAVE_ANEW}"
@@ -51,18 +51,18 @@ def inflated_values(
 def text_values(data: bytes, dtype: np.dtype[Any], shape: tuple[int, ...]) -> Values:
     """Return an array of `shape` from numbers written as text; raise MeshError if their number is wrong."""
     if not data[-1:].isspace():
-        raise MeshError(f"its last line has no line end: is it cut off? {SAVE_ANEW}")
+        raise MeshError(f"its last line has no line end: is it truncated? {SAVE_ANEW}")
     words = data.split()
     if len(words) != n_voxels(shape):
-        raise MeshError(f"{n_voxels(shape)} voxels are announced, found {len(words)}; {SAVE_ANEW}")
+        raise MeshError(f"{n_voxels(shape)} voxels are stated in the header, found {len(words)}; {SAVE_ANEW}")
     try:
         values = np.array([float(word) for word in words])
     except ValueError:
-        raise MeshError(f"its voxels are no numbers; {SAVE_ANEW}") from None
+        raise MeshError(f"its voxels are not numbers; {SAVE_ANEW}") from None
     if dtype.kind in "iu":
         limits = np.iinfo(dtype)
         if not ((values == np.rint(values)) & (values >= limits.min) & (values <= limits.max)).all():
-            raise MeshError(f"a voxel is no number of the type that its header gives; {SAVE_ANEW}")
+            raise MeshError(f"a voxel does not fit the type in the header; {SAVE_ANEW}")
     return values.astype(dtype).reshape(shape, order="F")
 
 

@@ -40,15 +40,15 @@ def _is_binary(data: bytes) -> bool:
     expected = _HEADER + _FACET.itemsize * count
     if len(data) == expected:
         if not count:
-            raise MeshError("the file holds no facet")
+            raise MeshError("the file has no facet")
         return True
     if b"\0" not in data:  # every binary file contains a zero byte, a text file none
         return False
     if len(data) < _HEADER:
-        raise MeshError("this is no STL file, or it is cut off in its header")
-    state = "cut off, or no STL file" if len(data) < expected else "damaged, or no STL file"
+        raise MeshError("this is no STL file, or it is truncated in its header")
+    state = "truncated, or no STL file" if len(data) < expected else "damaged, or no STL file"
     raise MeshError(
-        f"the file is {state}: a binary STL of the {count:,} facets that its header names has {expected:,} bytes, "
+        f"the file is {state}: a binary STL of the {count:,} facets in its header has {expected:,} bytes, "
         f"this file has {len(data):,}"
     )
 
@@ -78,11 +78,13 @@ def _refuse_torn(words: list[bytes]) -> None:
     """Raise MeshError if the keywords of a text file do not form complete solids of complete facets."""
     n_facets = words.count(b"facet")
     if not n_facets:
-        raise MeshError("the file holds no facet")
+        raise MeshError("the file has no facet")
     expected = {b"vertex": 3 * n_facets, b"endfacet": n_facets, b"endsolid": words.count(b"solid")}
     lines = ", ".join(f"{words.count(word)} of {count} '{word.decode()}'" for word, count in expected.items())
     marks = "".join(_MARKS[word] for word in words)
     if any(words.count(word) != count for word, count in expected.items()):
-        raise MeshError(f"the file is cut off or damaged: it has {lines} lines")
+        raise MeshError(f"the file is truncated or damaged: it has {lines} lines")
     if marks.replace("fvvvF", "").replace("sS", ""):
-        raise MeshError("the file is damaged: its facets and solids do not follow each other, each of three vertices")
+        raise MeshError(
+            "the file is damaged: its facets, each of three vertices, and its solids do not follow in order"
+        )

@@ -13,9 +13,9 @@ Rows = Sequence[Sequence[bytes]]
 def integers(rows: Rows, lines: Sequence[int], what: str) -> Ints:
     """Return all fields of all rows as integers, shape (n,); raise MeshError with the line of one that is not."""
     try:
-        return np.array(_numbers(rows, lines, what, int, "a whole number"), dtype=np.int64)
+        return np.array(_numbers(rows, lines, what, int, "an integer"), dtype=np.int64)
     except OverflowError:
-        raise MeshError(f"line {lines[0]} or later: {what}: a number has more digits than any mesh needs") from None
+        raise MeshError(f"line {lines[0]} or later: {what}: a number has too many digits for a mesh") from None
 
 
 def reals(rows: Rows, lines: Sequence[int], what: str) -> Floats:
@@ -27,7 +27,7 @@ def refuse_ragged(rows: Rows, lines: Sequence[int], columns: int, what: str) -> 
     """Raise MeshError, with the line, if a row does not have `columns` fields."""
     for row, line in zip(rows, lines, strict=True):
         if len(row) != columns:
-            raise MeshError(f"line {line}: {what} takes {columns} numbers, found {len(row)}")
+            raise MeshError(f"line {line}: {what} needs {columns} numbers, found {len(row)}")
 
 
 def word(field: bytes) -> str:

@@ -33,23 +33,25 @@ _COORDINATES = ("X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES")
 
 
 def read_legacy_grid(data: bytes) -> Grid:
-    """Read a legacy .vtk file with its arrays; raise MeshError if it is damaged or holds no grid."""
+    """Read a legacy .vtk file with its arrays; raise MeshError if it is damaged or contains no grid."""
     head = re.match(
         rb"# vtk DataFile Version\s+(\d+)\.\d+[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)[ \t\r]*\n",
         data,
         re.IGNORECASE,
     )
     if head is None:
-        raise MeshError("this is no .vtk file: it begins with # vtk DataFile Version, title, ASCII or BINARY, DATASET")
+        raise MeshError(
+            "this is no .vtk file: it must begin with # vtk DataFile Version, title, ASCII or BINARY, DATASET"
+        )
     data_set = head[3].decode().upper()
     if data_set not in _MADE:
         raise MeshError(
-            f"DATASET {word(head[3])} is not read; {', '.join(_MADE)} are: in ParaView, Append Datasets and save it "
-            "as .vtu"
+            f"DATASET {word(head[3])} is not supported; supported: {', '.join(_MADE)}; in ParaView, Append Datasets "
+            "and save as .vtu"
         )
     is_text = head[2].upper() == b"ASCII"
     if is_text and not data[-1:].isspace():
-        raise MeshError("the last line has no line end: is the file cut off? If it is whole, add one")
+        raise MeshError("the last line has no line end: is the file truncated? If it is whole, add one")
     cursor = _Cursor(data, head.end(), is_text)
     grid: dict[str, Any] = {}
     arrays: dict[str, dict[str, NDArray[Any]]] = {"POINT_DATA": {}, "CELL_DATA": {}, "": {}}
@@ -92,12 +94,12 @@ def read_legacy_grid(data: bytes) -> Grid:
             case ["METADATA"]:
                 cursor.skip_metadata()
             case _:
-                cursor.refuse(f"'{' '.join(fields)[:40]}' is no keyword that is read here, or lacks its counts")
+                cursor.refuse(f"'{' '.join(fields)[:40]}' is not a supported keyword, or lacks its counts")
     if data_set == "RECTILINEAR_GRID" and all(name in grid for name in _COORDINATES):
         grid["points"] = lattice_points([grid[name] for name in _COORDINATES])
     for name in _MADE[data_set]:
         if name not in grid:
-            raise MeshError(f"there are no {name}: is the file cut off?")
+            raise MeshError(f"there are no {name}: is the file truncated?")
     made = _made(data_set, grid, arrays["POINT_DATA"], arrays["CELL_DATA"])
     for what, there in (("POINT_DATA", len(made.points)), ("CELL_DATA", len(made.types))):
         for name, values in (made.point_arrays if what == "POINT_DATA" else made.cell_arrays).items():
@@ -165,13 +167,13 @@ class _Cursor:
         count = n_rows * n_columns
         code = _CODES.get(kind.lower())
         if code is None:
-            self.refuse(f"an array of type '{kind[:40]}' is not read: save without it, or as .vtu")
+            self.refuse(f"an array of type '{kind[:40]}' is not supported: save without it, or as .vtu")
         values = self._text_values(code, count) if self._is_text else self._binary_values(code, count)
         return values if n_columns == 1 else values.reshape(n_rows, n_columns)
 
     def _text_values(self, code: str, count: int) -> NDArray[Any]:
         if count > len(self._data) - self._next:
-            self.refuse(f"{count} numbers are announced, the file ends before")
+            self.refuse(f"{count} numbers are stated, the file ends before")
         words = self._data[self._next :].split(None, count)
         rest = len(words[count]) if len(words) > count else 0
         convert, dtype = (float, np.float64) if code.startswith("f") else (int, np.int64)
@@ -180,9 +182,9 @@ class _Cursor:
         except (ValueError, OverflowError):
             good = next(place for place, text in enumerate(words) if not _is(convert, text))
             self._here = len(self._data) - len(self._data[self._next :].split(None, good)[-1])
-            self.refuse(f"{count} numbers are announced here, number {good + 1} is '{word(words[good])}'")
+            self.refuse(f"{count} numbers are stated here, number {good + 1} is '{word(words[good])}'")
         if len(values) < count:
-            self.refuse(f"{count} numbers are announced, the file ends after {len(values)}")
+            self.refuse(f"{count} numbers are stated, the file ends after {len(values)}")
         self._next = len(self._data) - rest
         return values
 
@@ -191,7 +193,7 @@ class _Cursor:
         size = -(-count // 8) if code == _BIT else count * dtype.itemsize
         left = len(self._data) - self._next
         if size > left:
-            self.refuse(f"{size} bytes are announced, the file ends after {left}")
+            self.refuse(f"{size} bytes are stated, the file ends after {left}")
         raw = self._data[self._next : self._next + size]
         self._next += size
         if code == _BIT:
@@ -219,7 +221,7 @@ class _Cursor:
             heads.append(place)
             place += 1 + flat[place]
         if len(heads) != n_cells or place != len(flat):
-            self.refuse(f"{what} announces {n_cells} cells in {size} numbers, these hold {len(heads)}")
+            self.refuse(f"{what} states {n_cells} cells in {size} numbers, these contain {len(heads)}")
         values = np.array(flat, dtype=np.int64)
         return Lists(np.concatenate([[0], np.cumsum(values[heads])]).astype(np.int64), np.delete(values, heads))
 
@@ -231,7 +233,7 @@ class _Cursor:
                 self.skip_metadata()
                 fields = self.fields()
             if len(fields) != 4:
-                self.refuse(f"an array has a name, components, rows and a type, not '{' '.join(fields)[:40]}'")
+                self.refuse(f"an array must have a name, components, rows and a type, not '{' '.join(fields)[:40]}'")
             yield unquote(fields[0]), self.array(fields[3], self.count(fields[2]), self.count(fields[1]))
 
     def colors(self, n_rows: int, n_columns: int) -> None:

@@ -14,7 +14,7 @@ from truespring.opening import file_beside, read_file
 
 _TYPES = {".vtu": "UnstructuredGrid", ".vtp": "PolyData", ".vts": "StructuredGrid", ".vtr": "RectilinearGrid"}
 
-#: Functions that recognise a file, by suffix: of files that hold a grid, and of parallel files that name its pieces.
+#: Functions that recognise a file, by suffix: of files that contain a grid, and of parallel files that name its pieces.
 VTK_FORMATS: Mapping[str, Recognises] = {
     ".vtu": is_vtk_xml(_TYPES[".vtu"]),
     ".vtk": is_vtk,
@@ -32,7 +32,7 @@ def read_vtk(data: bytes, folder: Path) -> Contents:
 
 
 def read_vtk_grid(data: bytes, folder: Path) -> Grid:
-    """Read the grid of a VTK file with its arrays; raise MeshError if it is damaged or holds no grid."""
+    """Read the grid of a VTK file with its arrays; raise MeshError if it is damaged or contains no grid."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     if data[:1000].lstrip()[:1] != b"<":
         return read_legacy_grid(data)
@@ -43,12 +43,12 @@ def read_vtk_grid(data: bytes, folder: Path) -> Grid:
     if kind[:1] != "P" or kind[1:] not in GRIDS:
         known = ", ".join((*GRIDS, *(f"P{name}" for name in GRIDS)))
         raise MeshError(
-            f"a VTKFile of type {kind[:40] or 'none'} is not read; {known} are: in ParaView, Append Datasets and save "
-            "it as .vtu"
+            f"a VTKFile of type {kind[:40] or 'none'} is not supported; supported: {known}; in ParaView, Append "
+            "Datasets and save it as .vtu"
         )
     names = [piece.get("Source", "") for piece in root.iterfind(f"{kind}/Piece")]
     if not names or len(names) > _MOST_PIECES or len(set(names)) < len(names):
-        raise MeshError(f"it names {len(names)} pieces, {len(set(names))} of them different: name each once")
+        raise MeshError(f"it names {len(names)} pieces, only {len(set(names))} of them different: name each once")
     return one_grid([grid for name in names for grid in _piece(file_beside(folder, name, MeshError), kind[1:])])
 
 

@@ -101,9 +101,9 @@ def contents(grid: Grid) -> Contents:
     """Return the contents of a grid; raise MeshError if offsets and connectivity do not fit."""
     points, offsets, connectivity, types, point_arrays, cell_arrays, notes = grid
     if len(offsets) != len(types) + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
-        raise MeshError(f"{len(offsets)} offsets do not belong to {len(types)} cells, or do not ascend from 0")
+        raise MeshError(f"{len(offsets)} offsets do not match {len(types)} cells, or do not ascend from 0")
     if offsets[-1] != len(connectivity):
-        raise MeshError(f"the cells have {offsets[-1]} nodes by their offsets, {len(connectivity)} are listed")
+        raise MeshError(f"the offsets give {offsets[-1]} nodes of cells, {len(connectivity)} are listed")
     cells = [_cells(block, offsets, connectivity, int(types[block[0]])) for block in _blocks(types, np.diff(offsets))]
     return Contents(
         node_numbers=np.arange(len(points)),
@@ -133,7 +133,7 @@ def _cells(numbers: Ints, offsets: Ints, connectivity: Ints, type_: int) -> Cell
     kind, expected = _TYPES[type_]
     n_nodes = int(offsets[first + 1] - offsets[first])
     if n_nodes != expected and (expected is not None or n_nodes < CELL_KINDS[kind][1]):
-        raise MeshError(f"cell {first} is a {kind} by its type {type_}, and has {n_nodes} nodes")
+        raise MeshError(f"cell {first} is a {kind} by its type {type_}, but has {n_nodes} nodes")
     nodes = connectivity[offsets[numbers, None] + np.arange(n_nodes)]
     order = {8: _PIXEL, 11: _VOXEL, 13: WEDGE}.get(type_)
     if type_ >= _BEZIER:  # the other nodes are control points, which do not lie on the edges

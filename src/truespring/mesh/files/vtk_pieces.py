@@ -24,7 +24,7 @@ _SAME_VALUE = 1e-6
 def one_grid(pieces: Sequence[Grid]) -> Grid:
     """Return one grid of several pieces, without ghost cells, joined where their points coincide.
 
-    Coincident points of the same piece stay distinct. Cells that are in two pieces are taken once. Raises MeshError
+    Coincident points of the same piece stay distinct. Cells that are in two pieces are read once. Raises MeshError
     if no piece has a point.
     """
     there = [whole for piece in pieces if len(piece.points) and len((whole := _without_ghosts(piece)).points)]
@@ -94,11 +94,11 @@ def _joined(pieces: Sequence[Grid]) -> Grid:
     notes = [
         *dict.fromkeys(note for piece in pieces for note in piece.notes),
         f"{len(pieces)} pieces were joined at the {n_shared} points that they share",
-        *([f"{is_again.sum()} cells are in two pieces and were taken once"] if is_again.any() else []),
-        *([f"at {n_left} places a piece has several points: pieces were not joined there"] if n_left else []),
+        *([f"{is_again.sum()} cells are in two pieces and were read once"] if is_again.any() else []),
+        *([f"at {n_left} positions a piece has several points: pieces were not joined there"] if n_left else []),
         *(
             f"pieces differ in {name} by up to {gap:.2g} of its largest value at points that they share: the first "
-            "piece's values were taken"
+            "piece's values are used"
             for name, gap in differing
         ),
     ]
@@ -107,7 +107,7 @@ def _joined(pieces: Sequence[Grid]) -> Grid:
 
 
 def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
-    """Return the merged index of each point, the first point of each index, and the number of places not merged."""
+    """Return the merged index of each point, the first point of each index, and the number of positions not merged."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
@@ -117,7 +117,7 @@ def _numbered(points: Floats, owner: Ints) -> tuple[Ints, Ints, int]:
     pairs = finite[KDTree(points[finite]).query_pairs(_SAME_PLACE * size, output_type="ndarray").reshape(-1, 2)]
     n = len(points)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)))
-    # A place with several points of the same piece may be a crack: it is ambiguous which points to merge.
+    # A position with several points of the same piece may be a crack: it is ambiguous which points to merge.
     n_pieces = int(owner.max()) + 1
     key, inverse, counts = np.unique(place.astype(np.int64) * n_pieces + owner, return_inverse=True, return_counts=True)
     apart = np.unique(place[counts[inverse] > 1])

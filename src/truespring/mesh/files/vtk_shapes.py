@@ -49,7 +49,10 @@ def lattice(dims: Sequence[int], points: Floats, point_arrays: Arrays, cell_arra
 
 
 def lattice_points(coordinates: Sequence[Floats]) -> Floats:
-    """Return the points of a rectilinear grid, shape (n_points, 3); raise MeshError if there are too many."""
+    """Return the points of a rectilinear grid [the file's unit], shape (n_points, 3).
+
+    Raise MeshError if there are too many.
+    """
     try:
         refuse_too_large(24 * math.prod(map(len, coordinates)))
     except ValueError as error:
@@ -89,7 +92,7 @@ def faces(points: Floats, lists: Mapping[str, Lists], point_arrays: Arrays, cell
         rows.append(first + owner)
         first += len(offsets) - 1
     if not sizes:
-        raise MeshError("there are no polygons, lines or points: is the file cut off?")
+        raise MeshError("there are no polygons, lines or points: is the file truncated?")
     order = np.concatenate(rows)
     for name, values in cell_arrays.items():
         if len(values) != first:

@@ -50,13 +50,13 @@ def root_of(data: bytes) -> ElementTree.Element:
     tag, end = _appended(data)
     text = data[: tag.end()] + data[end:] if tag else data
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise MeshError("this is no file of VTK's XML: it declares entities")
+        raise MeshError("this is no VTK XML file: it declares entities")
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise MeshError(f"this is no file of VTK's XML, or not a whole one: {error}") from None
+        raise MeshError(f"this is no VTK XML file, or an incomplete one: {error}") from None
     if root.tag != "VTKFile":
-        raise MeshError(f"this is no file of VTK's XML: expected VTKFile, found {root.tag[:40]}")
+        raise MeshError(f"this is no VTK XML file: expected VTKFile, found {root.tag[:40]}")
     return root
 
 
@@ -65,7 +65,7 @@ def _appended(data: bytes) -> tuple[re.Match[bytes] | None, int]:
     tag = re.search(rb"<AppendedData[^>]*>", data)
     end = data.rfind(b"</AppendedData>")
     if tag and end < tag.end():
-        raise MeshError("<AppendedData> has no end: the file is cut off")
+        raise MeshError("<AppendedData> has no end tag: the file is truncated")
     return tag, end
 
 
@@ -142,7 +142,7 @@ class Reader:
     def _points(self, piece: ElementTree.Element, n_points: int) -> Floats:
         points = next(iter(self.arrays(piece, "Points", n_points).values()), np.zeros((0, 3)))
         if points.shape != (n_points, 3):
-            raise MeshError(f"<Points> holds an array of shape {points.shape}, not ({n_points}, 3)")
+            raise MeshError(f"<Points> has an array of shape {points.shape}, not ({n_points}, 3)")
         return points.astype(np.float64)
 
     def _lists(self, piece: ElementTree.Element, section: str, n_cells: int) -> Lists:
@@ -151,7 +151,7 @@ class Reader:
             return Lists(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
         ends = self._integers(piece, section, "offsets", n_cells)
         if len(ends) != n_cells:
-            raise MeshError(f"{n_cells} cells are announced, found {len(ends)} offsets")
+            raise MeshError(f"{n_cells} cells are stated, found {len(ends)} offsets")
         return Lists(np.concatenate([[0], ends]), self._integers(piece, section, "connectivity", int(ends[-1])))
 
     def _integers(self, piece: ElementTree.Element, section: str, name: str, n_values: int) -> Ints:
@@ -200,10 +200,10 @@ class Reader:
             case "appended":
                 begin = int(element.get("offset", ""))
                 if not 0 <= begin <= len(self._appended):
-                    raise ValueError(f"offset {begin} lies outside of what is appended")
+                    raise ValueError(f"offset {begin} lies outside of the appended data")
                 data = self._bytes(self._appended[begin:], self._is_raw, n_values * np.dtype(code).itemsize)
             case other:
-                raise ValueError(f"format {other[:40]} is not read")
+                raise ValueError(f"format {other[:40]} is not supported")
         return np.frombuffer(data, np.dtype(self._order + code))
 
     def _bytes(self, coded: memoryview, is_raw: bool, expected: int) -> bytes | memoryview:
@@ -223,7 +223,7 @@ class Reader:
         _, block, last, *compressed = self._sizes(coded, 3 + count, is_raw)
         sizes = [block] * (count - 1) + [last or block]  # of the decompressed blocks
         if sum(sizes) != expected:
-            raise ValueError(f"its header announces {sum(sizes)} bytes, expected {expected}")
+            raise ValueError(f"its header states {sum(sizes)} bytes, expected {expected}")
         self._n_bytes += expected
         refuse_too_large(self._n_bytes)
         data = _split(_split(coded, (3 + count) * size, is_raw)[1], sum(compressed), is_raw)[0]
@@ -242,7 +242,7 @@ def _split(coded: memoryview, size: int, is_raw: bool) -> tuple[bytes | memoryvi
     length = size if is_raw else _length(size)
     data = coded[:length] if is_raw else base64.b64decode(coded[:length], validate=True)
     if len(data) < size:
-        raise ValueError(f"{size} bytes are announced, found {len(data)}")
+        raise ValueError(f"{size} bytes are stated, found {len(data)}")
     return data[:size], coded[length:]
 
 
@@ -282,5 +282,5 @@ def _count(piece: ElementTree.Element, name: str, default: str = "") -> int:
 def _choice(element: ElementTree.Element, name: str, allowed: Mapping[str, _T], default: str = "") -> _T:
     value = element.get(name, default)
     if value not in allowed:
-        raise MeshError(f'{name}="{value[:40]}" is not read; {", ".join(allowed)} are')
+        raise MeshError(f'{name}="{value[:40]}" is not supported; supported: {", ".join(allowed)}')
     return allowed[value]
