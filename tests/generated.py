@@ -22,6 +22,8 @@ from truespring.loading import LOADS
 from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS
 from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.models.gaussian_rule import GAUSSIAN_LAWS
+from truespring.models.gaussian_weights import HOURGLASS_LIMITS
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS
 from truespring.study import schema
@@ -241,10 +243,22 @@ def _model(rng: random.Random, element: str) -> Tables:
         case _:
             model["law"] = rng.choice(list(LAWS))
     if kind == "fem" and rng.random() < 0.4:
-        model["element"] = rng.choice(
-            [one for one in ELEMENTS if one != ("mean-dilatation" if simplices else "quadratic")]
-        )
+        second = [one for one in ELEMENTS if one.startswith("quadratic")]
+        model["element"] = rng.choice(["linear", *(second if simplices else ["mean-dilatation"])])
+    if model.get("rule") == "gaussian":
+        model |= _gaussian(rng, element)
     return model
+
+
+def _gaussian(rng: random.Random, element: str) -> Tables:
+    """Keys of Gaussian springs that go with elements of a kind."""
+    if element in HOURGLASS_LIMITS:
+        keys: Tables = {"hourglass": rng.uniform(0.6, 1.5), "law": rng.choice(GAUSSIAN_LAWS)}
+    else:
+        keys = {"law": rng.choice(GAUSSIAN_LAWS)}
+        if element in ("triangle", "tetrahedron") and rng.random() < 0.5:
+            keys = {"element": "quadratic"}
+    return {key: value for key, value in keys.items() if rng.random() < 0.6}
 
 
 def _compare(rng: random.Random, dim: int, size: list[float], names: list[str]) -> Tables:

@@ -119,7 +119,7 @@ def test_gaussian_springs_follow_fem_that_does_not_lock(results: dict[str, Resul
         errors["neo-hookean"].rms_error < 0.01 < 0.05 < errors["springs"].rms_error < 0.3 < errors["linear"].rms_error
     )
     gaussian = result.paths["gaussian"].states[-1]
-    assert gaussian.displacement[result.probe, 1] / 0.16 == pytest.approx(-0.49, abs=0.02)
+    assert gaussian.displacement[result.probe, 1] / 0.16 == pytest.approx(-0.56, abs=0.01)
 
 
 def test_springs_on_an_imported_mesh_are_finite_elements(results: dict[str, Result]) -> None:
