@@ -57,6 +57,7 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
     yield from _limit(results)
     yield from _accuracy(runs)
     yield from _aims(results, runs)
+    yield from _gaussian(json.loads((HERE / "gaussian.json").read_text()))
     yield from _recorded(recorded)
 
 
@@ -333,6 +334,46 @@ def _aims(results: dict, runs: list[Measured]) -> Iterator[str]:
         yield "Why:\n"
         yield from (f"* {what}: {why}" for what, why in reasons.items())
         yield ""
+
+
+def _gaussian(results: dict) -> Iterator[str]:
+    """Yield the section on Gaussian springs beside finite elements, from benchmarks/gaussian.json."""
+    yield "## Gaussian springs\n"
+    yield (
+        "`python -m benchmarks.gaussian` measures Gaussian springs beside neo-Hookean finite elements in one run: "
+        f"{results['date']}, commit {results['commit']}, {results['machine']['cores']} cores. Finite elements have "
+        "mean dilatation, the default above a Poisson's ratio of 0.4. A tangent includes its assembly.\n"
+    )
+    head = ("body", "model", "elements", "force, ms", "tangent, ms", "solve, s", "iterations", "linear solver", "error")
+    rows = [(f"organ, nu {poisson}", one) for poisson, pair in results["organ"].items() for one in pair]
+    rows += [("block, nu 0.45", one) for one in results["block"]]
+    yield from table(head, (_timed(body, one) for body, one in rows), words=(0, 1, 7))
+    ratios = []
+    for poisson, (springs, fem) in results["organ"].items():
+        parts = [f"{what} {springs[what] / fem[what]:.3f}" for what in ("force", "tangent", "solve")]
+        ratios.append(f"on the organ at nu {poisson}, {', '.join(parts)}")
+    first, last = results["block"][0], results["block"][-1]
+    yield (
+        f"Springs over finite elements: {'; '.join(ratios)}. The block is bent by half its length; its error is the "
+        "rms distance at the nodes of the coarsest mesh from finite elements on two fine meshes, extrapolated. At no "
+        f"larger error, finite elements take {last['solve'] / first['solve']:.0f} times as long as springs.\n"
+    )
+
+
+def _timed(body: str, one: dict) -> tuple[str, ...]:
+    """Return a row of the table of Gaussian springs."""
+    cells = one["cells"]
+    return (
+        body,
+        one["model"],
+        f"{cells:,}" if isinstance(cells, int) else " x ".join(map(str, cells)),
+        f"{1e3 * one['force']:.2g}",
+        f"{1e3 * one['tangent']:.2g}",
+        f"{one['solve']:.2g}",
+        str(one["iterations"]),
+        one["linear"],
+        "" if one["error"] is None else f"{one['error']:.2%}",
+    )
 
 
 def _recorded(recorded: dict) -> Iterator[str]:

@@ -162,8 +162,8 @@ DEFAULTS = (
     (
         "hexahedra",
         "1 / (1 + nu^2)",
-        "within 2 % in bending from 2 elements deep on at any nu; at 1, torsion is 5 % too stiff at 4 deep, and smaller "
-        "values are better still",
+        "within 2 % in bending from 2 elements deep on at any nu; at 1, torsion is 5 % too stiff at 4 deep, less is "
+        "better still",
     ),
     (
         "equal bricks that do not fill their bounding box, such as voxels",

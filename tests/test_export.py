@@ -260,6 +260,7 @@ def test_both_files_hold_the_same_keys_and_numbers(case: str) -> None:
 
 def test_every_number_with_a_dimension_has_its_unit() -> None:
     without = {"truespring", "poisson", "load_factor", "probe", "springs", "elements", "material_numbers", "held"}
+    without |= {"dimension"}
     for case in CASES:
         values = from_json(exported(case))
         texts = {name for name, value in values.items() if isinstance(value, str)} | {"header", "units"}
@@ -547,6 +548,7 @@ def _with_feature() -> dict[Feature, tuple[ts.Problem, Any]]:
         Feature.PRESSURE: (_pulled(), ts.Springs("gaussian")),
         Feature.NEGATIVE: (flat, ts.Springs("isotropic", allow_negative=True)),
         Feature.PRESTRESS: (prestressed.problem, network_of(prestressed)),
+        Feature.FORCE_LAW: (_pulled(), ts.Springs("isotropic", law="neo-hookean")),
         Feature.FOLLOWING: (exported("pressed").problem, ts.Springs("lloyd")),
     }
 

@@ -15,10 +15,15 @@ from tests.law_contract import CHECKS
 from truespring.arrays import Floats
 from truespring.material import Lame
 from truespring.models import LAWS, Constant, Law
+from truespring.models.fem_potential import FemPotential
+from truespring.models.invariants import Derivatives, condensed
 from truespring.models.law import Constants, Response
-from truespring.models.laws import _free_thickness, material_constants, neo_hookean
+from truespring.models.laws import material_constants
+from truespring.models.rubber import gent, neo_hookean, yeoh
 from truespring.models.symmetric import determinant, inverted
 from truespring.study import schema
+
+MODULI = {"young", "poisson", "mu", "bulk", "density"}
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
@@ -36,7 +41,7 @@ def test_keys_of_a_material_are_one_thing_each() -> None:
             assert constant.smallest <= constant.example <= constant.largest
             assert constant.meaning and name.isidentifier()
     assert all(len(units) == 1 for units in by_name.values())
-    assert not by_name.keys() & {"young", "poisson", "density", "on"}
+    assert not by_name.keys() & {*MODULI, "on"}
 
 
 # --- a law with constants of its own ----------------------------------------------------------------------------------
@@ -47,7 +52,7 @@ def _of_c(c: Constants) -> Constants:
 
 
 SCRATCH = Law(
-    lambda C, c: neo_hookean(C, _of_c(c)),
+    lambda C, c: LAWS["neo-hookean"].respond(C, _of_c(c)),
     lambda stretch, c: LAWS["neo-hookean"].density(stretch, _of_c(c)),
     label="scratch",
     source="the neo-Hookean law by other constants",
@@ -98,6 +103,11 @@ def _at_finite_strain(law: Law) -> Law:
     return replace(law, respond=respond)
 
 
+def _by_wrong_slope(I1: Floats, y: Floats, constants: Constants) -> Derivatives:
+    found = yeoh(I1, y, constants)
+    return replace(found, by_trace_y=1.01 * found.by_trace_y)
+
+
 def _another_thickness(law: Law) -> Law:
     """The law with the third stretch of a body in space where it has no thickness."""
 
@@ -109,6 +119,11 @@ def _another_thickness(law: Law) -> Law:
 
 
 WRONG: dict[str, Law] = {
+    "said to be linear in I1": replace(LAWS["yeoh"], constant_springs=True),
+    "said to be not linear in I1": replace(LAWS["neo-hookean"], constant_springs=False),
+    "another second derivative": replace(LAWS["yeoh"], invariants=_by_wrong_slope),
+    "another function of I1": replace(LAWS["gent"], invariants=neo_hookean),
+    "said to have separate energies": replace(LAWS["neo-hookean"], volumetric="bulk"),
     "ten times too stiff in volume": _ten_times(LAWS["neo-hookean"]),
     "and so is its formula": _wrong_formula_too(LAWS["neo-hookean"]),
     "at finite strain only": _at_finite_strain(LAWS["neo-hookean"]),
@@ -188,6 +203,27 @@ def test_simplices_of_a_law_without_a_trace_are_quadratic() -> None:
         ts.Fem("scratch", "quadratic-mean-dilatation").potential(problem)
 
 
+@pytest.mark.parametrize("law", [name for name, law in LAWS.items() if law.trace == "logarithmic"])
+def test_the_named_modulus_is_at_the_mean(law: str) -> None:
+    """Elements with mean dilatation differ by K/2 ((ln of the mean of J)^2 - mean of (ln J)^2), K lam or bulk."""
+    values = {name: constant.example for name, constant in LAWS[law].constants.items()}
+    mesh = ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron")
+    stuff = ts.Material(2.0, 0.4, constants=values)
+    problem = ts.Problem(mesh, stuff, None, [ts.Fixed("left")], [ts.Force("right", (0.1, 0.0, 0.0))])
+    plain, mean = (ts.Fem(law, element).potential(problem) for element in ("quadratic", "quadratic-mean-dilatation"))
+    assert isinstance(plain, FemPotential)
+    positions = plain.nodes + 0.2 * plain.nodes**2
+    gradients, volumes = plain.quadrature()
+    F = np.einsum("eki,epkj->epij", positions[plain.elements], gradients)
+    J = np.linalg.det(F)
+    lam, mu = stuff.lame
+    modulus = {"lam": lam, "bulk": lam + 2 / 3 * mu}[LAWS[law].volumetric]
+    average = (volumes * J).sum(axis=1) / volumes.sum(axis=1)
+    change = (volumes.sum(axis=1) * np.log(average) ** 2).sum() - (volumes * np.log(J) ** 2).sum()
+    assert abs(change) > 1e-4
+    assert mean.energy(positions) - plain.energy(positions) == pytest.approx(modulus / 2 * change, rel=1e-9)
+
+
 def test_constants_of_a_material_are_values() -> None:
     assert ts.Material(2.07, 0.2647, constants=(("c2", 0.9), ("c1", 0.41))) == MATERIAL
     assert len({MATERIAL, replace(MATERIAL, constants={"c1": 0.41, "c2": 0.9}), replace(MATERIAL, constants={})}) == 2
@@ -205,14 +241,14 @@ def test_a_study_takes_them_with_units() -> None:
             table.model_validate({"young": 1.0, "poisson": 0.3, key: value})
     described = table.model_json_schema()["properties"]["c1"]["description"]
     assert "half of the shear modulus" in described and "[Pa]" in described
-    assert set(material_constants()) == set(schema.MaterialKeys.model_fields) - {"young", "poisson", "density"}
+    assert set(material_constants()) == set(schema.MaterialKeys.model_fields) - MODULI
 
 
 @pytest.mark.parametrize("ratio", [-0.6, -0.2, 0.0, 0.5, 2.0, 100.0])
 def test_the_free_thickness_is_the_root_on_the_branch_that_begins_at_rest(ratio: float) -> None:
     """Of e^y - 1 + ratio/2 (log det + y), by bisection above its minimum; none where that is above zero."""
     log_det = np.linspace(-6.0, 6.0, 49)
-    found = _free_thickness(log_det, ratio)
+    found = condensed(neo_hookean, 2.0 + log_det**2, log_det / 2, 2, Constants(ratio, 1.0, True)).C_33
     for value, at in zip(found, log_det, strict=True):
 
         def rest(y: float, at: float = at) -> float:
@@ -223,3 +259,94 @@ def test_the_free_thickness_is_the_root_on_the_branch_that_begins_at_rest(ratio:
             assert np.isnan(value)
         else:
             assert np.log(value) == pytest.approx(brentq(rest, low, 60.0, xtol=1e-14), abs=1e-9)
+
+
+# --- moduli, impossible constants, and the end of a law ---------------------------------------------------------------
+
+
+def test_moduli_of_either_pair() -> None:
+    material = ts.Material.from_moduli(1e3, 50e3, 1000.0, {"jm": 30.0})
+    lam, mu = material.lame
+    assert (mu, lam + 2 / 3 * mu) == pytest.approx((1e3, 50e3), rel=1e-12)
+    assert (material.young, material.poisson) == pytest.approx((9 * 50e3 / 151, 148 / 302), rel=1e-14)
+    table = schema.MaterialKeys.model_validate({"mu": "1 kPa", "bulk": "50 kPa", "density": 1000.0, "jm": 30})
+    assert table.build() == material
+    for mu, bulk, word in ((0.0, 1.0, "mu"), (1.0, -1.0, "bulk"), (1.0, np.inf, "bulk")):
+        with pytest.raises(ts.TruespringError, match=word):
+            ts.Material.from_moduli(mu, bulk)
+
+
+@pytest.mark.parametrize(
+    "names", ["", "young", "poisson", "mu", "bulk", "young mu", "young poisson mu", "mu bulk young"]
+)
+def test_another_set_of_moduli_is_an_error(names: str) -> None:
+    with pytest.raises(ValidationError, match="young and poisson, or mu and bulk") as error:
+        schema.MaterialKeys.model_validate(dict.fromkeys(names.split(), 0.3))
+    assert all(name in str(error.value) for name in names.split())
+    required = schema.MaterialKeys.model_json_schema()["oneOf"]
+    assert required == [{"required": ["young", "poisson"]}, {"required": ["mu", "bulk"]}]
+
+
+@pytest.mark.parametrize(
+    ("law", "constants", "named"),
+    [
+        ("gent", {}, ("jm",)),
+        ("gent", {"jm": 0.0}, ("jm = 0", "more than 0")),
+        ("arruda-boyce", {"locking_stretch": 1.0}, ("locking_stretch = 1", "more than 1")),
+        ("mooney-rivlin", {"c01": 0.6}, ("c01 = 0.6", "0.5")),
+        ("mooney-rivlin", {"c01": -0.1}, ("c01 = -0.1", "0 to inf")),
+        ("ogden", {"alpha1": 0.0}, ("alpha1 = 0",)),
+        ("ogden", {"alpha1": 2.0, "mu2": 0.1}, ("mu2 = 0.1", "alpha2")),
+        ("ogden", {"alpha1": 2.0, "alpha3": 4.0}, ("alpha3 = 4", "mu3")),
+        (
+            "ogden",
+            {"alpha1": 2.0, "mu2": 0.5, "alpha2": 3.0, "mu3": 0.5, "alpha3": 4.0},
+            ("mu2 + mu3 = 1", "modulus 1"),
+        ),
+        ("ogden", {"alpha1": 2.0, "mu2": -0.1, "alpha2": 3.0}, ("mu2 = -0.1",)),
+    ],
+)
+def test_impossible_constants(law: str, constants: dict[str, float], named: tuple[str, ...]) -> None:
+    with pytest.raises(ts.TruespringError) as error:
+        ts.Fem(law).potential(body(ts.Material.from_moduli(1.0, 10.0, None, constants)))
+    assert all(word in str(error.value) for word in named)
+
+
+def test_laws_that_are_others() -> None:
+    """Ogden of one term is Mooney-Rivlin without c01 and Yeoh without c20; a region has other constants."""
+    soft, stiff = ({"alpha1": 2.0, "c01": 0.0, "c20": 0.0, "c30": 0.0}, {"alpha1": 3.0, "mu2": 0.2, "alpha2": 2.0})
+    first = body(ts.Material.from_moduli(1.0, 10.0, None, soft))
+    positions = first.mesh.nodes * [1.3, 0.9] + 0.05 * first.mesh.nodes[:, ::-1] ** 2
+    forces = [ts.Fem(law).potential(first).gradient(positions) for law in ("ogden", "mooney-rivlin", "yeoh")]
+    assert np.abs(forces[0]).max() > 0.01
+    assert forces[1] == pytest.approx(forces[0], abs=1e-13)
+    assert forces[2] == pytest.approx(forces[0], abs=1e-13)
+    materials = [ts.Material.from_moduli(1.0, 10.0, None, one) for one in (soft, stiff)]
+    mixed = ts.Fem("ogden").potential(body(*materials))
+    alone = [ts.Fem("ogden").potential(body(one)) for one in materials]
+    assert isinstance(mixed, FemPotential)
+    found = [one.element_hessians(positions) for one in (mixed, *alone) if isinstance(one, FemPotential)]
+    assert found[0] == pytest.approx(np.concatenate([found[2][:2], found[1][2:]]), abs=1e-13)
+
+
+@pytest.mark.parametrize("model", [ts.Fem("gent"), ts.Springs(rule="gaussian", law="gent")])
+def test_a_motion_beyond_the_end_of_the_law(model: ts.Fem | ts.Springs) -> None:
+    """A strip in plane strain, sheared by g at constant volume, has I1b - 3 = g^2."""
+    material = ts.Material.from_moduli(1.0, 1e3, None, {"jm": 0.5})
+    moved = [ts.Fixed("bottom"), ts.Fixed("top", displacement=(1.0, 0.0))]
+    problem = ts.Problem(ts.rectangle((8.0, 1.0), (8, 2)), material, ts.PlaneStrain(1.0), moved, [])
+    solution = ts.solve(problem, model, ts.Newton(20))
+    assert solution.status == "not-converged"
+    assert any("jm" in warning for warning in solution.warnings)
+    assert 0.65 <= solution.states[-1].load_factor <= 0.75
+
+
+def test_the_free_thickness_near_the_end_of_a_law() -> None:
+    """An incompressible sheet; a start outside of the law's domain; a stretch that has no thickness."""
+    stretches = np.array([[1.25, 1.0], [0.75, 0.9], [1.4, 1.2], [0.6, 1.6]])
+    T, J = (stretches**2).sum(axis=1), stretches.prod(axis=1)
+    found = condensed(gent, T, np.log(J), 2, Constants(1e6, 1.0, True, {"jm": 0.6}))
+    assert found.C_33[:2] == pytest.approx(1 / J[:2] ** 2, rel=1e-4)
+    assert (T + 1 / J**2 - 3 > 0.6).tolist() == [False, False, True, True]
+    assert np.isnan(found.C_33).tolist() == [False, False, False, True]
+    assert np.abs(found.across[:3]).max() < 1e-8 * 1e6

@@ -128,14 +128,14 @@ def body(
     )
 
 
-def truss() -> ts.SpringNetwork:
+def truss(law: str = "straight") -> ts.SpringNetwork:
     """Fifteen springs between six nodes in space, some with a rest length that is not their distance."""
     generator = np.random.default_rng(2718)
     pairs = np.array([(i, j) for i in range(6) for j in range(i)])
     nodes = generator.uniform(-1, 1, (6, 3))
     distance = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
     rest_length = distance * generator.uniform(0.8, 1.2, len(pairs))
-    return ts.SpringNetwork(nodes, pairs, generator.uniform(0.5, 5, len(pairs)), rest_length)
+    return ts.SpringNetwork(nodes, pairs, generator.uniform(0.5, 5, len(pairs)), rest_length, law)
 
 
 def _spring_case(model: ts.Springs, problem: ts.Problem) -> Case:
@@ -192,6 +192,11 @@ def _springs() -> dict[str, Case]:
         "volume, plane strain": (ts.Springs("isotropic", volume=True), body(square.mesh, LONG, False)),
         "volume, cubes": (ts.Springs("isotropic", volume=True), body(cube.mesh, distorted=False, poisson=0.4)),
         "volume, below Cauchy's": (ts.Springs("isotropic", volume=True), body(cube.mesh, distorted=False, poisson=0.1)),
+        "isotropic, neo-hookean, squares": (ts.Springs("isotropic", law="neo-hookean"), square),
+        "volume, neo-hookean, cubes": (
+            ts.Springs("isotropic", volume=True, law="neo-hookean"),
+            body(cube.mesh, distorted=False, poisson=0.4),
+        ),
         "volume, tetrahedra": (ts.Springs("lloyd", volume=True), body(body_centred, distorted=False, poisson=0.4)),
     }
     return cases | {name: _spring_case(*pair) for name, pair in more.items()}
@@ -324,6 +329,7 @@ def _blocks() -> dict[str, Case]:
 
 CASES = {
     "truss": Case(truss, springs=True),
+    "truss, neo-hookean": Case(lambda: truss("neo-hookean"), springs=True),
     **_springs(),
     **_gaussian(),
     **_fem(),
@@ -378,7 +384,7 @@ def test_every_rule_law_and_element_is_here() -> None:
     laws = len(LAWS) * 2 * bodies + 2 * sum(law.trace is not None for law in LAWS.values())
     # HEML: one law on every element, the others on simplices; mass-tensor: the linear law likewise, another on these.
     links, tensors = bodies + 3 * (len(HEML_LAWS) - 1), bodies + 3
-    assert len(CASES) == 1 + rules + 11 + laws + links + tensors + 3 * len(BOUNDARIES) + 8
+    assert len(CASES) == 2 + rules + 13 + laws + links + tensors + 3 * len(BOUNDARIES) + 8
     assert rules >= 19 and laws >= 48
     assert {type(potential_of(name)).__name__ for name in CASES} == {
         *("SpringNetwork", "BiquadraticSprings", "VolumeSprings"),
@@ -474,7 +480,7 @@ def test_the_linear_law_takes_a_turn_for_strain(name: str) -> None:
 @pytest.mark.parametrize("name", EVERY)
 def test_rest_is_free_of_energy_and_force(name: str) -> None:
     potential = potential_of(name)
-    if name == "truss":  # pre-stressed on purpose
+    if name.startswith("truss"):  # pre-stressed on purpose
         assert potential.energy(potential.nodes) > 0
         return
     elsewhere = deformed(potential.nodes, 31)
@@ -691,7 +697,9 @@ def test_only_springs_tell_their_stretch(name: str) -> None:
         grown = potential.stretch(potential.nodes * 1.25) / potential.stretch(potential.nodes)
         assert grown == pytest.approx(np.full(len(grown), 1.25))
     if isinstance(potential, ts.SpringNetwork):
-        tension = potential.stiffness * potential.rest_length * (potential.stretch(potential.nodes * 1.25) - 1)
+        s, dim = potential.stretch(potential.nodes * 1.25), potential.nodes.shape[1]
+        line = s - 1 if potential.law == "straight" else (s - s ** -(dim + 1)) / (dim + 2)
+        tension = potential.stiffness * potential.rest_length * line
         assert potential.stress(potential.nodes * 1.25) == pytest.approx(tension)
 
 

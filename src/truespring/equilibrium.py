@@ -115,6 +115,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
             *model.warnings(problem),
             *broken,
             *path_warnings(states, best, model.finite, stable, below_rounding),
+            *([model.limit] if best is not None and model.limit else ()),
         ),
         best=best,
         potential=potential,

@@ -5,9 +5,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 from truespring.errors import ProblemError
+
+_MODULI = {"mu": "shear", "bulk": "bulk"}
 
 
 class Lame(NamedTuple):
@@ -48,6 +50,24 @@ class Material:
             )
         if self.density is not None and not (math.isfinite(self.density) and self.density > 0):
             raise ProblemError(f"density = {self.density!r} kg/m^3: the density must be positive and finite")
+
+    @classmethod
+    def from_moduli(
+        cls,
+        mu: float,
+        bulk: float,
+        density: float | None = None,
+        constants: Mapping[str, float] | Sequence[tuple[str, float]] = (),
+    ) -> Self:
+        """Return the material of a shear modulus and a bulk modulus at small strain [Pa], both positive.
+
+        young = 9 bulk mu / (3 bulk + mu) and poisson = (3 bulk - 2 mu) / (2 (3 bulk + mu)).
+        """
+        for name, value in (("mu", mu), ("bulk", bulk)):
+            if not (math.isfinite(value) and value > 0):
+                raise ProblemError(f"{name} = {value!r} Pa: the {_MODULI[name]} modulus must be positive and finite")
+        ratio = bulk / mu
+        return cls(9 * bulk / (3 * ratio + 1), (3 * ratio - 2) / (2 * (3 * ratio + 1)), density, constants)
 
     @property
     def lame(self) -> Lame:

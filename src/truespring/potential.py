@@ -93,6 +93,16 @@ class Stretched(Potential, Protocol):
 
 
 @runtime_checkable
+class Noted(Protocol):
+    """A potential whose fields need an explanation."""
+
+    @property
+    def cell_note(self) -> str:
+        """A sentence on the fields of `cell_fields`, without a full stop."""
+        ...
+
+
+@runtime_checkable
 class Visible(Potential, Protocol):
     """A potential that can be drawn: cells, and fields on them."""
 

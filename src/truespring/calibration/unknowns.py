@@ -13,9 +13,19 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.mesh import Mesh
 from truespring.mesh.selections import AXES
-from truespring.models import PrescribedSprings, SpringNetwork, Springs, VolumeSprings, VolumeTerm, shared_springs
+from truespring.models import (
+    PAIR_LAWS,
+    PrescribedSprings,
+    SpringNetwork,
+    Springs,
+    VolumeSprings,
+    VolumeTerm,
+    shared_springs,
+)
 from truespring.models.elasticity import lattice_classes
 from truespring.models.links import in_a_row, link_vectors
+from truespring.models.pair_law import PairLaw
+from truespring.models.pair_laws import STRAIGHT
 from truespring.problem import Problem
 
 Columns = sparse.csr_array[Any, tuple[int, int]]
@@ -35,6 +45,7 @@ class Unknowns:
         kind: a key of UNKNOWNS.
         names: of the unknowns, of length n.
         problem, springs: the body, and node numbers of its springs, shape (n_springs, 2).
+        law: force law of the springs, a key of PAIR_LAWS.
         stiffness: P, each spring's stiffness per unknown [N/m], sparse, shape (n_springs, n); its rows sum to the rule.
         kappa: modulus of each element's volume term per unknown [Pa], sparse, shape (n_elements, n); None without one.
     """
@@ -43,6 +54,7 @@ class Unknowns:
     names: tuple[str, ...]
     problem: Problem
     springs: Ints
+    law: str
     stiffness: Columns
     kappa: Columns | None = None
 
@@ -57,11 +69,11 @@ class Unknowns:
     def model(self, values: Floats, label: str = "springs (calibrated)") -> PrescribedSprings:
         """Return the springs with these unknowns (n,), which `solve` accepts for any problem on the same mesh."""
         kappa = np.zeros(0) if self.kappa is None else self.kappa @ values
-        return PrescribedSprings(self.springs, self.stiffness @ values, kappa, label)
+        return PrescribedSprings(self.springs, self.stiffness @ values, kappa, label, self.law)
 
     def potential(self, values: Floats) -> SpringNetwork | VolumeSprings:
         """Return the potential with these unknowns (n,), without the check for mechanisms."""
-        network = SpringNetwork(self.problem.mesh.nodes, self.springs, self.stiffness @ values)
+        network = SpringNetwork(self.problem.mesh.nodes, self.springs, self.stiffness @ values, law=self.law)
         if self.kappa is None:
             return network
         return VolumeSprings(network, VolumeTerm(self.problem, np.asarray(self.kappa @ values)))
@@ -69,10 +81,11 @@ class Unknowns:
     def forces(self, positions: Floats) -> Columns:
         """Return the derivative of the internal force by each unknown [N], sparse, shape (n_dof, n).
 
-        The internal force is this times the unknowns, at any deformation: spring s adds k_s (l - L) n to its second
-        node and takes it from its first, the volume term of an element adds kappa (V / V0 - 1) dV/dx.
+        The internal force is this times the unknowns, at any deformation: spring s adds its tension times n to its
+        second node and takes it from its first, the volume term of an element adds kappa (V / V0 - 1) dV/dx. Tensions
+        are proportional to the stiffness.
         """
-        found = _spring_forces(self.problem.mesh.nodes, self.springs, positions) @ self.stiffness
+        found = _spring_forces(self.problem.mesh.nodes, self.springs, PAIR_LAWS[self.law], positions) @ self.stiffness
         if self.kappa is not None:
             found = found + self._volume_forces(positions) @ self.kappa
         return sparse.csr_array(found)
@@ -89,13 +102,13 @@ class Unknowns:
         return VolumeTerm(self.problem, np.ones(len(self.problem.mesh.elements)))
 
 
-def _spring_forces(nodes: Floats, springs: Ints, positions: Floats) -> Columns:
+def _spring_forces(nodes: Floats, springs: Ints, law: PairLaw, positions: Floats) -> Columns:
     """Return the derivative of the internal force by the stiffness of each spring [m], shape (n_dof, n_springs)."""
     first, second = springs.T
     rest = np.linalg.norm(nodes[second] - nodes[first], axis=1)
     across = positions[second] - positions[first]
     length = np.linalg.norm(across, axis=1)
-    pull = ((length - rest) / length)[:, None] * across
+    pull = (law.tension(np.ones(len(springs)), rest, length, nodes.shape[1]) / length)[:, None] * across
     dim = nodes.shape[1]
     rows = [(ends[:, None] * dim + np.arange(dim)).ravel() for ends in (second, first)]
     columns = np.repeat(np.arange(len(springs)), dim)
@@ -124,16 +137,17 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Un
         by_link = by_link / np.bincount(place)[place]
     labels, group = UNKNOWNS[kind](problem, np.asarray(pairs), np.asarray(place))
     shape = (len(pairs), len(labels))
+    law = springs.law or STRAIGHT
     stiffness = sparse.csr_array((by_link, (place, group)), shape=shape)
     kappas = springs.kappa(problem) if springs.volume else np.zeros(len(problem.mesh.elements))
     if not kappas.any():
-        return _weighted(Unknowns(kind, tuple(labels), problem, np.asarray(pairs, dtype=np.int64), stiffness))
+        return _weighted(Unknowns(kind, tuple(labels), problem, np.asarray(pairs, dtype=np.int64), law, stiffness))
     terms, of = _volume_groups(problem, kind)
     elements = np.arange(len(kappas))
     kappa = sparse.csr_array((kappas, (elements, len(labels) + of)), shape=(len(kappas), len(labels) + len(terms)))
     wide = sparse.csr_array((stiffness.data, stiffness.indices, stiffness.indptr), shape=(len(pairs), kappa.shape[1]))
     return _weighted(
-        Unknowns(kind, (*labels, *terms), problem, np.asarray(pairs, dtype=np.int64), wide, kappa),
+        Unknowns(kind, (*labels, *terms), problem, np.asarray(pairs, dtype=np.int64), law, wide, kappa),
     )
 
 
@@ -150,6 +164,7 @@ def _weighted(unknowns: Unknowns) -> Unknowns:
         tuple(unknowns.names[number] for number in kept),
         unknowns.problem,
         unknowns.springs,
+        unknowns.law,
         sparse.csr_array(unknowns.stiffness[:, kept]),
         None if unknowns.kappa is None else sparse.csr_array(unknowns.kappa[:, kept]),
     )

@@ -12,6 +12,7 @@ from truespring.calibration.files import NAME, write_fitted
 from truespring.calibration.fitted_study import FittedStudy
 from truespring.calibration.page import calibration_values, fitted_sentence
 from truespring.errors import StudyError
+from truespring.models.pair_laws import STRAIGHT
 from truespring.outputs import Output
 from truespring.study import schema
 from truespring.study.read import Study
@@ -76,6 +77,8 @@ def calibrated_study(found: FittedStudy, folder: Path, tables: list[str]) -> str
     stiffness = {"file": tables[0], **({"volume": tables[1]} if len(tables) > 1 else {})}
     name = _free_name(study["models"])
     entry: dict[str, Any] = {"kind": "springs", "stiffness": stiffness}
+    if found.calibration.model.law != STRAIGHT:
+        entry["law"] = found.calibration.model.law
     if (found.calibration.model.stiffness < 0).any():
         entry["allow_negative"] = True
     study["models"] = {name: entry, **study["models"]}

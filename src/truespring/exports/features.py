@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from truespring.errors import ExportError
+from truespring.models.pair_laws import STRAIGHT
 from truespring.models.spring_data import COUPLING, PRESSURE, VOLUME_TERM, SpringData
 from truespring.problem import Problem
 
@@ -14,13 +15,14 @@ _AT_REST = 1e-12
 
 
 class Feature(StrEnum):
-    """A feature beyond springs of positive stiffness, at rest in the undeformed body, under dead loads."""
+    """A feature beyond linear springs of positive stiffness, at rest in the undeformed body, under dead loads."""
 
     VOLUME_TERM = VOLUME_TERM
     COUPLING = COUPLING
     PRESSURE = PRESSURE
     NEGATIVE = "negative stiffness"
     PRESTRESS = "prestress"
+    FORCE_LAW = "force law"
     FOLLOWING = "load that follows a face"
 
 
@@ -62,6 +64,11 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
                 f"the rest lengths of {tensed.size} springs differ from the distances of their nodes; the first is "
                 f"spring {first} with {network.rest_length[first]:g} m instead of {distance[first]:g} m: use springs "
                 "without prestress",
+            )
+        if not network.pair_law.linear:
+            yield (
+                Feature.FORCE_LAW,
+                f"law = '{network.law}' is a force law other than k (l - L): use law = '{STRAIGHT}'",
             )
     for load in problem.loads:
         if load.follows:

@@ -1,4 +1,4 @@
-"""Loops over springs, and over nodes for the rows of their forces and matrix.
+"""Loops over springs of the straight force law, and over nodes for the rows of forces and matrix of any springs.
 
 Shapes: x, step, forces (n_nodes, dim), springs (n_springs, 2); stiffness, rest, length, tension, pull, lengthwise,
 sideways (n_springs,); at_starts (n_nodes + 1,) and at (2 n_springs,): the ends of springs at each node, as
@@ -57,6 +57,14 @@ def tensions(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: 
     for s in range(unsigned(first), unsigned(last)):
         d = minus(row(x, springs[s, 1], zero), row(x, springs[s, 0], zero))
         tension[s] = stiffness[s] * (np.sqrt(dot(d, d)) - rest[s])
+
+
+def axial(first: int, last: int, x: Any, springs: Any, stiffness: Any, rest: Any, found: Any, zero: Any) -> None:
+    """Write the axial stiffness, the derivative of the tension with respect to the length: k.
+
+    Shapes: stiffness k, found (n_springs,).
+    """
+    found[first:last] = stiffness[first:last]
 
 
 @kernel

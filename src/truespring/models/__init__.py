@@ -26,6 +26,7 @@ from truespring.models.model import as_model as as_model
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli
 from truespring.models.network import SpringNetwork as SpringNetwork
+from truespring.models.pair_laws import PAIR_LAWS as PAIR_LAWS
 from truespring.models.prescribed import PrescribedSprings as PrescribedSprings
 from truespring.models.rules import RULES as RULES
 from truespring.models.rules import UserStiffness as UserStiffness

@@ -123,7 +123,7 @@ def _springs_beside(problem: Problem, rule: str, chosen: Bools) -> SpringNetwork
     network = springs.network(problem, per_element)
     pairs = np.sort(mesh.elements[~chosen][:, np.array(mesh.kind.links)].reshape(-1, 2), axis=1)
     kept = np.isin(np.sort(network.springs, axis=1) @ [mesh.n_nodes, 1], pairs @ [mesh.n_nodes, 1])
-    return SpringNetwork(mesh.nodes, network.springs[kept], network.stiffness[kept])
+    return SpringNetwork(mesh.nodes, network.springs[kept], network.stiffness[kept], law=network.law)
 
 
 def _check_inside(problem: Problem, inside: Ints) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.assembly import Pattern
+from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, lengths, stretch
 from truespring.models.gaussian_weights import Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
@@ -348,13 +349,9 @@ class GaussianElements:
     def _stiffness(self, state: _State) -> Floats:
         return self._summed(self._link_weights(state.law.at.by_trace))
 
-    def _lengths(self, positions: Floats) -> Floats:
-        across = positions[self.springs[:, 1]] - positions[self.springs[:, 0]]
-        return np.asarray(np.linalg.norm(across, axis=1))
-
     def stretch(self, positions: Floats) -> Floats:
         """Return length over undeformed length of each spring [-], shape (n_springs,)."""
-        return self._lengths(positions) / self._lengths(self.nodes)
+        return stretch(self.springs, self.nodes, positions)
 
     def spring_data(self) -> SpringData:
         """Return springs, elements and constants of the volume function as arrays; see docs/export/arrays.md."""
@@ -365,23 +362,20 @@ class GaussianElements:
         """Springs as lines, shape (n_springs, 2), and the elements, shape (n_elements, nodes)."""
         return {"line": self.springs, **self.problem.mesh.cells}
 
+    cell_note = CHANGE_OF_TENSION
+
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Return fields of springs, then of elements, NaN where a field is not defined, shape (n_cells, ...).
 
         Springs: change of tension from the undeformed body [N], stretch [-] and stiffness [N/m]. Elements: true stress
         [Pa], shape (n_cells, 9), and strain energy [J].
         """
-        state, n = self._state(positions), len(self.springs)
+        state, springs = self._state(positions), self.springs
         stiffness = self._stiffness(state)
-        change = stiffness * self._lengths(positions) - self.stiffness * self._lengths(self.nodes)
+        change = stiffness * lengths(springs, positions) - self.stiffness * lengths(springs, self.nodes)
         lines = {"tension_change": change, "stretch": self.stretch(positions), "stiffness": stiffness}
         energy = self._volumes * (state.law.at.energy + state.fibres[0].sum(axis=0))
-        whole = {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy}
-        empty = np.full(len(energy), np.nan)
-        found = {name: np.concatenate([values, empty]) for name, values in lines.items()}
-        for name, values in whole.items():
-            found[name] = np.concatenate([np.full((n, *values.shape[1:]), np.nan), values])
-        return found
+        return beside(lines, {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy})
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """Return the true stress of the mean deformation of each element [Pa], shape (n_elements, 3, 3).
@@ -404,6 +398,8 @@ class GaussianElements:
 
 class SummedGaussian(Summed[GaussianElements]):
     """Gaussian springs on elements of several kinds."""
+
+    cell_note = CHANGE_OF_TENSION
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints]:

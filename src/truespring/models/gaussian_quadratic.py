@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, stretch
 from truespring.models.fem_potential import FemPotential, of_one_kind
 from truespring.models.gaussian_weights import integrated
 from truespring.models.law import Constants, Response
@@ -35,6 +36,7 @@ class _BetweenAllNodes(QuadraticPotential):
     neo-Hookean law at the Gauss points: - mu ln J, and the part of lam, which a subclass may take at the mean volume.
     """
 
+    cell_note = CHANGE_OF_TENSION
     #: The finite elements that the springs equal.
     of_whole_law: ClassVar[type[FemPotential]] = QuadraticPotential
 
@@ -91,9 +93,18 @@ class _BetweenAllNodes(QuadraticPotential):
         return np.stack([rows, columns], axis=1)[chosen], self._weights[chosen]
 
     @property
+    def springs(self) -> Ints:
+        """Node numbers of the springs, each pair once, shape (n_springs, 2); midpoints follow the mesh's nodes."""
+        return self._pairs[0]
+
+    @property
     def stiffness(self) -> Floats:
         """Stiffness of each spring [N/m], shape (n_springs,)."""
         return self._pairs[1]
+
+    def stretch(self, positions: Floats) -> Floats:
+        """Return length over undeformed length of each spring [-], shape (n_springs,)."""
+        return stretch(self.springs, self.nodes, positions)
 
     def spring_data(self) -> SpringData:
         """Return springs between all nodes, and points of integration of the elements; see docs/export/arrays.md."""
@@ -112,9 +123,19 @@ class _BetweenAllNodes(QuadraticPotential):
         }
         return SpringData(None, arrays, PRESSURE)
 
+    @property
+    def cells(self) -> dict[str, Ints]:
+        """Edges of the mesh as lines, shape (n_edges, 2), and the elements, shape (n_elements, corners)."""
+        return {"line": self.mesh.edges, **self.mesh.cells}
+
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Return the true stress [Pa], shape (n_elements, 9), and strain energy [J], shape (n_elements,)."""
-        return self._twin.cell_fields(positions)
+        """Return fields of edges, then of elements, NaN where a field is not defined, shape (n_cells, ...).
+
+        Edges: stretch [-], the distance of their ends over that of the undeformed body. Elements: true stress [Pa],
+        shape (n_cells, 9), and strain energy [J].
+        """
+        edges = self.mesh.edges
+        return beside({"stretch": stretch(edges, self.nodes, positions)}, self._twin.cell_fields(positions))
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """Return the true stress of each element [Pa], shape (n_elements, 3, 3)."""

@@ -42,7 +42,6 @@ class Heml(Model):
     law: str = field()
 
     kind = "heml"
-    lines = "links"
 
     def __post_init__(self) -> None:
         if self.law == "linear":
@@ -53,6 +52,11 @@ class Heml(Model):
         if self.law not in HEML_LAWS:
             close = nearest(self.law, HEML_LAWS)
             raise ModelError(f"law = '{self.law}' is unknown{close}; allowed: {', '.join(HEML_LAWS)}")
+
+    @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures."""
+        return "links"
 
     @property
     def label(self) -> str:

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.law import Constants, Response
+from truespring.models.constants import Constants, Response
 from truespring.models.symmetric import determinant, identity, inverted, outer, swapped, trace
-
-# Iterations of Newton's method for the free thickness, largest change of ln C_33 in one, and the accepted residual
-# relative to the terms of the equation.
-_MAX_ITERATIONS, _LARGEST_CHANGE, _SOLVED = 100, 2.0, 1e-12
+from truespring.models.thickness import Slope, free_thickness
 
 
 @dataclass(frozen=True, slots=True)
 class Derivatives:
-    """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J, all of one shape."""
+    """An energy density [J/m^3] and its derivatives by I1, the trace of C in space, and y = ln J.
+
+    All are of one shape, or of shapes that broadcast to that of the energy.
+    """
 
     energy: Floats
     by_trace: Floats
@@ -24,6 +24,12 @@ class Derivatives:
     by_trace_trace: Floats
     by_trace_y: Floats
     by_y_y: Floats
+
+    @property
+    def filled(self) -> "Derivatives":
+        """The same with all arrays of the shape of the energy, some of them read-only."""
+        parts = (self.by_trace, self.by_y, self.by_trace_trace, self.by_trace_y, self.by_y_y)
+        return Derivatives(self.energy, *(np.broadcast_to(part, self.energy.shape) for part in parts))
 
     @property
     def linear(self) -> bool:
@@ -56,11 +62,8 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
     In plane strain and in 3D, C_33 is 1. In plane stress, C_33 minimises the energy: Newton's method in z = ln C_33 on
     C_33 W_I1 + W_y / 2 = 0; the second derivatives are those of the minimum.
     """
-    if dim == 3:
-        found = law(trace_C, y, constants)
-        return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     if not constants.plane_stress:
-        found = law(trace_C + 1, y, constants)
+        found = law(trace_C if dim == 3 else trace_C + 1, y, constants).filled
         return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     z = _free_thickness(law, trace_C, y, constants)
     C_33 = np.exp(z)
@@ -76,32 +79,24 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
         found.by_trace_y - by_z_trace * by_z_y / by_z_z,
         found.by_y_y - by_z_y**2 / by_z_z,
     )
-    return Condensed(minimum, C_33, 2 * C_33 * found.by_trace + found.by_y)
+    return Condensed(minimum.filled, C_33, 2 * C_33 * found.by_trace + found.by_y)
 
 
 def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:
     """Return ln C_33 at which the stress of the third direction is zero; NaN where there is no stable one."""
+
+    def slope(z: Floats) -> Slope:
+        C_33 = np.exp(z)
+        found = law(trace_C + C_33, y + z / 2, constants)
+        pull = C_33 * found.by_trace
+        curvature = pull + found.by_y_y / 4
+        if not found.linear:
+            curvature += C_33 * (C_33 * found.by_trace_trace + found.by_trace_y)
+        return Slope(pull + found.by_y / 2, curvature)
+
     lam, mu = constants.lam, constants.mu
-    z = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
-    for _ in range(_MAX_ITERATIONS):
-        slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
-        step = slope / np.where(curvature > 0, curvature, scale)
-        z = z - np.clip(np.where(np.isfinite(step), step, 0.0), -_LARGEST_CHANGE, _LARGEST_CHANGE)
-        if np.abs(step).max(initial=0.0) <= 1e-15 * max(1.0, float(np.abs(z).max(initial=0.0))):
-            break
-    slope, curvature, scale = _thickness_slope(law, trace_C, y, z, constants)
-    return np.where((np.abs(slope) <= _SOLVED * scale) & (curvature > 0), z, np.nan)
-
-
-def _thickness_slope(
-    law: InvariantLaw, trace_C: Floats, y: Floats, z: Floats, constants: Constants
-) -> tuple[Floats, Floats, Floats]:
-    """Return first and second derivative of the energy by z = ln C_33 [J/m^3], and the size of their terms."""
-    C_33 = np.exp(z)
-    found = law(trace_C + C_33, y + z / 2, constants)
-    pull, push = C_33 * found.by_trace, found.by_y / 2
-    curvature = pull + C_33**2 * found.by_trace_trace + C_33 * found.by_trace_y + found.by_y_y / 4
-    return pull + push, curvature, np.abs(pull) + np.abs(push) + constants.mu
+    start = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
+    return free_thickness(slope, start, lambda: np.log(trace_C / 2), mu)
 
 
 def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
@@ -118,16 +113,20 @@ def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
         found = condensed(law, trace(C), np.log(np.where(valid, det, 1.0)) / 2, dim, constants)
         at = found.at
         valid &= np.isfinite(at.energy)
-        stress = 2 * at.by_trace * identity(C) + at.by_y * inverse
+        stress = at.by_y * inverse
+        stress[:dim] += 2 * at.by_trace
 
         def elasticity() -> Floats:
-            found = at.by_y_y * outer(inverse, inverse) - at.by_y * swapped(inverse)
+            found, turned = outer(inverse, inverse), swapped(inverse)
+            found *= at.by_y_y
+            turned *= at.by_y
+            found -= turned
             if at.linear:
-                return np.asarray(found)
+                return found
             eye = np.broadcast_to(identity(C), C.shape)
             mixed = outer(eye, inverse)
             found += 4 * at.by_trace_trace * outer(eye, eye) + 2 * at.by_trace_y * (mixed + mixed.swapaxes(0, 1))
-            return np.asarray(found)
+            return found
 
         return Response(np.where(valid, at.energy, np.inf), stress, elasticity, np.sqrt(found.C_33), found.across)
 

@@ -1,118 +1,22 @@
-"""The entries of LAWS: constants, response and declared properties of a constitutive law."""
+"""The entries of LAWS: response, energy density, constants and declared properties of a constitutive law."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.material import Lame
-from truespring.units import SI_UNITS, Dimension
-
-if TYPE_CHECKING:
-    from truespring.models.invariants import InvariantLaw
+from truespring.models.constants import Constant as Constant
+from truespring.models.constants import Constants as Constants
+from truespring.models.constants import Response as Response
+from truespring.models.invariants import InvariantLaw
 
 
 def _none() -> Mapping[str, Any]:
     return MappingProxyType({})
-
-
-@dataclass(frozen=True, slots=True)
-class Constant:
-    """A constant of a law: an optional key of `[material]` and `[[region]]`.
-
-    Attributes:
-        dimension: a key of SI_UNITS; None for a dimensionless number.
-        meaning: description of the key, in a few words.
-        example: an allowed value [SI], used by the contract tests.
-        default: value for materials without the constant [SI]; None if the law requires it.
-        smallest, largest: allowed range, both included [SI].
-    """
-
-    dimension: Dimension | None
-    meaning: str
-    example: float
-    default: float | None = None
-    smallest: float = -np.inf
-    largest: float = np.inf
-
-    @property
-    def unit(self) -> str:
-        """The SI unit, "-" for a dimensionless number."""
-        return "-" if self.dimension is None else SI_UNITS[self.dimension][0]
-
-
-@dataclass(frozen=True, slots=True)
-class Constants:
-    """Values of the constants of a law: numbers, or arrays of shape (n_elements, 1) for several materials.
-
-    Attributes:
-        lam, mu: Lamé constants of the material [Pa], from its young and poisson.
-        plane_stress: whether the stress of the third direction is zero.
-        values: the other constants of the law by name [SI]; `constants["c1"]` returns one.
-    """
-
-    lam: float | Floats
-    mu: float | Floats
-    plane_stress: bool
-    values: Mapping[str, float | Floats] = field(default_factory=_none)
-
-    def __getitem__(self, name: str) -> float | Floats:
-        """Return a constant by name, not lam or mu [SI]."""
-        return self.values[name]
-
-    @property
-    def lam_plane(self) -> float | Floats:
-        """The first Lamé constant in the plane [Pa], shape as lam: 2 lam mu / (lam + 2 mu) in plane stress, else lam.
-
-        A law that is quadratic in its strain accounts for the third direction by using it instead of lam.
-        """
-        return 2 * self.lam * self.mu / (self.lam + 2 * self.mu) if self.plane_stress else self.lam
-
-    @property
-    def raveled(self) -> "Constants":
-        """The same constants, as arrays of shape (n_elements,) for several materials."""
-        if np.ndim(self.lam) == 0:
-            return self
-        values = {name: np.ravel(value) for name, value in self.values.items()}
-        return Constants(np.ravel(self.lam), np.ravel(self.mu), self.plane_stress, values)
-
-    @property
-    def bulk(self) -> float | Floats:
-        """The bulk modulus lam + 2/3 mu [Pa]."""
-        return self.lam + 2 / 3 * self.mu
-
-    def part(self, first: int, last: int) -> "Constants":
-        """Return the constants of the elements `first` to `last` - 1."""
-        if np.ndim(self.lam) == 0:
-            return self
-        values = {name: np.asarray(value)[first:last] for name, value in self.values.items()}
-        return Constants(np.asarray(self.lam)[first:last], np.asarray(self.mu)[first:last], self.plane_stress, values)
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """The response of a law to a strain.
-
-    Attributes:
-        energy: energy per undeformed volume [J/m^3], axes (...); infinite outside the domain of the law.
-        stress: second Piola-Kirchhoff stress [Pa], axes (component, ...); the stress, for the linear law.
-        elasticity: returns the derivative of the stress with respect to the Green strain [Pa], axes (component,
-            component, ...). It is a function because it is expensive and not needed for energy and forces. A shear
-            component stands for both e_xy and e_yx.
-        thickness_stretch: length of the third direction over its undeformed length, axes (...); 1 in plane strain
-            and in 3D.
-        across: Kirchhoff stress of the third direction [Pa], axes (...), zero in plane stress; the stress, for the
-            linear law.
-    """
-
-    energy: Floats
-    stress: Floats
-    elasticity: Callable[[], Floats]
-    thickness_stretch: Floats
-    across: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,10 +42,15 @@ class Law:
         constant_springs: whether `invariants` is linear in I1 with a factor that does not depend on ln J, so that the
             springs of `rule = "gaussian"` have a constant stiffness.
         domain: smallest and largest stretch of a bar between which its force increases with its length; beyond them a
-            bar under a dead load snaps.
+            bar under a dead load snaps. With `volumetric` "bulk", those of a nearly incompressible material, with
+            constants as in the examples.
+        limit: a sentence on a deformation that the law does not reach, because its energy is infinite there, without
+            a full stop; "" if there is none.
         constants: the constants by name, without lam and mu.
         lame: returns the Lamé constants [Pa] at small strain from the values of `constants` by name; None if they are
             those of the material for any values. A material with other young and poisson is an error.
+        fault: returns what is impossible in the values of `constants` by name for a material of the given Lamé
+            constants, or ""; None if the range of each constant says it all.
     """
 
     respond: Callable[[Floats, Constants], Response]
@@ -153,8 +62,10 @@ class Law:
     quadratic: bool
     trace: Literal["small", "green", "logarithmic"] | None
     volumetric: Literal["lam", "bulk"] = "lam"
-    invariants: "InvariantLaw | None" = None
+    invariants: InvariantLaw | None = None
     constant_springs: bool = False
     domain: tuple[float, float] = (0.0, np.inf)
+    limit: str = ""
     constants: Mapping[str, Constant] = field(default_factory=_none)
     lame: Callable[[Mapping[str, float]], Lame] | None = None
+    fault: Callable[[Lame, Mapping[str, float]], str] | None = None

@@ -5,6 +5,7 @@ from typing import Any
 from truespring.completing import completed
 from truespring.errors import ModelError
 from truespring.models.fem_potential import FiniteElements
+from truespring.models.laws import LAWS
 from truespring.models.moduli import Moduli
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -22,7 +23,6 @@ class Model:
         has_springs: whether the potential consists of springs, which are drawn and exported.
         any_mesh: whether the model can be solved on other meshes of the body, for refinement.
         solves: whether the model is solved; false for a solution that is read from a file.
-        lines: name of the lines of the potential in figures.
     """
 
     kind: str = "potential"
@@ -30,7 +30,6 @@ class Model:
     has_springs: bool = False
     any_mesh: bool = True
     solves: bool = True
-    lines: str = "springs"
 
     @property
     def label(self) -> str:
@@ -38,9 +37,19 @@ class Model:
         return type(self).__name__
 
     @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures."""
+        return "springs"
+
+    @property
     def finite(self) -> bool:
         """Whether strains are finite; false for a linear theory, in which loads act on the undeformed body."""
         return True
+
+    @property
+    def limit(self) -> str:
+        """A sentence on a deformation that the law does not reach, without a full stop; "" if there is none."""
+        return LAWS[self.law].limit if self.law is not None and self.law in LAWS else ""
 
     @property
     def element_is_open(self) -> bool:

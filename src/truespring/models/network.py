@@ -1,4 +1,4 @@
-"""Networks of linear springs."""
+"""Networks of springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,10 +9,12 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_ints
 from truespring.assembly import Pattern
-from truespring.errors import ModelError
+from truespring.errors import ModelError, nearest
 from truespring.mesh import Mesh
 from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
+from truespring.models.pair_law import PairLaw
+from truespring.models.pair_laws import PAIR_LAWS, STRAIGHT
 from truespring.models.spring_data import SpringData
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
@@ -20,23 +22,26 @@ from truespring.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class SpringNetwork(Model):
-    """Nodes joined by linear springs.
+    """Nodes joined by springs.
 
     With stiffness k, length l, rest length L, and unit vector n from the first node to the second: energy
-    1/2 k (l - L)^2, tension k (l - L) (Lembryk and Ciszkiewicz, equation 3), Hessian block
-    k [(1 - L/l) (I - n n^T) + n n^T].
+    1/2 k (l - L)^2, tension T = k (l - L) (Lembryk and Ciszkiewicz, equation 3), Hessian block
+    T/l (I - n n^T) + dT/dl n n^T. Other laws of the tension are in PAIR_LAWS.
 
     Attributes:
         nodes: undeformed positions [m], shape (n_nodes, dim).
         springs: node numbers, shape (n_springs, 2).
         stiffness: stiffness of each spring [N/m], shape (n_springs,).
         rest_length: rest length of each spring [m], shape (n_springs,); empty, the default, for the undeformed lengths.
+        law: force law, a key of PAIR_LAWS: "straight", the default, or "neo-hookean", tension
+            k L (s - s^-(d+1)) / (d + 2) with s = l / L and the dimension d of the nodes.
     """
 
     nodes: Floats
     springs: Ints
     stiffness: Floats
     rest_length: Floats = field(default_factory=lambda: np.zeros(0))
+    law: str = STRAIGHT
 
     kind = "springs"
     has_springs = True
@@ -60,6 +65,10 @@ class SpringNetwork(Model):
             raise ModelError(str(error)) from None
         if not (self.rest_length > 0).all():
             raise ModelError(f"rest_length of spring {int((self.rest_length <= 0).argmax())} is not positive")
+        if self.law not in PAIR_LAWS:
+            raise ModelError(
+                f"law = '{self.law}' is unknown{nearest(self.law, PAIR_LAWS)}; allowed: {', '.join(PAIR_LAWS)}"
+            )
 
     def _check_springs(self) -> None:
         """Raise ModelError if node numbers of springs are invalid."""
@@ -92,21 +101,27 @@ class SpringNetwork(Model):
     def spring_data(self) -> SpringData:
         """Return the springs as arrays."""
         names = ("springs", "stiffness", "rest_length")
-        return SpringData(self, {name: getattr(self, name) for name in names})
+        law = {"force_law": self.law, "dimension": self.nodes.shape[1]}
+        return SpringData(self, {name: getattr(self, name) for name in names} | law)
 
     @property
     def cells(self) -> dict[str, Ints]:
         """Springs as lines, shape (n_springs, 2)."""
         return {"line": self.springs}
 
+    @property
+    def pair_law(self) -> PairLaw:
+        """The force law of the springs."""
+        return PAIR_LAWS[self.law]
+
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
-        """Return tension [N], stretch [-], stiffness [N/m] and strain energy [J] of each spring, shape (n_springs,)."""
-        tension = self.stress(positions)
+        """Return tension [N], stretch [-], undeformed stiffness [N/m] and strain energy [J], shape (n_springs,)."""
+        known = (self.stiffness, self.rest_length, self.lengths(positions), self.nodes.shape[1])
         return {
-            "tension": tension,
+            "tension": self.stress(positions),
             "stretch": self.stretch(positions),
             "stiffness": self.stiffness,
-            "strain_energy": tension * (self.lengths(positions) - self.rest_length) / 2,
+            "strain_energy": self.pair_law.energy(*known),
         }
 
     @cached_property
@@ -114,14 +129,14 @@ class SpringNetwork(Model):
         return Pattern(self.springs, *self.nodes.shape)
 
     def _run(self, kernel: Callable[..., Any], positions: Floats, *arguments: Any) -> list[Any]:
-        """Run a kernel on all springs in parallel."""
+        """Run a loop over all springs in parallel."""
         from truespring.kernels.threads import run, writable
 
         return run(kernel, len(self.springs), writable(positions), *arguments, self._pattern.zero)
 
     @property
-    def _law(self) -> tuple[ShortInts, Floats, Floats]:
-        """Arguments of kernels: nodes, stiffness [N/m] and rest length [m] of the springs."""
+    def _data(self) -> tuple[ShortInts, Floats, Floats]:
+        """Arguments of loops: nodes, stiffness [N/m] and rest length [m] of the springs."""
         return self._pattern.elements, self.stiffness, self.rest_length
 
     def lengths(self, positions: Floats) -> Floats:
@@ -138,26 +153,21 @@ class SpringNetwork(Model):
 
     def stress(self, positions: Floats) -> Floats:
         """Return the tension of each spring [N], shape (n_springs,)."""
-        from truespring.kernels import springs
-
         tension = np.empty(len(self.springs))
-        self._run(springs.tensions, positions, *self._law, tension)
+        self._run(self.pair_law.loops.tensions, positions, *self._data, tension)
         return tension
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """Return k (l - L + n . (d_j - d_i)), the tension extrapolated along `step` [m], in N, shape (n_springs,)."""
-        from truespring.kernels import springs
+        """Return T + dT/dl n . (d_j - d_i), the tension extrapolated along `step` [m], in N, shape (n_springs,)."""
         from truespring.kernels.threads import writable
 
         tension = np.empty(len(self.springs))
-        self._run(springs.extrapolated, positions, writable(step), *self._law, tension)
+        self._run(self.pair_law.loops.extrapolated, positions, writable(step), *self._data, tension)
         return tension
 
     def energy(self, positions: Floats) -> float:
         """Return the stored energy [J]."""
-        from truespring.kernels import springs
-
-        return float(sum(self._run(springs.energy, positions, *self._law)))
+        return float(sum(self._run(self.pair_law.loops.energy, positions, *self._data)))
 
     def gradient(self, positions: Floats) -> Floats:
         """Return the internal force [N], shape (n_nodes, dim)."""
@@ -166,14 +176,20 @@ class SpringNetwork(Model):
 
         x, pattern = writable(positions), self._pattern
         pull, force = np.empty(len(self.springs)), np.empty(self.nodes.shape)
-        self._run(springs.pulls, x, *self._law, pull)
+        self._run(self.pair_law.loops.pulls, x, *self._data, pull)
         rows = (pattern.elements, pattern.at_starts, pattern.at)
         run(springs.internal_forces, len(self.nodes), x, *rows, pull, force, pattern.zero)
         return force
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Return the tangent stiffness [N/m]; `stress` [N] gives the geometric part, by default that at `positions`."""
-        return self._tangent(positions, self.stiffness, self.stress(positions) if stress is None else stress)
+        return self._tangent(positions, self._axial(positions), self.stress(positions) if stress is None else stress)
+
+    def _axial(self, positions: Floats) -> Floats:
+        """Return the axial stiffness dT/dl of each spring [N/m], shape (n_springs,)."""
+        stiffness = np.empty(len(self.springs))
+        self._run(self.pair_law.loops.axial, positions, *self._data, stiffness)
+        return stiffness
 
     def _tangent(self, positions: Floats, stiffness: Floats, tension: Floats) -> SparseMatrix:
         """Return the matrix of springs with a stiffness [N/m] and a tension [N], both of shape (n_springs,)."""
@@ -194,4 +210,5 @@ class SpringNetwork(Model):
 
         These are those of the geometric part of compressed springs.
         """
-        return self._tangent(positions, np.maximum(self.stiffness, 0.0), np.maximum(self.stress(positions), 0.0))
+        tension = np.maximum(self.stress(positions), 0.0)
+        return self._tangent(positions, np.maximum(self._axial(positions), 0.0), tension)

@@ -9,6 +9,7 @@ from truespring.errors import ModelError
 from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
 from truespring.models.network import SpringNetwork
+from truespring.models.pair_laws import STRAIGHT
 from truespring.models.volume import VolumeTerm
 from truespring.models.volume_springs import VolumeSprings
 from truespring.problem import Problem
@@ -25,6 +26,7 @@ class PrescribedSprings(Model):
         stiffness: stiffness of each spring [N/m], shape (n_springs,).
         kappa: modulus of the area or volume term of each element [Pa], shape (n_elements,); empty for none.
         label: name in figures and tables.
+        law: force law, a key of PAIR_LAWS.
 
     Raises ModelError if shapes do not match, or if a node number is not in the mesh of the problem.
     """
@@ -33,6 +35,7 @@ class PrescribedSprings(Model):
     stiffness: Floats
     kappa: Floats = field(default_factory=lambda: np.zeros(0))
     label: str = "springs (prescribed)"
+    law: str = STRAIGHT
 
     kind = "springs"
     has_springs = True
@@ -51,7 +54,7 @@ class PrescribedSprings(Model):
 
     def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
         """Return the potential on the mesh of a problem; raise ModelError if the network is a mechanism."""
-        network = SpringNetwork(problem.mesh.nodes, self.springs, self.stiffness)
+        network = SpringNetwork(problem.mesh.nodes, self.springs, self.stiffness, law=self.law)
         if not (self.stiffness > 0).any():
             raise ModelError("stiffness: at least one spring must have a positive stiffness")
         if not self.kappa.size:

@@ -6,8 +6,8 @@ The shear modulus at small strain is that of the material, mu; the volume functi
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.models.constants import Constants
 from truespring.models.invariants import Derivatives, isochoric
-from truespring.models.law import Constants
 
 # Coefficients of the series of Arruda and Boyce, of (I1b^i - 3^i) / locking_stretch^(2 i - 2).
 _SERIES = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
@@ -15,9 +15,9 @@ _SERIES = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
 
 def neo_hookean(I1: Floats, y: Floats, constants: Constants) -> Derivatives:
     """Return the derivatives of W = mu/2 (I1 - 3) - mu ln J + lam/2 (ln J)^2 (Simo and Pister 1984)."""
-    lam, mu, zero = constants.lam, constants.mu, np.zeros_like(y)
+    lam, mu, zero = constants.lam, constants.mu, np.zeros(())
     energy = mu / 2 * (I1 - 3) - mu * y + lam / 2 * y**2
-    return Derivatives(energy, mu / 2 + zero, lam * y - mu, zero, zero, lam + zero)
+    return Derivatives(energy, np.asarray(mu / 2), lam * y - mu, zero, zero, np.asarray(lam))
 
 
 def yeoh(I1: Floats, y: Floats, constants: Constants) -> Derivatives:

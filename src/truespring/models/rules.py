@@ -16,26 +16,24 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.errors import ModelError
+from truespring.errors import ModelError, nearest
 from truespring.material import Material, Section
 from truespring.memory import slices
 from truespring.mesh import Mesh
 from truespring.mesh.rows import distinct_rows
 from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.fem_potential import fem_of_one_kind
-from truespring.models.gaussian_rule import gaussian_potential, gaussian_stiffness
+from truespring.models.gaussian_rule import GAUSSIAN_LAWS, gaussian_potential, gaussian_stiffness
 from truespring.models.interpolation import SIMPLICES
 from truespring.models.linked import LinkedElements
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
+from truespring.models.pair_laws import PAIR_LAWS, STRAIGHT
 from truespring.models.summed import SummedLinks, summed_links
 from truespring.potential import Stressed
 from truespring.problem import Problem, sample
 
-#: Default stiffness of each body diagonal of a cube in the rule `isotropic`, in E h: the member of the family whose
-#: element matrix is nearest to that of the hexahedron.
-K_BODY = 1 / 12
+# Largest stiffness of each body diagonal of a cube in the rule `isotropic`, in E h.
 _LARGEST_K_BODY = 0.3
-
 
 #: Value of `LatticeModuli.lattice` for moduli that hold on all meshes.
 ANY_MESH = "any mesh"
@@ -89,6 +87,8 @@ class Rule:
         potential: returns the potential of a problem and `parameters` by name, if a spring's force depends on other
             nodes of the element, too; None for plain springs. `stiffness` is then that of a spring while the other
             lengths are constant, of all kinds of elements of a problem.
+        laws: allowed values of `law`: keys of PAIR_LAWS for plain springs, constitutive laws for a potential; empty if
+            the springs have no other law.
         locks_on: kinds of elements on which such a potential locks near Poisson's ratio 1/2.
         remark: a sentence on cost and law of such a potential, without a full stop.
     """
@@ -101,6 +101,7 @@ class Rule:
     shapes: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     parameters: tuple[str, ...] = ()
     potential: Callable[..., Stressed] | None = None
+    laws: tuple[str, ...] = ()
     locks_on: tuple[str, ...] = ()
     remark: str = ""
 
@@ -138,6 +139,21 @@ class UserStiffness:
             )
 
 
+def check_law(law: str, rule: str | None) -> None:
+    """Raise ModelError if springs by a rule of RULES, or of user-defined stiffness (None), do not have this law."""
+    allowed = tuple(PAIR_LAWS) if rule is None else RULES[rule].laws
+    if law in allowed:
+        return
+    owners = [name for name, other in RULES.items() if law in other.laws] + ["stiffness"] * (law in PAIR_LAWS)
+    whose = "stiffness" if rule is None else f"rule = '{rule}'"
+    raise ModelError(
+        f"law = '{law}' is not available with {whose}"
+        + nearest(law, allowed)
+        + (f"; allowed: {', '.join(allowed)}" if allowed else "; it has no key law")
+        + (f"; available with {', '.join(owners)}" if owners else "")
+    )
+
+
 def require_body(problem: Problem) -> tuple[Material, Section]:
     """Return material and section; raise ModelError if the problem is a plain network."""
     if problem.material is None or problem.section is None or problem.mesh.element == "line":
@@ -158,7 +174,8 @@ def rule_stiffness(problem: Problem, rule: str, parameters: dict[str, Any]) -> F
 
 def _of_one_kind(problem: Problem, rule: str, parameters: dict[str, Any]) -> Floats:
     """Return the stiffness of links [N/m] on a mesh of one kind of elements, shape (n_elements, links)."""
-    recipe = partial(RULES[rule].stiffness, **parameters)
+    own = RULES[rule].parameters
+    recipe = partial(RULES[rule].stiffness, **{name: value for name, value in parameters.items() if name in own})
     forms = problem.mesh.forms
     if not forms.few:
         return recipe(problem)
@@ -179,7 +196,8 @@ def check_rule(problem: Problem, rule: str, parameters: dict[str, Any]) -> None:
             f"rule = '{rule}' supports {', '.join(entry.elements)}; allowed for this mesh of {problem.mesh.kinds} "
             f"elements: {', '.join(allowed)}"
         )
-    idle = sorted(parameters.keys() - set(entry.parameters))
+    law = {"law"} if entry.laws else set()  # of plain springs, whose stiffness need not depend on it
+    idle = sorted(parameters.keys() - {*entry.parameters} - law)
     if idle:
         owners = [name for name, other in RULES.items() if set(idle) & set(other.parameters)]
         raise ModelError(f"rule = '{rule}' has no parameter {', '.join(idle)}: use it with {', '.join(owners)}")
@@ -282,16 +300,18 @@ def lloyd(problem: Problem) -> Floats:
     return _classes(problem, 5 / 16, 7 / 16)
 
 
-def isotropic(problem: Problem, k_body: float = K_BODY) -> Floats:
+def isotropic(problem: Problem, k_body: float | None = None, law: str = STRAIGHT) -> Floats:
     """Return the stiffness [N/m], shape (n_elements, links), of an isotropic lattice with the E of the material.
 
     Its Poisson's ratio is 1/3 in plane stress and 1/4 in 3D. Squares: 3/8 t E on edges and diagonals (Brisard, "What is
     homogenization?", part 4; the only such pair). Cubes, in E h: edges 1/10 + k_body/3, face diagonals
-    1/5 - 2 k_body/3, body diagonals k_body, a free parameter (the family of Golec et al. 2020). Rectangles and bricks:
+    1/5 - 2 k_body/3, body diagonals k_body, a free parameter (the family of Golec et al. 2020), by default that of the
+    force law in PAIR_LAWS. Rectangles and bricks:
     the stiffness for which C_iijj = sum k (d_i d_j)^2 / L^2 / V is isotropic, d the vector along a spring of length L:
     the diagonals of each face follow from C_iijj, then the edges from C_iiii. On rectangles this is the member for
     Poisson's ratio 1/3 of the family of Baudet et al. (2009); an edge is negative at aspect ratios above sqrt(3).
     """
+    k_body = PAIR_LAWS[law].k_body if k_body is None else k_body
     if not 0 <= k_body <= _LARGEST_K_BODY:
         raise ModelError(f"k_body = {k_body:g}: allowed are values from 0 to {_LARGEST_K_BODY:g}, in E h")
     kind, dim = problem.mesh.kind, problem.mesh.dim
@@ -415,6 +435,7 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             ),
             "Lembryk and Ciszkiewicz, equations 1 and 2, after Lloyd, Szekely, Harders 2007",
             shapes=MappingProxyType({"quadrilateral": "square"}),
+            laws=tuple(PAIR_LAWS),
         ),
         "isotropic": Rule(
             isotropic,
@@ -423,7 +444,8 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             (LatticeModuli("rectangles", poisson=_THIRD), LatticeModuli("bricks", poisson=_QUARTER)),
             "Brisard, What is homogenization? part 4; Baudet et al. 2009; Golec et al. 2020",
             shapes=MappingProxyType({"quadrilateral": "rectangle", "hexahedron": "brick"}),
-            parameters=("k_body",),
+            parameters=("k_body", "law"),
+            laws=tuple(PAIR_LAWS),
         ),
         "least-squares": Rule(
             least_squares,
@@ -484,6 +506,7 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             "James and Guth 1943 (Gaussian chains); Pinkall and Polthier 1993 (weights on triangles)",
             parameters=("hourglass", "element", "law"),
             potential=gaussian_potential,
+            laws=GAUSSIAN_LAWS,
             locks_on=SIMPLICES,
         ),
     }

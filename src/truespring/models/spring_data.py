@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from truespring.arrays import Floats, Ints
+from truespring.models.pair_law import PairLaw
 from truespring.potential import Potential
 
 #: Features beyond plain springs: a modulus for the area or volume of each element, a coupling of lengths, or a pressure
@@ -28,6 +29,16 @@ class PlainSprings(Potential, Protocol):
     @property
     def rest_length(self) -> Floats:
         """Rest length of each spring [m], shape (n_springs,)."""
+        ...
+
+    @property
+    def law(self) -> str:
+        """Name of the force law, a key of PAIR_LAWS."""
+        ...
+
+    @property
+    def pair_law(self) -> PairLaw:
+        """The force law of the springs."""
         ...
 
     def stretch(self, positions: Floats) -> Floats:

@@ -14,13 +14,21 @@ from truespring.models.by_rule import SpringCounts
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.findings import springs_warnings
 from truespring.models.gaussian_quadratic import gaussian_quadratic
-from truespring.models.gaussian_rule import check_law
 from truespring.models.interpolation import SIMPLICES
 from truespring.models.links import in_a_row
 from truespring.models.model import Model
 from truespring.models.moduli import Moduli, moduli, spring_counts
 from truespring.models.network import SpringNetwork
-from truespring.models.rules import RULES, UserStiffness, check_rule, require_body, rule_stiffness, user_stiffness
+from truespring.models.pair_laws import STRAIGHT
+from truespring.models.rules import (
+    RULES,
+    UserStiffness,
+    check_law,
+    check_rule,
+    require_body,
+    rule_stiffness,
+    user_stiffness,
+)
 from truespring.models.volume import VolumeTerm
 from truespring.models.volume_springs import VolumeSprings
 from truespring.potential import Stressed
@@ -47,7 +55,8 @@ class Springs(Model):
             None, 1 in the plane, and in space a function of Poisson's ratio (see docs/models.md).
         element: "quadratic" for springs between all nodes of triangles or tetrahedra of second order, for the rule
             gaussian.
-        law: the constitutive law of the rule gaussian, one of GAUSSIAN_LAWS; by default, None, neo-hookean.
+        law: of the rule gaussian the constitutive law, one of GAUSSIAN_LAWS, by default, None, neo-hookean; of other
+            springs the force law, a key of PAIR_LAWS, by default straight; see `laws` of a rule.
     """
 
     rule: str | None = None
@@ -73,8 +82,8 @@ class Springs(Model):
             raise ModelError(f"k_body = {self.k_body}: must be finite")
         if self.k_body is not None and self.rule is None:
             raise ModelError("k_body requires the rule isotropic; with stiffness, use its key body")
-        if self.rule is None and self._parameters:
-            name = next(iter(self._parameters))
+        name = next((name for name in self._parameters if name != "law"), None)
+        if self.rule is None and name is not None:
             owners = [rule for rule, entry in RULES.items() if name in entry.parameters]
             raise ModelError(f"{name} requires a rule ({', '.join(owners)}), not stiffness")
         if self.sharing == "single" and (self.volume or self.coupled):
@@ -85,10 +94,15 @@ class Springs(Model):
                 f"rule = '{self.rule}' has the Poisson's ratio of the material without a volume term: remove volume"
             )
         if self.law is not None:
-            check_law(self.law)
+            check_law(self.law, self.rule)
 
     kind = "springs"
     has_springs = True
+
+    @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures: springs between all nodes of an element are not drawn."""
+        return "springs" if self.element is None else "edges"
 
     @property
     def coupled(self) -> bool:
@@ -224,7 +238,7 @@ class Springs(Model):
                 f"{stiffness[negative[0]]:g} N/m at {middle.tolist()} m: use elements closer to squares, cubes or "
                 "regular simplices, another rule, or allow_negative = true"
             )
-        return SpringNetwork(mesh.nodes, springs, stiffness)
+        return SpringNetwork(mesh.nodes, springs, stiffness, law=self.law or STRAIGHT)
 
 
 def springs_by_rule(models: Mapping[str, object]) -> dict[str, Springs]:

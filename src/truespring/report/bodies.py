@@ -35,7 +35,7 @@ def path_lines(path: Solution) -> Ints:
     """
     if path.is_cloud:
         return np.zeros((0, 2), dtype=np.int64)
-    if spring_lines(path) is None:
+    if spring_lines(path.potential) is None:
         return path.problem.mesh.edges
     assert isinstance(path.potential, Visible)  # every potential with springs is
     return path.potential.cells["line"]

@@ -12,6 +12,7 @@ from truespring.equilibrium import Solution, Status
 from truespring.material import Material
 from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
+from truespring.potential import Noted
 from truespring.problem import Problem, Region
 from truespring.report.figures import distance_name, over_name, render_figures
 from truespring.report.quantity import input_quantity, percent, quantity, significant, tolerance_percent
@@ -252,6 +253,7 @@ def _model_row(name: str, path: Solution) -> dict[str, Any]:
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "effort": _effort(path),
+        "fields": path.potential.cell_note if isinstance(path.potential, Noted) else None,
         "seconds": f"{path.seconds:.2f}" if solved else "–",
         "unknowns": str(path.n_unknowns) if solved else "–",
         "area": f"{min(areas):.3f}" if areas else "–",

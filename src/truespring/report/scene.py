@@ -38,7 +38,7 @@ def _lines(path: Solution) -> tuple[Ints, Ints]:
     none = np.zeros((0, 2), dtype=np.int64)
     if not len(facets):
         return lines, none
-    if spring_lines(path) is None:
+    if spring_lines(path.potential) is None:
         return edges_of(facets), none
     on, _ = lines_on(facets, lines)
     return lines[on], lines[~on] if len(lines) < _MOST_SPRINGS else none

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from truespring.arrays import Ints
-from truespring.equilibrium import Solution
+from truespring.conditions import Refined
+from truespring.potential import Stretched, Visible
 from truespring.problem import Problem
 from truespring.report.legend import Entry
 from truespring.report.result import Result
@@ -17,8 +18,8 @@ class Undeformed:
     Attributes:
         problem: mesh, supports and loads.
         probe: number of the watched node; None if it is not known before solving.
-        springs: pairs of nodes joined by springs, shape (n, 2); None without springs.
-        springs_are: "springs" or "links".
+        springs: pairs of nodes joined by springs, shape (n, 2); None without springs. See `spring_lines`.
+        springs_are: "springs", "links" or "edges".
         is_cloud: whether the body was read as points without elements.
     """
 
@@ -45,13 +46,19 @@ class Undeformed:
         return tuple(entries)
 
 
-def spring_lines(path: Solution) -> Ints | None:
-    """Return the pairs of nodes joined by the springs of a model, shape (n, 2); None without springs."""
-    springs: Ints | None = getattr(path.potential, "springs", None)
-    return springs
+def spring_lines(potential: object) -> Ints | None:
+    """Return the pairs of nodes joined by the springs of a potential, shape (n, 2); None without springs.
+
+    If there are springs to nodes that are not in the mesh, return the lines of the potential between nodes of the mesh.
+    """
+    if not isinstance(potential, Stretched):
+        return None
+    if isinstance(potential, Refined) and isinstance(potential, Visible):
+        return potential.cells["line"]
+    return potential.springs
 
 
 def undeformed_of(result: Result) -> Undeformed:
     """Return the undeformed body of a result, with the springs of the compared or, without one, the first model."""
     model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
-    return Undeformed(result.problem, result.probe, spring_lines(model), model.lines, model.is_cloud)
+    return Undeformed(result.problem, result.probe, spring_lines(model.potential), model.lines, model.is_cloud)

@@ -138,6 +138,7 @@ def rule_values() -> dict[str, dict[str, Any]]:
             "follows_poisson": follows_poisson(name),
             "coupled": rule.coupled,
             "parameters": list(rule.parameters),
+            "laws": list(rule.laws),
             "source": rule.source,
         }
         for name, rule in RULES.items()

@@ -10,6 +10,7 @@ from truespring.arrays import Floats, Ints
 from truespring.columns import Columns
 from truespring.errors import MeshError
 from truespring.models import PrescribedSprings, shared_springs
+from truespring.models.pair_laws import STRAIGHT
 from truespring.problem import Problem
 from truespring.units import Dimension
 
@@ -18,7 +19,11 @@ _VOLUME_COLUMNS: dict[str, Dimension | None] = {"element": None, "kappa": "stres
 
 
 def read_spring_files(
-    problem: Problem, file: str | Path, volume: str | Path | None = None, allow_negative: bool = False
+    problem: Problem,
+    file: str | Path,
+    volume: str | Path | None = None,
+    allow_negative: bool = False,
+    law: str = STRAIGHT,
 ) -> PrescribedSprings:
     """Read the stiffness of each spring of a mesh from CSV files with a header line.
 
@@ -27,6 +32,7 @@ def read_spring_files(
         file: columns a and b, the two nodes of each spring by number from 0, and stiffness [N/m].
         volume: columns element, the number of each element from 0, and kappa, the modulus of its volume term [Pa].
         allow_negative: whether springs of negative stiffness are accepted.
+        law: force law of the springs, a key of PAIR_LAWS.
 
     Raises MeshError with file and line if a file is damaged, if a spring or element is missing, duplicate or not in the
     mesh, or if a stiffness is negative.
@@ -55,7 +61,7 @@ def read_spring_files(
         )
     stiffness = _by_number(place, data, found, values, [f"{a}-{b}" for a, b in springs.tolist()], "spring")
     kappa = np.zeros(0) if volume is None else _read_kappa(problem, Path(volume))
-    return PrescribedSprings(np.asarray(springs, dtype=np.int64), stiffness, kappa, f"springs ({place.name})")
+    return PrescribedSprings(np.asarray(springs, dtype=np.int64), stiffness, kappa, f"springs ({place.name})", law)
 
 
 def _read_kappa(problem: Problem, file: Path) -> Floats:

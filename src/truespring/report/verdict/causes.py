@@ -1,11 +1,16 @@
 """The cause of the distance to nonlinear FEM: stiffness, or the response to large strain."""
 
+import numpy as np
+
+from truespring.equilibrium import Solution
 from truespring.report.quantity import percent
 from truespring.report.result import Result
 from truespring.report.verdict.naming import display_name
 
 # Below this rms error no cause is given.
 _NO_CAUSE = 0.005
+# Relative difference of moduli, and difference of Poisson's ratios, that count as rounding.
+_EXACT = 1e-6
 
 
 def cause_sentence(result: Result) -> str | None:
@@ -34,4 +39,16 @@ def cause_sentence(result: Result) -> str | None:
         return f"{what}: most of it arises at large strain, to which springs and law respond differently."
     if errors[0] > 2 * errors[-1]:
         return f"{what}: the springs' stiffness is off from the start, and large strain hides it."
-    return f"{what}: most of it is there from the start, in the springs' moduli and bending stiffness on this mesh."
+    where = "bending stiffness" if _exact(result.paths[result.model]) else "moduli and bending stiffness"
+    return f"{what}: most of it is there from the start, in the springs' {where} on this mesh."
+
+
+def _exact(path: Solution) -> bool:
+    """Return whether the effective moduli of springs are those of the material."""
+    moduli = path.moduli
+    if moduli is None:
+        return False
+    young, poisson = moduli.material_young, moduli.material_poisson
+    return np.allclose(moduli.young_range, young, rtol=_EXACT) and np.allclose(
+        moduli.poisson_range, poisson, atol=_EXACT
+    )

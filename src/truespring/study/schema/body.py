@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
-from pydantic import Field, create_model, model_validator
+from pydantic import ConfigDict, Field, create_model, model_validator
 
 from truespring.errors import StudyError
 from truespring.loading import LOADS, Fixed, Load, LoadKind
@@ -28,18 +28,43 @@ from truespring.study.schema.values import (
     two_or_three,
 )
 
+#: The pairs of elastic constants of a material: exactly one is set.
+ELASTIC_PAIRS = (("young", "poisson"), ("mu", "bulk"))
+_PAIR_WORDS = "set young and poisson, or mu and bulk"
+
 
 class PlainMaterialKeys(Keys):
-    """The material of the body."""
+    """The material of the body: young and poisson, or mu and bulk."""
 
-    young: Stress = Field(description='Young\'s modulus: a number in Pa, or a string with its unit such as "10 kPa"')
-    poisson: Number = Field(description="Poisson's ratio")
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": list(pair)} for pair in ELASTIC_PAIRS]})
+
+    young: Stress | None = Field(
+        default=None, description='Young\'s modulus: a number in Pa, or a string with its unit such as "10 kPa"'
+    )
+    poisson: Number | None = Field(default=None, description="Poisson's ratio")
+    mu: Stress | None = Field(
+        default=None, description="shear modulus at small strain [Pa], with bulk, instead of young and poisson"
+    )
+    bulk: Stress | None = Field(
+        default=None, description="bulk modulus at small strain [Pa], with mu, instead of young and poisson"
+    )
     density: Density | None = Field(default=None, description="density, needed for gravity")
+
+    @model_validator(mode="after")
+    def _one_pair(self) -> Self:
+        names = [name for pair in ELASTIC_PAIRS for name in pair if getattr(self, name) is not None]
+        if tuple(names) not in ELASTIC_PAIRS:
+            found = f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} set" if names else "no modulus is set"
+            raise ValueError(f"{found}: {_PAIR_WORDS}")
+        return self
 
     def build(self) -> Material:
         """Return the material."""
         constants = {name: getattr(self, name, None) for name in material_constants()}
         stated = {name: value for name, value in constants.items() if value is not None}
+        if self.mu is not None and self.bulk is not None:
+            return Material.from_moduli(self.mu, self.bulk, self.density, stated)
+        assert self.young is not None and self.poisson is not None  # see _one_pair
         return Material(self.young, self.poisson, self.density, stated)
 
 

@@ -15,6 +15,7 @@ from truespring.models import (
     ELEMENTS,
     GAUSSIAN_LAWS,
     LAWS,
+    PAIR_LAWS,
     RULES,
     BemSprings,
     Fem,
@@ -27,12 +28,23 @@ from truespring.models import (
     Terzopoulos,
     UserStiffness,
 )
+from truespring.models.pair_laws import STRAIGHT
 from truespring.problem import Problem
 from truespring.program import ReadSolution
 from truespring.reference import CalculiX, read_stl
 from truespring.solvers import Solver
 from truespring.study.places import Places
-from truespring.study.schema.values import FemElement, FileName, Keys, LawName, Number, On, PlainRuleName, RuleName
+from truespring.study.schema.values import (
+    FemElement,
+    FileName,
+    Keys,
+    LawName,
+    Number,
+    On,
+    PlainRuleName,
+    RuleName,
+    SpringsLawName,
+)
 from truespring.study.spring_files import read_spring_files
 
 
@@ -138,9 +150,11 @@ class SpringsKeys(ModelKeys):
         default=None,
         description="springs between all nodes of triangles or tetrahedra of second order; rule gaussian only",
     )
-    law: LawName | None = Field(
+    law: SpringsLawName | None = Field(
         default=None,
-        description=f"constitutive law of the rule gaussian: {', '.join(GAUSSIAN_LAWS)}; default: neo-hookean",
+        description=f"constitutive law of the rule gaussian: {', '.join(GAUSSIAN_LAWS)}; default: neo-hookean; force "
+        f"law of the springs of the rules isotropic and lloyd, or of given stiffness: {', '.join(PAIR_LAWS)}; default: "
+        f"{STRAIGHT}",
     )
 
     @property
@@ -151,7 +165,7 @@ class SpringsKeys(ModelKeys):
     @model_validator(mode="after")
     def _stiffness_read(self) -> Self:
         if self.stiffness is not None and self.stiffness.file is not None:
-            named = sorted({"rule", "sharing", "volume", *self._parameters} & self.model_fields_set)
+            named = sorted(({"rule", "sharing", "volume", *self._parameters} - {"law"}) & self.model_fields_set)
             if named:
                 raise ValueError(f"stiffness is read from a file, so leave {' and '.join(named)} out")
         return self
@@ -161,7 +175,8 @@ class SpringsKeys(ModelKeys):
         keys = self.stiffness
         if keys is not None and keys.file is not None:
             volume = None if keys.volume is None else scope.places.beside(keys.volume)
-            return read_spring_files(scope.problem, scope.places.beside(keys.file), volume, self.allow_negative)
+            file, law = scope.places.beside(keys.file), self.law or STRAIGHT
+            return read_spring_files(scope.problem, file, volume, self.allow_negative, law)
         numbers = None if keys is None or keys.edge is None else UserStiffness(keys.edge, keys.diagonal, keys.body)
         return Springs(self.rule, numbers, self.sharing, self.allow_negative, self.volume, **self._parameters)
 
