@@ -91,6 +91,9 @@ def valid(rng: random.Random) -> Tables:
             tables["material"].setdefault("density", 1000.0)
             for region in tables.get("region", []):
                 region.setdefault("density", 1000.0)
+        if any("tension" in one for one in tables["load"]):
+            for one in (tables["material"], *tables.get("region", [])):
+                one["fibres"] = {"along": [1.0, *[0.0] * (dim - 1)]}
     tables["solver"] = _solver(rng, dim, size, driven)
     element = tables["mesh"].get("element", "quadrilateral" if dim == 2 else "hexahedron").removeprefix("bcc-")
     tables["models"] = {f"{rng.choice('abcxyz')}{n}": _model(rng, element) for n in range(rng.choice((1, 2, 2, 3)))}
@@ -188,7 +191,7 @@ def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tabl
     sizes = {"stress": stress, "force": stress * section, "moment": stress * section * size[1], "length": size[0]}
     several = {name: (one, sizes.get(one.dimension, 1.0)) for name, one in LOADS[key].quantities(key).items()}
     load = {name: _vector(rng, dim, value) if one.vector else value for name, (one, value) in several.items()}
-    return {**({"on": rng.choice(("right", "top"))} if LOADS[key].on_selection else {}), **load}
+    return {**({"on": rng.choice(("right", "top"))} if LOADS[key].needs_selection else {}), **load}
 
 
 def _vector(rng: random.Random, dim: int, size: float) -> list[float]:

@@ -104,11 +104,18 @@ def load_of(key: str, dim: int, on: str = "top") -> Load:
     return kind.load(**({"on": on} if kind.on_selection else {}), **arguments)
 
 
+#: Directions of two families of fibres, of another angle to each axis.
+ALONG = {2: [(2.0, 1.0), (1.0, -3.0)], 3: [(2.0, 1.0, 0.5), (1.0, -3.0, 2.0)]}
+
+
 @cache
 def mesh_of(dim: int, element: str = "") -> ts.Mesh:
+    """A body with a group of elements named as a side: loads on elements take the one, others the other."""
     if dim == 2:
-        return ts.rectangle(SIZE[:2], (4, 3), element or "quadrilateral")
-    return ts.box(SIZE, (3, 2, 3), element or "hexahedron")
+        mesh = ts.rectangle(SIZE[:2], (4, 3), element or "quadrilateral")
+    else:
+        mesh = ts.box(SIZE, (3, 2, 3), element or "hexahedron")
+    return replace(mesh, element_groups={"top": np.flatnonzero(mesh.centres[:, 1] > 0.5 * SIZE[1])})
 
 
 def problem_of(key: str, dim: int, mesh: ts.Mesh | None = None, material: float = 1e3) -> ts.Problem:
@@ -116,7 +123,8 @@ def problem_of(key: str, dim: int, mesh: ts.Mesh | None = None, material: float 
     mesh = mesh or mesh_of(dim)
     section = ts.PlaneStress(0.5) if dim == 2 else None
     supports = [ts.Fixed(side) for side in SUPPORTED[dim]]
-    return ts.Problem(mesh, ts.Material(material, 0.25, density=1.5), section, supports, load_of(key, dim))
+    along = ts.Fibres(ALONG[dim])
+    return ts.Problem(mesh, ts.Material(material, 0.25, 1.5, fibres=along), section, supports, load_of(key, dim))
 
 
 def forces(problem: ts.Problem, positions: Floats) -> Floats:
@@ -224,8 +232,10 @@ def test_a_turned_problem_has_a_turned_solution(key: str, dim: int) -> None:
     groups = {side: select(problem.mesh, side) for side in ("top", *SUPPORTED[dim])}
     mesh = replace(problem.mesh, node_groups=groups)
     problem = replace(problem, mesh=mesh)
+    assert problem.material and problem.material.fibres
     other = replace(
         problem,
+        material=replace(problem.material, fibres=problem.material.fibres.turned(turn)),
         mesh=replace(mesh, nodes=mesh.nodes @ turn.T),
         loads=[load.turned(turn) for load in problem.loads],
         supports=[support.turned(turn) for support in problem.supports],
@@ -251,7 +261,10 @@ def test_a_load_is_drawn_where_it_acts(key: str, dim: int) -> None:
     acting = np.flatnonzero(forces(problem, problem.mesh.nodes).any(axis=1))
     assert len(acting) and set(acting) <= set(arrow.nodes.tolist())
     if ALL[key].on_selection:
-        assert set(arrow.nodes.tolist()) == set(select(problem.mesh, "top").tolist())
+        assert set(arrow.nodes.tolist()) == set(problem.loads[0].nodes(problem.mesh).tolist())
+        elements = problem.mesh.elements[problem.mesh.element_groups["top"]]
+        there = elements if ALL[key].load.on_elements else select(problem.mesh, "top")
+        assert set(arrow.nodes.tolist()) == set(np.unique(there).tolist())
     assert " = " in arrow.text
 
 
@@ -280,9 +293,12 @@ def test_a_load_is_read_from_toml(key: str, dim: int) -> None:
     for tables in ({**on, **given}, {**on, **{name: with_unit(name) for name in given}}):
         read = form.model_validate(tomllib.loads(toml_text({"load": [tables]}))["load"][0])
         assert read.load() == load_of(key, dim)
-        if kind.on_selection:
+        without = {name: one for name, one in tables.items() if name != "on"}
+        if kind.needs_selection:
             with pytest.raises(ValueError, match="on is required"):
-                form.model_validate({name: one for name, one in tables.items() if name != "on"})
+                form.model_validate(without)
+        elif kind.on_selection:
+            assert form.model_validate(without).load() == replace(load_of(key, dim), on=None)
     for name, quantity in kind.further.items():
         left = {one: value for one, value in {**on, **given}.items() if one != name}
         if quantity.default is None:

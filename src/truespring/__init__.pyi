@@ -14,6 +14,8 @@ from .equilibrium import Status as Status
 from .equilibrium import solve as solve
 from .errors import TruespringError as TruespringError
 from .exports import export as export
+from .fibres import Fibres as Fibres
+from .loading import ActiveTension as ActiveTension
 from .loading import Fixed as Fixed
 from .loading import Force as Force
 from .loading import Gravity as Gravity

@@ -12,7 +12,7 @@ from truespring.conditions import Loading, Refined, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, TruespringError, one_line
 from truespring.mesh import select
-from truespring.models import Model, as_model
+from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
@@ -48,6 +48,7 @@ def solve(
     solver does not.
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
+    check_fibres(problem, model)
     if isinstance(model, Program):
         return model.run(problem, solver, progress, timeout)
     moduli = model.moduli(problem.homogeneous[0]) if problem.material is not None else None

@@ -32,6 +32,14 @@ class LoadError(ProblemError):
         self.number, self.text = number, text
 
 
+class FibreError(ProblemError):
+    """The fibres of a material have a wrong direction in a body; `fibres` are these fibres."""
+
+    def __init__(self, fibres: object, text: str) -> None:
+        super().__init__(text)
+        self.fibres = fibres
+
+
 class ModelError(TruespringError):
     """A model cannot be built for a problem: its rule or law is unknown or does not fit."""
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple, Self
 
 from truespring.errors import ProblemError
+from truespring.fibres import Fibres
 
 _MODULI = {"mu": "shear", "bulk": "bulk"}
 
@@ -29,14 +30,18 @@ class Material:
         density: [kg/m^3], positive; None if unknown.
         constants: further constants of constitutive laws by name [SI], as a mapping or pairs, stored as sorted pairs.
             The entries of LAWS define them; a law ignores the constants of other laws.
+        fibres: fibres whose energy is added to that of the law; None without.
     """
 
     young: float
     poisson: float
     density: float | None = None
     constants: Mapping[str, float] | Sequence[tuple[str, float]] = field(default=())
+    fibres: Fibres | None = None
 
     def __post_init__(self) -> None:
+        if self.fibres is not None and not isinstance(self.fibres, Fibres):
+            raise ProblemError(f"fibres = {self.fibres!r}: give Fibres(along=..., k1=..., k2=...)")
         object.__setattr__(self, "constants", tuple(sorted(dict(self.constants).items())))
         for name, value in dict(self.constants).items():
             if not math.isfinite(value):
@@ -58,6 +63,7 @@ class Material:
         bulk: float,
         density: float | None = None,
         constants: Mapping[str, float] | Sequence[tuple[str, float]] = (),
+        fibres: Fibres | None = None,
     ) -> Self:
         """Return the material of a shear modulus and a bulk modulus at small strain [Pa], both positive.
 
@@ -67,7 +73,7 @@ class Material:
             if not (math.isfinite(value) and value > 0):
                 raise ProblemError(f"{name} = {value!r} Pa: the {_MODULI[name]} modulus must be positive and finite")
         ratio = bulk / mu
-        return cls(9 * bulk / (3 * ratio + 1), (3 * ratio - 2) / (2 * (3 * ratio + 1)), density, constants)
+        return cls(9 * bulk / (3 * ratio + 1), (3 * ratio - 2) / (2 * (3 * ratio + 1)), density, constants, fibres)
 
     @property
     def lame(self) -> Lame:

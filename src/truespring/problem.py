@@ -10,6 +10,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.conditions import Loading
 from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
+from truespring.fibres import Families, families
 from truespring.loading import LOADS, Body, Fixed, Held, Load, Spread, held_by, nodal_force
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
@@ -70,6 +71,7 @@ class Problem:
         if self.regions and self.material is None:
             raise ProblemError("regions need a material for the rest of the body")
         _ = self.material_numbers  # raises MeshError for a region without elements
+        _ = self.fibres  # raises FibreError
         if not self.stated:
             return
         loading = self.loading
@@ -100,6 +102,11 @@ class Problem:
             numbers[select_elements(self.mesh, region.on)] = named.index(region.material)
         used = np.bincount(numbers, minlength=len(named)) > 0
         return [material for material, there in zip(named, used, strict=True) if there], (np.cumsum(used) - 1)[numbers]
+
+    @cached_property
+    def fibres(self) -> Families | None:
+        """The fibres of the elements; None if no material has any. Raises FibreError if a direction is wrong."""
+        return families(self.mesh, [material.fibres for material in self.materials], self.material_numbers)
 
     @cached_property
     def homogeneous(self) -> "tuple[Problem, ...]":
@@ -160,7 +167,8 @@ class Problem:
         """The body that loads act on."""
         dense = bool(self.materials) and all(material.density is not None for material in self.materials)
         density = self.of_elements(lambda material: material.density or 0.0) if dense else None
-        return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density)
+        along = None if self.fibres is None else self.fibres.directions
+        return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density, along)
 
     def spreads(self, body: Body) -> tuple[Spread, ...]:
         """Return the dead loads over the cells of `body`, which may have mid-edge nodes."""
@@ -228,7 +236,12 @@ def sample(problem: Problem, elements: Ints) -> Problem:
     corners = mesh.elements[elements]
     return replace(
         problem,
-        mesh=Mesh(mesh.nodes[corners.ravel()], nodes.reshape(corners.shape), mesh.element),
+        mesh=Mesh(
+            mesh.nodes[corners.ravel()],
+            nodes.reshape(corners.shape),
+            mesh.element,
+            element_vectors=mesh.vectors_of(elements),
+        ),
         supports=[Fixed(on=nodes, displacement=(1.0,) * mesh.dim)],  # type: ignore[arg-type]
         loads=(),
         regions=_regions_of(problem, numbers),

@@ -19,6 +19,7 @@ from truespring.mesh import (
     Mesh,
     Near,
     Plane,
+    Selection,
     box,
     in_simplices,
     rectangle,
@@ -251,7 +252,9 @@ def coarser_problem(problem: Problem) -> Problem:
     mesh, counts = problem.mesh, cell_counts(problem.mesh)
     chosen = [one.on for one in problem.supports] + [one.on for one in problem.loads]
     plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
-    if counts is None or any(count % 2 for count in counts) or not plain or mesh.element_groups or mesh.facet_groups:
+    plain &= not (mesh.element_groups or mesh.facet_groups or mesh.element_vectors)
+    plain &= not any(one.on_elements and one.on is not None for one in problem.loads)
+    if counts is None or any(count % 2 for count in counts) or not plain:
         raise MeshError("there is no mesh of twice the size")
     half = tuple(count // 2 for count in counts)
     size = mesh.upper - mesh.lower
@@ -270,6 +273,11 @@ def _by_groups(problem: Problem) -> Problem:
     mesh = problem.mesh
     nodes, elements = dict(mesh.node_groups), dict(mesh.element_groups)
 
+    def of_elements(on: Selection) -> str:
+        name = f"elements {len(elements) + 1}"
+        elements[name] = select_elements(mesh, on)
+        return name
+
     def named(ones: Sequence[Any]) -> list[Any]:
         found = []
         for one in ones:
@@ -280,12 +288,13 @@ def _by_groups(problem: Problem) -> Problem:
             found.append(one)
         return found
 
-    supports, loads, regions = named(problem.supports), named(problem.loads), []
+    loads = [
+        one.moved_to(of_elements(one.on)) if one.on_elements and one.on is not None else one for one in problem.loads
+    ]
+    supports, loads, regions = named(problem.supports), named(loads), []
     for region in problem.regions:
-        name = f"elements {len(elements) + 1}"
-        elements[name] = select_elements(mesh, region.on)
-        regions.append(Region(name, region.material))
-    if len(nodes) == len(mesh.node_groups) and not regions:
+        regions.append(Region(of_elements(region.on), region.material))
+    if len(nodes) == len(mesh.node_groups) and len(elements) == len(mesh.element_groups):
         return problem
     mesh = replace(mesh, node_groups=nodes, element_groups=elements)
     return replace(problem, mesh=mesh, supports=supports, loads=loads, regions=regions)

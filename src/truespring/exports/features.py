@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from truespring.errors import ExportError
+from truespring.models import stiff_fibres
 from truespring.models.pair_laws import STRAIGHT
 from truespring.models.spring_data import COUPLING, PRESSURE, VOLUME_TERM, SpringData
 from truespring.problem import Problem
@@ -23,7 +24,7 @@ class Feature(StrEnum):
     NEGATIVE = "negative stiffness"
     PRESTRESS = "prestress"
     FORCE_LAW = "force law"
-    FOLLOWING = "load that follows a face"
+    FOLLOWING = "load that follows the body"
 
 
 #: All features.
@@ -72,14 +73,24 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
             )
     for load in problem.loads:
         if load.follows:
-            yield Feature.FOLLOWING, f"{load.words()} follows a face: use {load.instead}, or finite elements instead"
+            yield Feature.FOLLOWING, f"{load.words()} follows the body: use {load.instead}, or finite elements instead"
 
 
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
-    """Raise UntakenError for the first feature of springs or loads that is not in `takes`."""
+    """Raise UntakenError for the first feature of springs or loads that is not in `takes`, ExportError for fibres."""
+    refuse_fibres(problem, program)
     for feature, where in features(problem, springs):
         if feature not in takes:
             raise UntakenError(feature, f"{program} does not support {feature}: {where}")
+
+
+def refuse_fibres(problem: Problem, program: str) -> None:
+    """Raise ExportError if the material has fibres with a stiffness, which no target has."""
+    if stiff_fibres(problem) is not None:
+        raise ExportError(
+            f"{program}: the fibres of the material are not exported: solve it here, or remove the fibres or set their "
+            "k1 to 0"
+        )
 
 
 class UntakenError(ExportError):

@@ -1,5 +1,6 @@
 """Loads and supports: dead loads, loads that follow the body, fixed nodes and prescribed motions."""
 
+from truespring.loading.active import ActiveTension as ActiveTension
 from truespring.loading.body import Body as Body
 from truespring.loading.body import Spread as Spread
 from truespring.loading.body import nodal_force as nodal_force

@@ -16,12 +16,15 @@ class Body(NamedTuple):
         mesh: the mesh.
         thickness: thickness [m]; 1 in 3D.
         density: density of each element [kg/m^3], shape (n_elements,); None if not known.
+        fibres: unit vectors along the fibres of each element, zero where it has none, shape (n_families, n_elements,
+            dim); None if no element has fibres.
         second_order: mid-edge nodes of second-order elements; None for first-order elements.
     """
 
     mesh: Mesh
     thickness: float
     density: Floats | None
+    fibres: Floats | None = None
     second_order: SecondOrder | None = None
 
     @property

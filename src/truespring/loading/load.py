@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.loading.body import Body, Spread
-from truespring.mesh import Mesh, Selection
+from truespring.mesh import Mesh, Selection, loaded
 from truespring.potential import Potential
 
 
@@ -59,13 +59,19 @@ class Load(ABC):
 
     Attributes:
         on: the loaded selection; None for the whole body.
+        on_elements: whether `on` selects elements, as for regions, instead of nodes or facets.
         follows: whether the forces depend on the positions of the nodes.
         instead: alternative for programs without loads that follow the body, for error messages.
     """
 
     on: Selection | None
+    on_elements: ClassVar[bool] = False
     follows: ClassVar[bool]
     instead: ClassVar[str] = ""
+
+    def nodes(self, mesh: Mesh) -> Ints:
+        """Return the numbers of the loaded nodes, ascending; raise MeshError if `on` selects nothing."""
+        return np.arange(mesh.n_nodes) if self.on is None else loaded(mesh, self.on)
 
     def spread(self, body: Body) -> Spread | None:
         """Return a dead load over the cells of `body`; None for a load that follows the body."""

@@ -1,9 +1,10 @@
 """The keys of `[[load]]` in study files, with the class of each load and its values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from types import MappingProxyType
 
+from truespring.loading.active import ActiveTension
 from truespring.loading.dead import Force, Gravity, Traction
 from truespring.loading.load import Load
 from truespring.loading.moment import Moment
@@ -35,7 +36,8 @@ class LoadKind:
     """A kind of load in study files.
 
     Attributes:
-        load: the class of the load; with an argument `on` the load needs a selection, else it acts on the whole body.
+        load: the class of the load; with an argument `on` the load acts on a selection, which may be left out if the
+            argument has a default, else on the whole body.
         value: the value of the key that names the load.
         further: values of further keys, by key.
         dims: dimensions of the bodies that the load can act on.
@@ -55,6 +57,12 @@ class LoadKind:
         """Whether the load acts on a selection, not on the whole body."""
         return any(one.name == "on" and one.init for one in fields(self.load))  # type: ignore[arg-type]  # a dataclass
 
+    @property
+    def needs_selection(self) -> bool:
+        """Whether the selection is required."""
+        ours = fields(self.load)  # type: ignore[arg-type]  # a dataclass
+        return any(one.name == "on" and one.init and one.default is MISSING for one in ours)
+
 
 #: The kinds of loads by the key of `[[load]]` that names them.
 LOADS: Mapping[str, LoadKind] = MappingProxyType(
@@ -72,6 +80,14 @@ LOADS: Mapping[str, LoadKind] = MappingProxyType(
             Moment,
             Quantity("moment", "moment", "the moment on nodes of a plane body, anticlockwise, which rotates with them"),
             dims=(2,),
+        ),
+        "tension": LoadKind(
+            ActiveTension,
+            Quantity(
+                "tension",
+                "stress",
+                "the active tension along the fibres of the material, a nominal stress; on: elements, a group or a box",
+            ),
         ),
         "gravity": LoadKind(
             Gravity, Quantity("acceleration", "acceleration", "the acceleration of the whole body", vector=True)

@@ -24,3 +24,16 @@ def selection_words(on: Selection) -> str:
             return f"the node nearest to {vector_words(point)} m"
         case _:
             return counted(len(on), "node")
+
+
+def element_words(on: Selection) -> str:
+    """Return a description of a selection of elements: "'muscle'", "3 elements"."""
+    match on:
+        case str():
+            return f"'{on}'"
+        case Box(lower, upper):
+            return f"the elements with centres from {vector_words(lower)} to {vector_words(upper)} m"
+        case Plane() | Near():
+            return selection_words(on)
+        case _:
+            return counted(len(on), "element")

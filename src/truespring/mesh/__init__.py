@@ -1,5 +1,6 @@
 """Geometry without physics: nodes, elements, named sides, selections."""
 
+from truespring.mesh.along import square_stretch_forms as square_stretch_forms
 from truespring.mesh.cells import CELL_SHAPES as CELL_SHAPES
 from truespring.mesh.cells import quadrature as quadrature
 from truespring.mesh.corner_mesh import corner_mesh as corner_mesh

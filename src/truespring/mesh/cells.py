@@ -188,13 +188,22 @@ CELL_SHAPES: MappingProxyType[str, CellShape] = MappingProxyType(
 def quadrature(base: str, n: int) -> tuple[Floats, Floats]:
     """Return Gauss points of a cell in reference coordinates, shape (n^dim, dim), and their weights, shape (n^dim,).
 
-    `base` is "line", "quad", "triangle" or "tetra". Polynomials of order 2 n - 1 are integrated exactly, on a quad
-    along each axis. On simplices the points are those of a collapsed cube, Gauss-Jacobi points along each axis
-    (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
+    `base` is that of a CellShape. Polynomials of order 2 n - 1 are integrated exactly, on quads, hexahedra and wedges
+    along each axis. On simplices and pyramids the points are those of a collapsed cube, Gauss-Jacobi points along each
+    axis that collapses (Karniadakis and Sherwin, Spectral/hp Element Methods for CFD, 1999).
     """
     from scipy.special import roots_jacobi
 
-    dim = {"line": 1, "quad": 2, "triangle": 2, "tetra": 3}[base]
+    if base == "wedge":
+        (flat, shares), (high, heights) = quadrature("triangle", n), quadrature("line", n)
+        at = np.column_stack([np.repeat(flat, len(high), axis=0), np.tile(high, (len(flat), 1))])
+        return at, np.outer(shares, heights).ravel()
+    if base == "pyramid":
+        (flat, shares), (places, heights) = quadrature("quad", n), roots_jacobi(n, 2, 0)
+        z, heights = (1 + places) / 2, heights / 2
+        base_at = np.repeat(2 * flat - 1, len(z), axis=0) * (1 - np.tile(z, len(flat)))[:, None]
+        return np.column_stack([base_at, np.tile(z, len(flat))]), np.outer(shares, heights).ravel()
+    dim = {"line": 1, "quad": 2, "triangle": 2, "tetra": 3, "hexahedron": 3}[base]
     collapsed = base in ("triangle", "tetra")
     at, weights, left = np.zeros((1, 0)), np.ones(1), np.ones(1)  # left: remaining height of a simplex
     for axis in range(dim):

@@ -44,6 +44,8 @@ class Mesh:
             lexicographic order; names for loads, which act on these facets alone. A name that is no group of nodes
             becomes one: the facets' nodes.
         notes: remarks on the mesh, such as those of a reader.
+        element_vectors: a vector for each element by name, such as directions of fibres, shape (n_elements, dim) or
+            (n_elements, 3).
         middles: positions of the middle nodes of `edges` [m], shape (n_edges, dim), for triangles and tetrahedra of
             second order; None if all edges are straight. Elements of first order do not use them.
 
@@ -59,6 +61,7 @@ class Mesh:
     facet_groups: Mapping[str, Ints] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     middles: Floats | None = None
+    element_vectors: Mapping[str, Floats] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.element not in ELEMENT_KINDS and self.element != MIXED:
@@ -73,6 +76,7 @@ class Mesh:
         except ValueError as error:
             raise MeshError(str(error)) from None
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
+        object.__setattr__(self, "element_vectors", self._element_vectors())
         object.__setattr__(self, "facet_groups", self._facet_groups())
         nodes = {name: np.unique(self.facet_nodes(facets)) for name, facets in self.facet_groups.items()}
         object.__setattr__(self, "node_groups", _groups({**nodes, **self.node_groups}, self.n_nodes, "node"))
@@ -166,6 +170,22 @@ class Mesh:
                 f"{int(bad.sum())} of {len(bad)} {what} are {why}; the first is {what[:-1]} {first} at ({place}) m"
             )
 
+    def _element_vectors(self) -> Mapping[str, Floats]:
+        """Freeze the vectors of elements; raise MeshError if a shape does not match."""
+        frozen = {}
+        for name, vectors in self.element_vectors.items():
+            if np.shape(vectors) not in {(len(self.elements), self.dim), (len(self.elements), 3)}:
+                raise MeshError(
+                    f"vectors '{name}' of the elements have shape {np.shape(vectors)}: ({len(self.elements)}, "
+                    f"{self.dim}) is expected"
+                )
+            frozen[name] = _frozen(np.array(vectors, dtype=np.float64))
+        return MappingProxyType(frozen)
+
+    def vectors_of(self, elements: Ints) -> dict[str, Floats]:
+        """Return `element_vectors` of some elements, each of shape (n, dim) or (n, 3)."""
+        return {name: vectors[elements] for name, vectors in self.element_vectors.items()}
+
     def _facet_groups(self) -> Mapping[str, Ints]:
         """Freeze groups of facets: each facet once; raise MeshError for one that is empty or does not exist."""
         frozen = {}
@@ -199,13 +219,17 @@ class Mesh:
         """The elements by kind."""
         if self.element != MIXED:
             return (Block(np.arange(len(self.elements)), self),)
-        return tuple(Block(numbers, self._part(kind, own)) for kind, (numbers, own) in unmerged(self.elements).items())
+        return tuple(
+            Block(numbers, self._part(kind, own, numbers)) for kind, (numbers, own) in unmerged(self.elements).items()
+        )
 
-    def _part(self, kind: str, elements: Ints) -> "Mesh":
-        """Return a mesh of some elements of one kind on all nodes, without checks."""
+    def _part(self, kind: str, elements: Ints, numbers: Ints) -> "Mesh":
+        """Return a mesh of some elements of one kind on all nodes, without checks; `numbers` are theirs in this one."""
         part = object.__new__(Mesh)
         groups = dict.fromkeys(("node_groups", "element_groups", "facet_groups"), _NONE)
-        part.__dict__.update(nodes=self.nodes, elements=elements, element=kind, notes=(), **groups)
+        vectors = MappingProxyType(self.vectors_of(numbers))
+        own = {"nodes": self.nodes, "elements": elements, "element": kind, "notes": (), "element_vectors": vectors}
+        part.__dict__.update(own, **groups)
         return part
 
     def _by_block(self, values: Callable[["Mesh"], Floats]) -> Floats:

@@ -107,7 +107,18 @@ def _refined(mesh: Mesh) -> Mesh:
         if name in facet_groups:
             members.append(facet_nodes(elements, kind, facet_groups[name]).ravel())
         node_groups[name] = np.concatenate(members)
-    finer = Mesh(np.concatenate(places), elements, kind, node_groups, element_groups, facet_groups, mesh.notes)
+    parents = np.argsort(_children_of(first, n_children), kind="stable")
+    vectors = mesh.vectors_of(np.repeat(np.arange(len(mesh.elements)), n_children)[parents])
+    finer = Mesh(
+        np.concatenate(places),
+        elements,
+        kind,
+        node_groups,
+        element_groups,
+        facet_groups,
+        mesh.notes,
+        element_vectors=vectors,
+    )
     return finer if mesh.middles is None else _curved(finer, mesh)
 
 

@@ -37,7 +37,8 @@ def in_simplices(mesh: Mesh) -> tuple[Mesh, Ints]:
         name: find_facets(elements, kind, np.concatenate(fanned(mesh.facet_nodes(of))))
         for name, of in mesh.facet_groups.items()
     }
-    return Mesh(mesh.nodes, elements, kind, mesh.node_groups, groups, facets, mesh.notes), parents
+    known = (mesh.node_groups, groups, facets, mesh.notes)
+    return Mesh(mesh.nodes, elements, kind, *known, element_vectors=mesh.vectors_of(parents)), parents
 
 
 def _cones(element: str, elements: Ints) -> tuple[Ints, Ints]:

@@ -5,6 +5,7 @@ from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprin
 from truespring.models.fem import Fem as Fem
 from truespring.models.fem_potential import FemPotential as FemPotential
 from truespring.models.fem_potential import FiniteElements as FiniteElements
+from truespring.models.fibres import stiff_fibres as stiff_fibres
 from truespring.models.findings import CODES as CODES
 from truespring.models.findings import Finding as Finding
 from truespring.models.findings import findings as findings
@@ -23,6 +24,7 @@ from truespring.models.mass_tensor import MassTensor as MassTensor
 from truespring.models.mechanism import check_mechanism as check_mechanism
 from truespring.models.model import Model as Model
 from truespring.models.model import as_model as as_model
+from truespring.models.model import check_fibres as check_fibres
 from truespring.models.moduli import Moduli as Moduli
 from truespring.models.moduli import moduli as moduli
 from truespring.models.network import SpringNetwork as SpringNetwork

@@ -61,6 +61,11 @@ class Fem(Model):
         return LAWS[self.law].finite
 
     @property
+    def takes_fibres(self) -> bool:
+        """Whether fibres are included: under laws of finite strain; fibres that bear tension only are nonlinear."""
+        return self.finite
+
+    @property
     def element_is_open(self) -> bool:
         """Whether the mesh determines the interpolation."""
         return self.element is None

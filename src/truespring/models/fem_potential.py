@@ -10,7 +10,9 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.assembly import Pattern
 from truespring.errors import ModelError
+from truespring.fibres import Families
 from truespring.mesh import Mesh
+from truespring.models.fibres import stiff_fibres, with_fibres
 from truespring.models.law import Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
@@ -34,6 +36,7 @@ class Points(NamedTuple):
         F: deformation gradient [-], axes (i, j, element, point).
         frame: F, or the identity for a linear law: the change of strain is the symmetric part of frame^T dF.
         constants: constants of the law.
+        fibres: fibres of the elements; None without.
     """
 
     gradients: Floats
@@ -41,6 +44,7 @@ class Points(NamedTuple):
     F: Floats
     frame: Floats
     constants: Constants
+    fibres: Families | None
 
 
 @runtime_checkable
@@ -71,11 +75,13 @@ class FemPotential:
         problem: mesh, material and section.
         law: the constitutive law.
         constants: its constants.
+        fibres: fibres whose energy is added to that of a law of finite strain; None without.
     """
 
     problem: Problem
     law: Law
     constants: Constants
+    fibres: Families | None = None
 
     #: The interpolation, one of ELEMENTS.
     interpolation: ClassVar[str] = "linear"
@@ -142,7 +148,8 @@ class FemPotential:
         frame = F if self.law.finite else np.zeros_like(F)
         if not self.law.finite:
             frame[np.diag_indices(len(F))] = 1.0
-        return Points(gradients, volumes, F, frame, self.constants.part(first, last))
+        fibres = None if self.fibres is None else self.fibres.part(first, last)
+        return Points(gradients, volumes, F, frame, self.constants.part(first, last), fibres)
 
     def _gradient_of(self, field: Floats, gradients: Floats, first: int, last: int) -> Floats:
         """Return the gradient of a vector field with the given nodal values, axes (i, j, element, point)."""
@@ -163,6 +170,11 @@ class FemPotential:
         return small - identity(small)
 
     def _respond(self, at: Points) -> Response:
+        """Return the response of the law and of the fibres."""
+        response = self._law_response(at)
+        return response if at.fibres is None else with_fibres(response, self._strain(at), at.fibres)
+
+    def _law_response(self, at: Points) -> Response:
         return self.law.respond(self._strain(at), at.constants)
 
     def energy(self, positions: Floats) -> float:
@@ -337,8 +349,8 @@ def require_continuum(problem: Problem) -> None:
 
 
 def of_one_kind(problem: Problem, law: str, kind: type[FemPotential] = FemPotential) -> FemPotential:
-    """Return a potential of the class `kind` on a mesh of one kind of elements."""
-    return kind(problem, LAWS[law], law_constants(problem, law))
+    """Return a potential of the class `kind` on a mesh of one kind of elements, with the fibres of the material."""
+    return kind(problem, LAWS[law], law_constants(problem, law), stiff_fibres(problem))
 
 
 def element_matrices(problem: Problem) -> Floats:
@@ -347,7 +359,10 @@ def element_matrices(problem: Problem) -> Floats:
 
 
 def fem_of_one_kind(problem: Problem, law: str) -> FemPotential:
-    """Return the finite elements of a mesh of one kind of elements; raise MeshError if it has several."""
+    """Return the finite elements of a mesh of one kind of elements, without fibres.
+
+    Raises MeshError if the mesh has several kinds.
+    """
     require_continuum(problem)
     _ = problem.mesh.kind
-    return of_one_kind(problem, law)
+    return FemPotential(problem, LAWS[law], law_constants(problem, law))

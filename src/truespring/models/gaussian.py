@@ -9,7 +9,9 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.assembly import Pattern
+from truespring.fibres import Families
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, lengths, stretch
+from truespring.models.fibres import fibre_energy
 from truespring.models.gaussian_weights import Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
@@ -58,13 +60,15 @@ class GaussianElements:
         problem: mesh, material and section.
         law: the constitutive law, with `invariants`.
         constants: its constants.
-        laplacians: the matrices of the quadratic form of each element.
+        laplacians: the matrices of the quadratic form of each element; those of fibres follow that of tr C.
+        fibres: the fibres; None without.
     """
 
     problem: Problem
     law: Law
     constants: Constants
     laplacians: Laplacians
+    fibres: Families | None = None
 
     @property
     def nodes(self) -> Floats:
@@ -148,7 +152,7 @@ class GaussianElements:
 
     def _stretched(self, squares: Floats) -> tuple[Floats, Floats, Floats]:
         """Return energy density and derivatives of fibres whose stretch has the given square."""
-        return squares, squares, squares
+        return (squares,) * 3 if self.fibres is None else fibre_energy(squares, self.fibres.k1, self.fibres.k2)
 
     def energy(self, positions: Floats) -> float:
         """Return the stored energy [J]; infinite if an element is inverted."""

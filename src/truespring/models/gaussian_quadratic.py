@@ -9,6 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, stretch
 from truespring.models.fem_potential import FemPotential, of_one_kind
+from truespring.models.fibres import stiff_fibres
 from truespring.models.gaussian_weights import integrated
 from truespring.models.law import Constants, Response
 from truespring.models.laws import LAWS, law_constants
@@ -161,4 +162,4 @@ def gaussian_quadratic(problem: Problem) -> GaussianQuadratic:
     section = problem.section
     kind = _AtPoints if section is not None and section.free_thickness else _AtMean
     law = replace(LAWS["neo-hookean"], respond=_without_springs)
-    return kind(problem, law, law_constants(problem, "neo-hookean"))
+    return kind(problem, law, law_constants(problem, "neo-hookean"), stiff_fibres(problem))

@@ -4,6 +4,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError, nearest
+from truespring.models.fibres import stiff_fibres
 from truespring.models.gaussian import GaussianElements, SummedGaussian
 from truespring.models.gaussian_quadratic import GaussianQuadratic, gaussian_quadratic
 from truespring.models.gaussian_weights import check_hourglass, hourglass_values, laplacians
@@ -32,11 +33,15 @@ def gaussian_potential(
         return gaussian_quadratic(problem)
     check_hourglass(problem.mesh, hourglass)
     values = hourglass_values(problem, hourglass)
-    parts = tuple(
-        GaussianElements(part, LAWS[law], law_constants(part, law), laplacians(part, values[numbers]))
-        for numbers, part in problem.blocks
-    )
+    parts = tuple(_of_one_kind(part, law, values[numbers]) for numbers, part in problem.blocks)
     return parts[0] if len(parts) == 1 else SummedGaussian(parts, problem)
+
+
+def _of_one_kind(problem: Problem, law: str, hourglass: Floats) -> GaussianElements:
+    """Return Gaussian springs on elements of one kind; `hourglass` has shape (n_elements,)."""
+    fibres = stiff_fibres(problem)
+    forms = laplacians(problem, hourglass, None if fibres is None else fibres.directions)
+    return GaussianElements(problem, LAWS[law], law_constants(problem, law), forms, fibres)
 
 
 def gaussian_stiffness(

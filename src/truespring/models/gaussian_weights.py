@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
-from truespring.mesh import Mesh
+from truespring.mesh import Mesh, square_stretch_forms
 from truespring.mesh.rows import distinct_rows
 from truespring.models.fem_potential import FemPotential, fem_of_one_kind
 from truespring.models.links import CORNERS
@@ -79,19 +79,42 @@ class Laplacians(NamedTuple):
     of: Ints
 
 
-def laplacians(problem: Problem, hourglass: Floats) -> Laplacians:
-    """Return the scalar Laplacian of each element for a unit modulus; elements of one kind.
+def laplacians(problem: Problem, hourglass: Floats, along: Floats | None = None) -> Laplacians:
+    """Return the scalar Laplacian of each element for a unit modulus, and the forms of fibres; elements of one kind.
 
-    The off-diagonal entries are minus the weights of the springs between the nodes. `hourglass` has shape
-    (n_elements,). With the mean gradients b of the shape functions over the volume V0, the part V0 b b^T determines the
-    energy of uniform strain; the rest, the integral of grad N . grad N minus that part, is the stiffness of the
-    hourglass modes of finite elements.
+    The off-diagonal entries are minus the weights of the springs between the nodes. With the mean gradients b of the
+    shape functions over the volume V0, the part V0 b b^T determines the energy of uniform strain; the rest, the
+    integral of grad N . grad N minus that part, is the stiffness of the hourglass modes of finite elements.
+
+    Args:
+        problem: mesh and section.
+        hourglass: stiffness of the hourglass modes over that of finite elements, shape (n_elements,).
+        along: unit vectors along fibres, shape (n_families, n_elements, dim); each family has a further form, the
+            integral of (grad N_a . a)(grad N_b . a).
     """
     forms = problem.mesh.forms
     if not forms.few:
-        return Laplacians(_laplacians(problem, hourglass)[None], np.arange(len(hourglass)))
-    kinds = distinct_rows((forms.of, np.unique(hourglass, return_inverse=True)[1].ravel()))
-    return Laplacians(_laplacians(sample(problem, kinds.first), hourglass[kinds.first])[None], kinds.of)
+        return Laplacians(_forms(problem, hourglass, along), np.arange(len(hourglass)))
+    columns = [forms.of, _numbered(hourglass[:, None])]
+    columns += [] if along is None else [_numbered(one) for one in along]
+    kinds = distinct_rows(tuple(columns))
+    part = None if along is None else along[:, kinds.first]
+    return Laplacians(_forms(sample(problem, kinds.first), hourglass[kinds.first], part), kinds.of)
+
+
+def _numbered(rows: Floats) -> Ints:
+    """Return the number of each row among the distinct ones, shape (n,)."""
+    return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
+
+
+def _forms(problem: Problem, hourglass: Floats, along: Floats | None) -> Floats:
+    """Return the Laplacian of each element and the forms of fibres, shape (n_forms, n_elements, nodes, nodes)."""
+    found, mesh, section = [_laplacians(problem, hourglass)], problem.mesh, problem.section
+    assert section is not None  # see require_body
+    for one in () if along is None else along:
+        form = square_stretch_forms(mesh.kind.vtk, mesh.nodes, mesh.elements, one)
+        found.append(section.thickness * form)
+    return np.stack(found)
 
 
 def _laplacians(problem: Problem, hourglass: Floats) -> Floats:

@@ -5,6 +5,7 @@ from typing import Any
 from truespring.completing import completed
 from truespring.errors import ModelError
 from truespring.models.fem_potential import FiniteElements
+from truespring.models.fibres import stiff_fibres
 from truespring.models.laws import LAWS
 from truespring.models.moduli import Moduli
 from truespring.potential import Potential
@@ -40,6 +41,11 @@ class Model:
     def lines(self) -> str:
         """Name of the lines of the potential in figures."""
         return "springs"
+
+    @property
+    def takes_fibres(self) -> bool:
+        """Whether the potential includes the stiffness of the material's fibres; without, such fibres are an error."""
+        return False
 
     @property
     def finite(self) -> bool:
@@ -97,6 +103,11 @@ class BarePotential(Model):
         return type(self._potential).__name__
 
     @property
+    def takes_fibres(self) -> bool:
+        """True: a given potential is used as it is."""
+        return True
+
+    @property
     def finite(self) -> bool:
         """Whether strains are finite; false for finite elements of the linear law."""
         return not isinstance(self._potential, FiniteElements) or self._potential.law.finite
@@ -122,3 +133,13 @@ def as_model(model: Any) -> Model:
     if not hasattr(model, "potential"):
         raise ModelError(f"{model!r} is not a model: use Springs(rule=...), Fem(law=...) or a SpringNetwork")
     return completed(model, Model)
+
+
+def check_fibres(problem: Problem, model: Model) -> None:
+    """Raise ModelError if the material has fibres with a stiffness, which the model would ignore."""
+    if model.takes_fibres or not model.solves or stiff_fibres(problem) is None:
+        return
+    raise ModelError(
+        f"{model.label}: this model has no fibres, the material has fibres with k1 > 0: use rule = 'gaussian', or "
+        "kind = 'fem' with a law of finite strain; fibres with k1 = 0 may have an active tension in every model"
+    )

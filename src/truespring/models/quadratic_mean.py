@@ -67,7 +67,7 @@ class QuadraticMeanPotential(QuadraticPotential):
             J,
         )
 
-    def _respond(self, at: Points) -> Response:
+    def _law_response(self, at: Points) -> Response:
         shear = self.law.respond(self._strain(at), replace(at.constants, lam=0 * at.constants.lam))
         volume = self._volume(at)
         return Response(

@@ -91,6 +91,7 @@ class Rule:
             the springs have no other law.
         locks_on: kinds of elements on which such a potential locks near Poisson's ratio 1/2.
         remark: a sentence on cost and law of such a potential, without a full stop.
+        takes_fibres: whether such a potential includes the fibres of the material.
     """
 
     stiffness: Callable[..., Floats]
@@ -104,6 +105,7 @@ class Rule:
     laws: tuple[str, ...] = ()
     locks_on: tuple[str, ...] = ()
     remark: str = ""
+    takes_fibres: bool = False
 
     @property
     def coupled(self) -> bool:
@@ -508,6 +510,7 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             potential=gaussian_potential,
             laws=GAUSSIAN_LAWS,
             locks_on=SIMPLICES,
+            takes_fibres=True,
         ),
     }
 )

@@ -110,6 +110,11 @@ class Springs(Model):
         return self.rule is not None and RULES[self.rule].coupled
 
     @property
+    def takes_fibres(self) -> bool:
+        """Whether the rule includes the fibres of the material."""
+        return self.rule is not None and RULES[self.rule].takes_fibres
+
+    @property
     def locks_on(self) -> tuple[str, ...]:
         """Kinds of elements on which the springs lock near Poisson's ratio 1/2."""
         if self.coupled:

@@ -1,6 +1,7 @@
 """Summarise a study without solving it, for `check`."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ from truespring.study.moduli import finding_values
 from truespring.study.read import Study
 
 
-def _values(material: Material) -> dict[str, float | None]:
+def _values(material: Material) -> dict[str, Any]:
     """Return the keys of `[material]` with their values in SI units."""
     young, poisson, density = material.young, material.poisson, material.density
-    return {"young": young, "poisson": poisson, "density": density, **dict(material.constants)}
+    values = {"young": young, "poisson": poisson, "density": density, **dict(material.constants)}
+    fibres = material.fibres
+    return values if fibres is None else {**values, "fibres": asdict(fibres)}
 
 
 def plan(study: Study) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.errors import LoadError, NoLoadError, StudyError, TruespringError
+from truespring.errors import FibreError, LoadError, NoLoadError, StudyError, TruespringError
 from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
-from truespring.models import Model, SpringNetwork
+from truespring.models import Model, SpringNetwork, check_fibres
 from truespring.problem import Problem
 from truespring.solvers import Solver
 from truespring.study.changes import changed
@@ -141,6 +141,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int) -> Study:
         with places.at("models", name):
             scope = Scope(places, problem, solver, network, keys.models, name)
             entries[name] = model_keys.build(scope)
+            check_fibres(problem, entries[name])
             model_keys.check(scope, entries[name])
     model, references = keys.compare.names(places, entries)
     return Study(
@@ -178,6 +179,10 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
     loads = [load.build(places, number, mesh) for number, load in enumerate(keys.load)]
     try:
         return Problem(mesh, material, section, supports, loads, regions), network
+    except FibreError as error:
+        own = [number for number, region in enumerate(regions) if region.material.fibres == error.fibres]
+        with places.at("region", own[0]) if own else places.at("material"):
+            raise
     except LoadError as error:
         with places.at("load", error.number):
             raise StudyError(error.text) from None

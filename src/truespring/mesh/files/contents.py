@@ -94,6 +94,7 @@ class Contents:
             with the same corners.
         facet_groups: facets by name: the number of a cell and the index of its facet in the `facets` of
             ELEMENT_KINDS, shape (n, 2).
+        cell_vectors: vectors of the cells by name, shape (n, 3), in the order of their numbers from 0.
         node_lines: line numbers of the nodes in a text file, shape (n,).
         is_apart: whether the file defines contact between bodies: coincident nodes are then merged only if `join` is
             true.
@@ -107,6 +108,7 @@ class Contents:
     node_groups: Mapping[str, Ints] = field(default_factory=dict)
     cell_groups: Mapping[str, Ints] = field(default_factory=dict)
     facet_groups: Mapping[str, Ints] = field(default_factory=dict)
+    cell_vectors: Mapping[str, Floats] = field(default_factory=dict)
     node_lines: Ints | None = None
     is_apart: bool = False
     notes: tuple[str, ...] = ()
@@ -180,6 +182,7 @@ class Contents:
                 element_groups=_not_empty(element_groups),
                 facet_groups=_not_empty(facet_groups),
                 notes=tuple(notes),
+                element_vectors=self._vectors(body),
             )
             return self._curved(mesh, body, nodes, scale)
         except MeshError as error:
@@ -279,6 +282,11 @@ class Contents:
         return element_groups, {
             name: _found(self.node_numbers[nodes], np.unique(np.concatenate(group))) for name, group in members.items()
         }
+
+    def _vectors(self, body: Sequence[Cells]) -> dict[str, Floats]:
+        """Return the vectors of the body's elements by name, shape (n_elements, 3)."""
+        numbers = np.concatenate([block.numbers for block in body])
+        return {name: vectors[numbers] for name, vectors in self.cell_vectors.items()}
 
     def _none_of(self, name: str, body: Sequence[Cells]) -> str:
         """Return a phrase for a note about a group that has no corner node of the body."""

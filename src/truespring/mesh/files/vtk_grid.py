@@ -115,6 +115,11 @@ def contents(grid: Grid) -> Contents:
             if values.min() == 0 and values.max() == 1
         },
         cell_groups=_cell_groups(cells, cell_arrays),
+        cell_vectors={
+            name: values.astype(np.float64)
+            for name, values in cell_arrays.items()
+            if values.dtype.kind in "fiu" and values.shape == (len(types), 3)
+        },
         notes=notes,
     )
 

@@ -1,11 +1,13 @@
 """Keys of `[material]`, `[[region]]`, `[section]`, `[[support]]` and `[[load]]`."""
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from truespring.errors import StudyError
+from truespring.fibres import Fibres
 from truespring.loading import LOADS, Fixed, Load, LoadKind
 from truespring.material import SECTIONS, Material, Section
 from truespring.mesh import Mesh, select, select_elements
@@ -15,6 +17,7 @@ from truespring.study.places import Places
 from truespring.study.schema.values import (
     QUANTITIES,
     SELECTION_FORMS,
+    Along,
     Angle,
     Density,
     Direction,
@@ -33,6 +36,35 @@ ELASTIC_PAIRS = (("young", "poisson"), ("mu", "bulk"))
 _PAIR_WORDS = "set young and poisson, or mu and bulk"
 
 
+class FibreKeys(Keys):
+    """Fibres of a material, which bear tension only: k1 / (2 k2) (exp(k2 <I4 - 1>^2) - 1) for each family."""
+
+    along: Along | None = Field(
+        default=None,
+        description="direction of the fibres: a vector, or the name of a cell array of the mesh file; for several "
+        "families a list of these",
+    )
+    angle: Angle | list[Angle] | None = Field(
+        default=None, description="direction in a plane body, instead of along: angle from x, or a list of angles"
+    )
+    k1: Stress = Field(default=0.0, description="stiffness; default: 0, fibres for an active tension only")
+    k2: Number = Field(default=0.0, description="increase of the stiffness with the stretch")
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if (self.along is None) == (self.angle is None):
+            raise ValueError("a direction is required: set along, or angle in a plane body")
+        return self
+
+    def build(self) -> Fibres:
+        """Return the fibres."""
+        if self.angle is None:
+            assert self.along is not None  # see _one_direction
+            return Fibres(self.along, self.k1, self.k2)
+        angles = self.angle if isinstance(self.angle, list) else [self.angle]
+        return Fibres([(math.cos(one), math.sin(one)) for one in angles], self.k1, self.k2)
+
+
 class PlainMaterialKeys(Keys):
     """The material of the body: young and poisson, or mu and bulk."""
 
@@ -49,6 +81,9 @@ class PlainMaterialKeys(Keys):
         default=None, description="bulk modulus at small strain [Pa], with mu, instead of young and poisson"
     )
     density: Density | None = Field(default=None, description="density, needed for gravity")
+    fibres: FibreKeys | None = Field(
+        default=None, description='fibres, such as { along = [1, 0, 0], k1 = "5 kPa", k2 = 10 }'
+    )
 
     @model_validator(mode="after")
     def _one_pair(self) -> Self:
@@ -62,10 +97,11 @@ class PlainMaterialKeys(Keys):
         """Return the material."""
         constants = {name: getattr(self, name, None) for name in material_constants()}
         stated = {name: value for name, value in constants.items() if value is not None}
+        fibres = None if self.fibres is None else self.fibres.build()
         if self.mu is not None and self.bulk is not None:
-            return Material.from_moduli(self.mu, self.bulk, self.density, stated)
+            return Material.from_moduli(self.mu, self.bulk, self.density, stated, fibres)
         assert self.young is not None and self.poisson is not None  # see _one_pair
-        return Material(self.young, self.poisson, self.density, stated)
+        return Material(self.young, self.poisson, self.density, stated, fibres)
 
 
 def with_constants(keys: type[Keys], name: str, constants: Mapping[str, Constant]) -> type[Keys]:
@@ -151,7 +187,7 @@ class LoadKeys(Keys):
         if len(named) != 1:
             found = f"{' and '.join(named)} are set" if named else "no load is set"
             raise ValueError(f"{found}: set exactly one of {', '.join(self.kinds)}")
-        if self.kind.on_selection and self.on is None:
+        if self.kind.needs_selection and self.on is None:
             raise ValueError(f"on is required and missing: where the {self.key} acts")
         if not self.kind.on_selection and self.on is not None:
             raise ValueError(f"{self.key} acts on the whole body: leave out on")
@@ -189,7 +225,7 @@ class LoadKeys(Keys):
         """Return the load, the `number`-th of the study from 0; raise StudyError if it does not fit the mesh."""
         if self.on is not None:
             with places.at("load", number, "on"):
-                select(mesh, self.on)
+                self.load().nodes(mesh)
         for key, value in self.values.items():
             with places.at("load", number, key):
                 check_length(value, mesh)

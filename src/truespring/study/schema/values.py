@@ -117,6 +117,23 @@ def _point(value: Any) -> tuple[float, ...]:
     return tuple(to_si(coordinate, "length") for coordinate in value)
 
 
+def _along(value: Any) -> Any:
+    """Return the direction of fibres, or a list of them, each a vector or the name of an array."""
+    families = value if isinstance(value, list) and value and isinstance(value[0], list | str) else [value]
+    for one in families:
+        vector = isinstance(one, list) and len(one) in (2, 3) and all(map(_is_number, one))
+        if not vector and not isinstance(one, str):
+            raise TruespringError(
+                f"{shown(one)} is no direction: give a vector such as [1, 0, 0], the name of an array of the mesh "
+                "file, or a list of these"
+            )
+    return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _probe(value: Any) -> str | tuple[float, ...]:
     return value if isinstance(value, str) else _point(value)
 
@@ -143,6 +160,14 @@ Probe = Annotated[
     Any, PlainValidator(_as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
 ]
 
+
+_ONE_ALONG = [{"type": "string"}, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}]
+#: Direction of fibres: a vector or the name of an array of the mesh file, or a list of these.
+Along = Annotated[
+    Any,
+    PlainValidator(_as_value_error(_along)),
+    WithJsonSchema({"anyOf": [*_ONE_ALONG, {"type": "array", "items": {"anyOf": _ONE_ALONG}, "minItems": 1}]}),
+]
 
 Count = Annotated[int, Field(ge=1, le=10**9)]
 #: Lengths of lists with one value per direction, in 2D, in 3D, or in either.
