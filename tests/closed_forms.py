@@ -229,11 +229,12 @@ def shallow_truss_limit(half_span: float, rise: float, stiffness: float) -> tupl
 def material_of(law: str, young: float, poisson: float) -> ts.Material:
     """A material for a law, with examples of the constants that it takes, those that are stresses by `young`.
 
-    Of a law whose constants give the moduli at small strain Poisson's ratio is that of the examples.
+    The examples are those of a Young's modulus of 1 kPa. Of a law whose constants give the moduli at small strain they
+    are scaled to `young`, and Poisson's ratio is that of the examples.
     """
     entry = LAWS[law]
     values = {name: constant.example for name, constant in entry.constants.items()}
-    scale = 1.0
+    scale = young / 1e3
     if entry.lame is not None:
         lam, mu = entry.lame(values)
         scale, poisson = young * (lam + mu) / mu / (3 * lam + 2 * mu), lam / 2 / (lam + mu)

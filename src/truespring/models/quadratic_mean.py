@@ -36,7 +36,7 @@ class _Volume(NamedTuple):
 class QuadraticMeanPotential(QuadraticPotential):
     """Elements of second order with the part of lam at the mean of each element, the rest at every Gauss point.
 
-    A law with separate energies of shape and volume has the part of its bulk modulus at the mean.
+    A law with an energy of volume of the bulk modulus lam + 2/3 mu has the part of mu at the Gauss points, too.
 
     An element has one incompressibility constraint instead of one at every Gauss point, so that it does not lock near
     Poisson's ratio 1/2: selective integration (Malkus and Hughes, CMAME 15, 1978). With the volumetric part of mu at
@@ -46,7 +46,7 @@ class QuadraticMeanPotential(QuadraticPotential):
     interpolation = "quadratic-mean-dilatation"
 
     def _volume(self, at: Points) -> _Volume:
-        strain, lam = self._strain(at), self._modulus(at)
+        strain, lam = self._strain(at), at.constants.lam
         eye = np.broadcast_to(identity(strain), strain.shape)
         if self.law.trace != "logarithmic":
             own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
@@ -67,13 +67,8 @@ class QuadraticMeanPotential(QuadraticPotential):
             J,
         )
 
-    def _modulus(self, at: Points) -> float | Floats:
-        """Return the modulus of the part at the mean [Pa]: lam, or the bulk modulus."""
-        return at.constants.lam if self.law.volumetric == "lam" else at.constants.bulk
-
     def _law_response(self, at: Points) -> Response:
-        without = replace(at.constants, lam=at.constants.lam - self._modulus(at))
-        shear = self.law.respond(self._strain(at), without)
+        shear = self.law.respond(self._strain(at), replace(at.constants, lam=0 * at.constants.lam))
         volume = self._volume(at)
         return Response(
             shear.energy + volume.energy,
