@@ -229,7 +229,8 @@ def shallow_truss_limit(half_span: float, rise: float, stiffness: float) -> tupl
 def material_of(law: str, young: float, poisson: float) -> ts.Material:
     """A material for a law, with examples of the constants that it takes, those that are stresses by `young` / 3 Pa.
 
-    Of a law whose constants give the moduli at small strain Poisson's ratio is that of the examples.
+    Of a law whose constants give the moduli at small strain they are scaled to `young`, and Poisson's ratio is that of
+    the examples.
     """
     entry = LAWS[law]
     values = {name: constant.example for name, constant in entry.constants.items()}

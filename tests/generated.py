@@ -22,6 +22,8 @@ from truespring.loading import LOADS
 from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS
 from truespring.models import ELEMENTS, LAWS, RULES
+from truespring.models.gaussian_rule import GAUSSIAN_LAWS
+from truespring.models.gaussian_weights import HOURGLASS_LIMITS
 from truespring.models.heml import HEML_LAWS
 from truespring.models.mass_tensor import TENSOR_LAWS
 from truespring.study import schema
@@ -89,6 +91,9 @@ def valid(rng: random.Random) -> Tables:
             tables["material"].setdefault("density", 1000.0)
             for region in tables.get("region", []):
                 region.setdefault("density", 1000.0)
+        if any("tension" in one for one in tables["load"]):
+            for one in (tables["material"], *tables.get("region", [])):
+                one["fibres"] = {"along": [1.0, *[0.0] * (dim - 1)]}
     tables["solver"] = _solver(rng, dim, size, driven)
     element = tables["mesh"].get("element", "quadrilateral" if dim == 2 else "hexahedron").removeprefix("bcc-")
     tables["models"] = {f"{rng.choice('abcxyz')}{n}": _model(rng, element) for n in range(rng.choice((1, 2, 2, 3)))}
@@ -186,7 +191,7 @@ def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tabl
     sizes = {"stress": stress, "force": stress * section, "moment": stress * section * size[1], "length": size[0]}
     several = {name: (one, sizes.get(one.dimension, 1.0)) for name, one in LOADS[key].quantities(key).items()}
     load = {name: _vector(rng, dim, value) if one.vector else value for name, (one, value) in several.items()}
-    return {**({"on": rng.choice(("right", "top"))} if LOADS[key].on_selection else {}), **load}
+    return {**({"on": rng.choice(("right", "top"))} if LOADS[key].needs_selection else {}), **load}
 
 
 def _vector(rng: random.Random, dim: int, size: float) -> list[float]:
@@ -228,7 +233,7 @@ def _model(rng: random.Random, element: str) -> Tables:
                 model["stiffness"] |= {} if simplices else {"diagonal": rng.uniform(0.05, 0.6)}
             else:
                 model["rule"] = rng.choice([name for name, rule in RULES.items() if element in rule.elements])
-            if rng.random() < 0.2 and model.get("rule") != "biquadratic":
+            if rng.random() < 0.2 and not ("rule" in model and RULES[model["rule"]].coupled):
                 model["sharing"] = rng.choice(words(schema.SpringsKeys, "sharing"))
             model["allow_negative"] = rng.random() < 0.9
             model["volume"] = rng.random() < (0.4 if model.get("rule") == "isotropic" else 0.02)
@@ -241,10 +246,22 @@ def _model(rng: random.Random, element: str) -> Tables:
         case _:
             model["law"] = rng.choice(list(LAWS))
     if kind == "fem" and rng.random() < 0.4:
-        model["element"] = rng.choice(
-            [one for one in ELEMENTS if one != ("mean-dilatation" if simplices else "quadratic")]
-        )
+        second = [one for one in ELEMENTS if one.startswith("quadratic")]
+        model["element"] = rng.choice(["linear", *(second if simplices else ["mean-dilatation"])])
+    if model.get("rule") == "gaussian":
+        model |= _gaussian(rng, element)
     return model
+
+
+def _gaussian(rng: random.Random, element: str) -> Tables:
+    """Keys of Gaussian springs that go with elements of a kind."""
+    if element in HOURGLASS_LIMITS:
+        keys: Tables = {"hourglass": rng.uniform(0.6, 1.5), "law": rng.choice(GAUSSIAN_LAWS)}
+    else:
+        keys = {"law": rng.choice(GAUSSIAN_LAWS)}
+        if element in ("triangle", "tetrahedron") and rng.random() < 0.5:
+            keys = {"element": "quadratic"}
+    return {key: value for key, value in keys.items() if rng.random() < 0.6}
 
 
 def _compare(rng: random.Random, dim: int, size: list[float], names: list[str]) -> Tables:

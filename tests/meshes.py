@@ -44,3 +44,21 @@ def shaken(mesh: ts.Mesh, share: float, seed: int = 5) -> ts.Mesh:
     """The mesh with its nodes moved by up to a length [m]."""
     moved = np.random.default_rng(seed).uniform(-share, share, mesh.nodes.shape)
     return ts.Mesh(mesh.nodes + moved, mesh.elements, mesh.element)
+
+
+def random_mesh(element: str, generator: np.random.Generator) -> ts.Mesh:
+    """A few elements of random shape, turned anyhow and of any size."""
+    match element:
+        case "triangle":
+            mesh = ts.rectangle((2.0, 1.0), (2, 1), "triangle", "alternating")
+        case "quadrilateral":
+            mesh = ts.rectangle((2.0, 1.0), (2, 1))
+        case "tetrahedron":
+            mesh = ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron")
+        case _:
+            mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1), element)
+    jitter = 0.12 if element in ("tetrahedron", "pyramid") else 0.17
+    shaken = mesh.nodes * generator.uniform(0.6, 1.6, mesh.dim) + generator.uniform(-jitter, jitter, mesh.nodes.shape)
+    turn = np.linalg.qr(generator.normal(size=(mesh.dim, mesh.dim)))[0]
+    turn[0] *= np.sign(np.linalg.det(turn))
+    return ts.Mesh(shaken @ turn.T * 10 ** generator.uniform(-2, 2), mesh.elements, element)

@@ -98,7 +98,7 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "sharing unknown": (('rule = "lloyd"', 'rule = "lloyd"\nsharing = "sum"'), ("models.springs.sharing", "'summed'")),
     "area term": (
         ('rule = "lloyd"', 'rule = "lloyd"\nvolume = true'),
-        ("models.springs", "isotropic lattices", "biquadratic"),
+        ("models.springs", "isotropic lattices", "gaussian"),
     ),
     "law unknown": (('law = "linear"', 'law = "hooke"'), ("models.linear.law", "hooke", "saint-venant-kirchhoff")),
     "links of the linear law": (

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import truespring as ts
+from tests.meshes import random_mesh
 from truespring.arrays import Floats
 from truespring.models import RULES, BiquadraticSprings
 
@@ -16,24 +17,6 @@ CASES = [
     for section in (PLANE if element in ("triangle", "quadrilateral") else ("solid",))
 ]
 ROUNDING = 1e-12
-
-
-def random_mesh(element: str, generator: np.random.Generator) -> ts.Mesh:
-    """A few elements of random shape, turned anyhow and of any size."""
-    match element:
-        case "triangle":
-            mesh = ts.rectangle((2.0, 1.0), (2, 1), "triangle", "alternating")
-        case "quadrilateral":
-            mesh = ts.rectangle((2.0, 1.0), (2, 1))
-        case "tetrahedron":
-            mesh = ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron")
-        case _:
-            mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1), element)
-    jitter = 0.12 if element in ("tetrahedron", "pyramid") else 0.17
-    shaken = mesh.nodes * generator.uniform(0.6, 1.6, mesh.dim) + generator.uniform(-jitter, jitter, mesh.nodes.shape)
-    turn = np.linalg.qr(generator.normal(size=(mesh.dim, mesh.dim)))[0]
-    turn[0] *= np.sign(np.linalg.det(turn))
-    return ts.Mesh(shaken @ turn.T * 10 ** generator.uniform(-2, 2), mesh.elements, element)
 
 
 def body(mesh: ts.Mesh, section: str, poisson: float, young: float = 3e3, **more: object) -> ts.Problem:

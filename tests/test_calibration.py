@@ -114,6 +114,57 @@ def test_the_volume_term_and_regions_are_unknowns_too() -> None:
     assert fit_full_field(system, 0.0) == pytest.approx(wanted, abs=1e-8)
 
 
+def _triangles() -> Problem:
+    return replace(cantilever((4, 1)), mesh=ts.rectangle((0.16, 0.04), (4, 1), element="triangle"))
+
+
+def _cubes(poisson: float) -> Problem:
+    """Of two materials, in bricks that are not aligned with the axes."""
+    box = ts.box((0.08, 0.04, 0.04), (4, 2, 2))
+    nodes = box.nodes + 0.002 * np.sin(200 * box.nodes[:, [1, 2, 0]]) * (box.nodes > 0)
+    return Problem(
+        mesh=ts.Mesh(nodes, box.elements, "hexahedron"),
+        material=ts.Material(10e3, poisson),
+        supports=[ts.Fixed(ts.Near((0.0, y, z))) for y in (0.0, 0.02, 0.04) for z in (0.0, 0.02, 0.04)],
+        loads=[ts.Force(ts.Near((0.08, 0.04, 0.04)), (0.05, -0.06, 0.03))],
+        regions=[ts.Region(ts.Box((0.04, -1.0, -1.0), (1.0, 1.0, 1.0)), ts.Material(20e3, poisson))],
+    )
+
+
+@pytest.mark.parametrize("body", ["squares", "cubes"])
+def test_hourglass_and_moduli_are_recovered_from_the_displacement(body: str) -> None:
+    """On distorted cubes the force is a nonlinear function of `hourglass` with a kink at 1, where the search begins."""
+    problem = cantilever((8, 2)) if body == "squares" else _cubes(0.0)
+    springs = ts.Springs("gaussian", hourglass=1.0)
+    known = case_of(problem, ts.Springs("gaussian", hourglass=1.3), 2)
+    found = ts.calibrate(known, springs, regularisation=0.0)
+    assert found.unknowns.kind == "hourglass" and found.identifiability.determined
+    assert found.values == pytest.approx([1.3], abs=1e-6)
+    assert found.model.hourglass == pytest.approx(1.3, abs=1e-6)  # type: ignore[attr-defined]
+    unknowns = make_unknowns(problem, springs, "material")
+    assert len(unknowns) == len(problem.materials)
+    wanted = np.array([1.4, 0.8])[: len(unknowns)]
+    again = ts.calibrate(case_of(problem, unknowns.model(wanted), 2), springs, "material", regularisation=0.0)
+    assert again.values == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["hourglass", "material"])
+def test_force_and_gradient_of_unknown_parameters(kind: str) -> None:
+    problem, springs = _cubes(0.3), ts.Springs("gaussian", hourglass=0.8)
+    unknowns = make_unknowns(problem, springs, kind)
+    positions = problem.mesh.nodes + 0.001 * np.random.default_rng(3).normal(size=problem.mesh.nodes.shape)
+    whole = springs.potential(problem).gradient(positions).ravel()
+    assert unknowns.forces(positions) @ unknowns.start + unknowns.offset(positions) == pytest.approx(whole, abs=1e-12)
+    case = case_of(problem, ts.Springs("gaussian", hourglass=1.1), 1)
+    objective, at = Objective(unknowns, [case], 0.01), np.array([1.2, 0.9])[: len(unknowns)]
+    differences = [
+        (objective.value(at + step) - objective.value(at - step)) / 2e-4 for step in 1e-4 * np.eye(len(unknowns))
+    ]
+    assert objective.gradient(at) == pytest.approx(differences, rel=1e-5)
+    residuals = objective.residuals(at)
+    assert objective.jacobian(at).T @ residuals == pytest.approx(differences, rel=1e-5)
+
+
 def test_springs_each_of_its_own_cannot_be_told_from_one_load_and_that_is_said() -> None:
     """344 springs between 100 free nodes: one field gives 200 equations."""
     problem, springs = cantilever((20, 4)), ts.Springs("isotropic")
@@ -416,7 +467,19 @@ def test_what_does_not_fit_is_refused() -> None:
     case = case_of(problem, ts.Springs("isotropic"), 1)
     for call, error, said in (
         (lambda: make_unknowns(problem, ts.Springs("lloyd"), "clas"), ModelError, "did you mean 'class'"),
-        (lambda: make_unknowns(problem, ts.Springs("biquadratic")), ModelError, "biquadratic.*coupled"),
+        (lambda: make_unknowns(problem, ts.Springs("biquadratic"), "class"), ModelError, "biquadratic.*coupled"),
+        (
+            lambda: make_unknowns(problem, ts.Springs("gaussian"), "spring"),
+            ModelError,
+            "allowed.*: hourglass, material$",
+        ),
+        (lambda: make_unknowns(problem, ts.Springs("lloyd"), "hourglass"), ModelError, "allowed.*: class, region"),
+        (lambda: make_unknowns(_triangles(), ts.Springs("gaussian")), ModelError, "no hourglass modes"),
+        (
+            lambda: make_unknowns(_triangles(), ts.Springs("gaussian", element="quadratic")),
+            ModelError,
+            "element = 'quadratic'",
+        ),
         (lambda: make_unknowns(problem, ts.Springs("lloyd"), "region"), ModelError, "several materials"),
         (lambda: LoadCase("x", problem, solver=newton), ProblemError, "no data at the load levels k/1"),
         (lambda: LoadCase("x", problem, case.reference, solver=ts.ArcLength()), ProblemError, "load control"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
+from truespring.comparison import compare
 from truespring.report.result import Result
 from truespring.report.summary import summary
 from truespring.study import read_study, run
@@ -65,7 +66,7 @@ def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:
 @pytest.mark.parametrize("name", ["stretching", "bending"])
 def test_every_model_of_the_shipped_studies_converges(name: str, results: dict[str, Result]) -> None:
     result = results[name]
-    assert list(result.paths) == ["springs", "linear", "nonlinear", "neo-hookean", "hencky"]
+    assert list(result.paths) == ["springs", "gaussian", "linear", "nonlinear", "neo-hookean", "hencky"]
     assert result.converged
     assert result.problem.mesh.nodes[result.probe] == pytest.approx([0.16, 0.02])
     for path in result.paths.values():
@@ -106,24 +107,32 @@ def test_bending_reaches_half_the_length(results: dict[str, Result]) -> None:
     assert springs.states[-1].displacement[results["bending"].probe, 1] / 0.16 == pytest.approx(-0.53, abs=0.02)
 
 
-def test_springs_with_a_volume_term_follow_fem_that_does_not_lock(results: dict[str, Result]) -> None:
+def test_gaussian_springs_follow_fem_that_does_not_lock(results: dict[str, Result]) -> None:
     result = results["soft_block"]
     assert result.converged
     assert result.paths["neo-hookean"].potential.interpolation == "mean-dilatation"
-    assert result.paths["springs"].moduli.poisson() == pytest.approx(0.45, abs=1e-12)
-    assert result.comparisons["neo-hookean"].agrees_up_to_load_factor == 1.0
-    assert result.comparisons["linear"].rms_error > 0.3
-    assert result.paths["springs"].states[-1].displacement[result.probe, 1] / 0.16 == pytest.approx(-0.53, abs=0.02)
+    for name in ("gaussian", "springs"):
+        assert result.paths[name].moduli.poisson() == pytest.approx(0.45, abs=1e-12)
+    errors = result.comparisons
+    assert errors["neo-hookean"].agrees_up_to_load_factor == 1.0
+    assert (
+        errors["neo-hookean"].rms_error < 0.01 < 0.05 < errors["springs"].rms_error < 0.3 < errors["linear"].rms_error
+    )
+    gaussian = result.paths["gaussian"].states[-1]
+    assert gaussian.displacement[result.probe, 1] / 0.16 == pytest.approx(-0.56, abs=0.01)
 
 
-def test_biquadratic_springs_on_an_imported_mesh_are_saint_venant_kirchhoff(results: dict[str, Result]) -> None:
+def test_springs_on_an_imported_mesh_are_finite_elements(results: dict[str, Result]) -> None:
+    """Gaussian ones of second order neo-Hookean, biquadratic ones St. Venant-Kirchhoff of first order."""
     result = results["tissue"]
     assert result.converged
     assert result.problem.mesh.notes == ()
-    assert result.comparisons["saint-venant-kirchhoff"].max_error < 1e-8
-    assert result.comparisons["neo-hookean"].rms_error > 0.1
-    assert result.paths["springs"].warnings == ()
-    assert any("patch test" in warning for warning in result.paths["lloyd"].warnings)
+    paths = result.paths
+    assert compare(paths["biquadratic"], paths["saint-venant-kirchhoff"]).max_error < 1e-8
+    assert result.comparisons["neo-hookean"].rms_error < 0.02
+    assert result.comparisons["biquadratic"].rms_error > 0.1
+    assert paths["gaussian"].warnings == paths["biquadratic"].warnings == ()
+    assert any("patch test" in warning for warning in paths["lloyd"].warnings)
 
 
 @pytest.mark.verification

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 import truespring as ts
 from tests.closed_forms import material_of, principal_state
+from tests.meshes import random_mesh
 from tests.studies import changed, written
-from tests.test_biquadratic import PLANE, ROUNDING, apart, body, random_mesh
+from tests.test_biquadratic import PLANE, ROUNDING, apart, body
 from tests.test_fem import GRADIENTS, TIGHT, distorted, in_section, patch
 from tests.test_report import words
 from truespring.arrays import Floats
@@ -36,10 +37,8 @@ def some_body(
 ) -> ts.Problem:
     """Elements of random shape, the first of another material."""
     mesh = random_mesh(element, generator)
-    constants = material_of(law, 1.0, poisson).constants
-    plain = body(mesh, section, poisson, regions=[ts.Region([0], ts.Material(5e4, 0.1, constants=constants))])
-    assert plain.material is not None
-    return replace(plain, material=replace(plain.material, constants=constants))
+    whole = body(mesh, section, poisson, regions=[ts.Region([0], material_of(law, 5e4, 0.1))])
+    return replace(whole, material=material_of(law, 3e3, poisson))
 
 
 def upright(mesh: ts.Mesh, generator: np.random.Generator, strain: float) -> Floats:
@@ -163,7 +162,7 @@ def test_patch(kind: str, model: Model) -> None:
     """Within a rim that moves uniformly the nodes inside follow, whatever the shape of the elements."""
     mesh = distorted(kind)
     gradient = GRADIENTS["large"][: mesh.dim, : mesh.dim]
-    problem = patch(mesh, gradient, in_section(mesh, "plane-strain", 0.5), 0.3, model.law or SAME)
+    problem = patch(mesh, gradient, in_section(mesh, "plane-strain", 0.5), poisson=0.3, law=model.law)
     path = ts.solve(problem, model, TIGHT)
     assert path.status is ts.Status.CONVERGED
     assert np.abs(path.states[-1].displacement - mesh.nodes @ gradient.T).max() <= 1e-12 * mesh.diameter

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from truespring.models.response import response
 
 import truespring as ts
 from tests.studies import changed, written
 from truespring.cli import main
 from truespring.models.bending import bending_excess
 from truespring.models.findings import CODES, findings
-from truespring.models.fitness import Fitness, follows_poisson, judge
+from truespring.models.fitness import Fitness, follows_poisson, judge, recommended
 from truespring.report.page import _moduli_rows
 from truespring.report.style import figure_style
 from truespring.report.verdict import moduli_sentence
 from truespring.report.young import Known, _facets, _visible, young_figure
 
 THIRD = 1 / 3
+GAUSSIAN, SECOND_ORDER = ts.Springs("gaussian"), ts.Springs("gaussian", element="quadratic")
 
 
 def body(mesh: ts.Mesh, poisson: float, section: Any = None, regions: Any = (), force: float = 1e-4) -> ts.Problem:
@@ -83,9 +83,9 @@ def numbers(found: Fitness, code: str) -> dict[str, float]:
 
 
 def solved_error(problem: ts.Problem, springs: ts.Springs) -> float:
-    """Rms distance from linear FEM of first order on the same mesh, under a small load."""
-    once = ts.Newton(load_steps=1)
-    error = ts.compare(ts.solve(problem, springs, once), ts.solve(problem, ts.Fem("linear", "linear"), once)).rms_error
+    """Rms distance from linear FEM on the same mesh, of second order where the springs are, under a small load."""
+    once, reference = ts.Newton(load_steps=1), ts.Fem("linear", springs.element or "linear")
+    error = ts.compare(ts.solve(problem, springs, once), ts.solve(problem, reference, once)).rms_error
     assert error is not None
     return error
 
@@ -100,22 +100,25 @@ def test_cooks_membrane_of_triangles_is_predicted_unfit(rule: str, diagonal: tup
     problem, springs = body(cook(6, diagonal), THIRD), ts.Springs(rule, allow_negative=True)
     found = judge(problem, springs)
     assert not found.fit and numbers(found, "young")["highest"] > 3 * numbers(found, "young")["lowest"]
-    assert found.better == ts.Springs("biquadratic")
-    assert "Not fit" in found.sentence and 'rule = "biquadratic"' in found.sentence
+    assert found.better == SECOND_ORDER
+    assert "Not fit" in found.sentence and 'rule = "gaussian", element = "quadratic"' in found.sentence
     assert ("negative" in codes(found)) == (rule == "projected")
     if rule != "projected":  # which is refused, or goes on with an indefinite matrix
         assert solved_error(problem, springs) > 0.2
     assert solved_error(problem, found.better) < 1e-3
-    # What is better is still no more than linear triangles, six deep.
-    beside = judge(problem, found.better)
-    assert len(beside.reasons) == 1 and beside.reasons[0] in found.sentence
-    assert numbers(beside, "simplices")["excess"] > 0.05
+    assert judge(problem, found.better).fit
+    # Of first order they are no more than linear triangles, six deep.
+    for first_order in (GAUSSIAN, ts.Springs("biquadratic")):
+        assert solved_error(problem, first_order) < 1e-3
+        beside = judge(problem, first_order)
+        assert len(beside.reasons) == 1 and beside.better == SECOND_ORDER
+        assert numbers(beside, "simplices")["excess"] > 0.05
 
 
 @pytest.mark.parametrize("rule", ["lloyd", "van-gelder", "projected", "least-squares"])
 def test_six_tetrahedra_to_a_cube_are_unfit_for_plain_springs(rule: str) -> None:
     found = judge(SIX, ts.Springs(rule))
-    assert not found.fit and found.better == ts.Springs("biquadratic")
+    assert not found.fit and found.better == SECOND_ORDER
     assert "bcc-tetrahedron" in found.sentence
     if rule == "lloyd":
         young = numbers(found, "young")
@@ -131,6 +134,9 @@ def test_six_tetrahedra_to_a_cube_are_unfit_for_plain_springs(rule: str) -> None
         (BCC, ts.Springs("lloyd")),
         (loaded_upwards(equilateral(4)), ts.Springs("lloyd")),
         (body(SQUARES.mesh, 0.2), ts.Springs("biquadratic")),
+        (body(SQUARES.mesh, -0.3), GAUSSIAN),
+        (body(SOFT_CUBES.mesh, 0.499), GAUSSIAN),
+        (body(SIX.mesh, 0.49), SECOND_ORDER),
     ],
 )
 def test_fit_springs(problem: ts.Problem, springs: ts.Springs) -> None:
@@ -155,11 +161,11 @@ def test_springs_that_are_linear_simplices_are_fit_where_these_bend_as_they_shou
     path = ts.solve(problem, ts.Fem("linear", "linear"), ts.Newton(load_steps=1))
     tip = -path.states[-1].displacement[mesh.nodes[:, 0] == length, 1].mean()
     stiff = 1e-6 * length**3 / (3 * 1 / 12) / tip - 1
-    found = judge(problem, ts.Springs("biquadratic"))
     assert bending_excess(problem) == pytest.approx(stiff, rel=0.25, abs=0.01)
-    assert found.fit == (stiff < 0.05)
-    if not found.fit:
-        assert found.better is None and "Finite elements of second order and finer meshes are better" in found.sentence
+    for springs in (ts.Springs("biquadratic"), GAUSSIAN):
+        found = judge(problem, springs)
+        assert found.fit == (stiff < 0.05)
+        assert found.better == (None if found.fit else SECOND_ORDER)
 
 
 def test_springs_that_lock_are_not_fit() -> None:
@@ -173,57 +179,24 @@ def bar(element: str, poisson: float) -> ts.Problem:
     return body(ts.box((4.0, 1.0, 1.0), (16, 4, 4), element), poisson, force=1e-6)
 
 
-@pytest.mark.parametrize(("poisson", "better"), [(0.48, ts.Springs("van-gelder")), (0.25, ts.Springs("biquadratic"))])
-def test_springs_that_lock_are_not_better(poisson: float, better: ts.Springs) -> None:
-    """Six tetrahedra a cube: exact moduli do not help where the elements lock, by 52 % in bending at 0.48."""
+@pytest.mark.parametrize("poisson", [0.25, 0.48])
+def test_springs_that_lock_are_not_better(poisson: float) -> None:
+    """Six tetrahedra a cube: springs of second order are better, which do not lock, than those of exact moduli."""
     problem = bar("tetrahedron", poisson)
-    found = judge(problem, ts.Springs("lloyd"))
-    assert not found.fit and found.better == better
-    if poisson == 0.48:
-        assert judge(problem, ts.Springs("biquadratic")).better == better
-        assert judge(problem, better).better is None
+    for rule in ("lloyd", "van-gelder", "biquadratic", "gaussian"):
+        found = judge(problem, ts.Springs(rule))
+        assert not found.fit and found.better == SECOND_ORDER
+        assert ("locking" in codes(found)) == (poisson == 0.48 and ts.RULES[rule].coupled)
+    assert judge(problem, SECOND_ORDER).fit
 
 
 @pytest.mark.parametrize(
-    ("rule", "poisson", "stretch", "bending"),
-    [
-        ("biquadratic", 0.48, 0.0, -0.524),
-        ("van-gelder", 0.48, -0.033, -0.133),
-        ("lloyd", 0.48, 0.225, 0.103),
-        ("biquadratic", 0.25, 0.0, -0.186),
-    ],
-)
-def test_the_response_is_that_of_a_cantilever(rule: str, poisson: float, stretch: float, bending: float) -> None:
-    """The deflection beside finite elements of second order, which do not lock: within 5 % of the response told."""
-    problem, springs, once = bar("tetrahedron", poisson), ts.Springs(rule), ts.Newton(load_steps=1)
-    found = response(problem, springs)
-    assert found is not None and tuple(found) == pytest.approx((stretch, bending), abs=1e-3)
-    if poisson == 0.48:
-        tips = [
-            ts.solve(problem, model, once).states[-1].displacement[problem.mesh.nodes[:, 0] == 4.0, 1].mean()
-            for model in (springs, ts.Fem("linear", "quadratic-mean-dilatation"))
-        ]
-        assert tips[0] / tips[1] - 1 == pytest.approx(bending, abs=0.06)
-
-
-def test_the_response_of_the_material_is_exact_in_stretch_and_nears_it_in_bending() -> None:
-    coarse, fine = (
-        response(body(ts.rectangle((4.0, 1.0), (4 * n, n), "triangle"), 0.3), ts.Springs("biquadratic")) for n in (4, 8)
-    )
-    assert coarse is not None and fine is not None
-    assert abs(coarse.stretch) < 1e-10 and abs(fine.stretch) < 1e-10
-    assert fine.bending / coarse.bending == pytest.approx(0.25, abs=0.1)
-    with pytest.raises(ts.TruespringError, match="triangles and tetrahedra"):
-        response(SQUARES, ts.Springs("lloyd"))
-
-
-@pytest.mark.parametrize(
-    ("problem", "rule", "better"),
+    ("problem", "rule", "pairs"),
     [
         (SQUARES, "lloyd", ts.Springs("isotropic")),
         (body(SQUARES.mesh, 0.45), "isotropic", ts.Springs("isotropic", volume=True)),
         # Below Cauchy's ratio the volume term would be negative, its energy without a bound.
-        (body(SQUARES.mesh, 0.1), "isotropic", ts.Springs("biquadratic")),
+        (body(SQUARES.mesh, 0.1), "isotropic", None),
         (SOFT_CUBES, "isotropic", ts.Springs("isotropic", volume=True)),
         (BCC, "van-gelder", ts.Springs("lloyd")),
         (SOFT_BCC, "lloyd", ts.Springs("lloyd", volume=True)),
@@ -235,16 +208,25 @@ def test_the_response_of_the_material_is_exact_in_stretch_and_nears_it_in_bendin
         ),
     ],
 )
-def test_the_simplest_springs_that_are_fit_are_proposed(problem: ts.Problem, rule: str, better: ts.Springs) -> None:
+def test_gaussian_springs_are_proposed_and_the_simplest_of_pair_forces(
+    problem: ts.Problem, rule: str, pairs: ts.Springs | None
+) -> None:
     found = judge(problem, ts.Springs(rule))
-    assert not found.fit and found.better == better
-    assert judge(problem, better).fit
+    simplices = problem.mesh.element in ("triangle", "tetrahedron")
+    assert not found.fit and found.better == recommended(problem) == (SECOND_ORDER if simplices else GAUSSIAN)
+    assert judge(problem, found.better).fit
+    assert ("pair forces" in found.sentence) == (pairs is not None)
+    if pairs is not None:
+        keys = f'rule = "{pairs.rule}"' + (", volume = true" if pairs.volume else "")
+        assert f"pair forces only: {keys}." in found.sentence
+        assert judge(problem, pairs).fit
 
 
-def test_of_springs_that_are_fit_the_nearest_are_proposed() -> None:
+def test_of_springs_of_pair_forces_that_are_fit_the_nearest_are_proposed() -> None:
     """Within 15 % Lloyd's summed springs on squares are fit too; the isotropic ones are exact."""
     assert judge(SQUARES, ts.Springs("lloyd"), 0.15).fit
-    assert judge(SQUARES, ts.Springs("lloyd", sharing="single"), 0.15).better == ts.Springs("isotropic")
+    found = judge(SQUARES, ts.Springs("lloyd", sharing="single"), 0.15)
+    assert found.better == GAUSSIAN and 'pair forces only: rule = "isotropic".' in found.sentence
 
 
 def test_regions_that_are_too_stiff_and_too_soft_fail_the_patch_test() -> None:
@@ -292,7 +274,7 @@ def test_bending_is_remarked_upon_and_decides_nothing() -> None:
     assert found.fit and numbers(found, "bending") == pytest.approx({"factor": 1.3125, "fem": 1.125, "depth": 2})
     assert "1.312" in found.sentence and "1.125" in found.sentence
     both = judge(problem, ts.Springs("lloyd")).sentence
-    assert "1.131" in both and "1.312" in both
+    assert "1.131" in both and "0.938" in both  # Gaussian springs: 1 - nu / (1 + nu) / n^2
     assert "Bent" not in judge(body(ts.rectangle((8.0, 8.0), (8, 8)), THIRD), ts.Springs("isotropic")).sentence
 
 
@@ -307,7 +289,7 @@ def test_every_material_of_a_body_is_judged() -> None:
     soft = ts.Material(0.1, 0.45)
     problem = body(ts.rectangle((4.0, 2.0), (8, 4)), THIRD, regions=[ts.Region(range(8), soft)])
     found = judge(problem, ts.Springs("isotropic"))
-    assert not found.fit and found.better == ts.Springs("isotropic", volume=True)
+    assert not found.fit and found.better == GAUSSIAN
     (reason,) = found.reasons
     assert all(word in reason for word in ("0.1 Pa", "0.45", "Poisson's ratio"))
     assert "1 Pa and nu 0.333333" in found.sentence
@@ -317,7 +299,7 @@ def test_every_material_of_a_body_is_judged() -> None:
 
 def test_what_rules_follow_is_found_out() -> None:
     follow = {rule for rule in ts.RULES if follows_poisson(rule)}
-    assert follow == {"least-squares", "projected", "biquadratic"}
+    assert follow == {"least-squares", "projected", "biquadratic", "gaussian"}
 
 
 # --- words and pictures ------------------------------------------------------------------------------
@@ -448,7 +430,7 @@ def test_moduli_of_a_plane_study(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert springs["bending_factor"]["2"] == pytest.approx(15 / 17 * 3 / 4 + 6 * 5 / 16 / 4)
     assert springs["depth"] == 2 and springs["lattice"] and springs["patch_score"] == 0
     assert (springs["n_springs"], springs["n_negative"], springs["n_zero"]) == (74, 0, 0)
-    assert not springs["fit"] and springs["better"] == {"rule": "isotropic", "volume": False}
+    assert not springs["fit"] and springs["better"] == {"rule": "gaussian", "element": None, "volume": False}
     assert springs["sentence"].startswith("Not fit for this material") and "regions" not in springs
     assert json.loads((out / "study" / "moduli.json").read_text("utf-8")) == told
     assert {path.name for path in (out / "study").iterdir()} == {"moduli.json", "figures", ".truespring.json"}
@@ -470,8 +452,8 @@ def test_moduli_of_a_body_of_two_materials_in_space(tmp_path: Path, capsys: pyte
     assert region["material"] == {"young": 20e3, "poisson": 0.25}
     assert region["young_max"] == pytest.approx(2 * springs["young_max"])
     assert springs["bending_factor"] == {} and springs["depth"] is None
-    assert not springs["fit"] and springs["better"] == {"rule": "biquadratic", "volume": False}
-    assert not coupled["fit"] and coupled["better"] is None
+    assert not springs["fit"] and not coupled["fit"]
+    assert springs["better"] == coupled["better"] == {"rule": "gaussian", "element": "quadratic", "volume": False}
     assert all("finite elements of linear tetrahedra" in reason for reason in coupled["reasons"])
     assert (out / "cubes" / "figures" / "moduli.png").read_bytes().startswith(b"\x89PNG")
 

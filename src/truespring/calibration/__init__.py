@@ -10,9 +10,9 @@ from truespring.calibration.curve import read_curve as read_curve
 from truespring.calibration.fitted import CaseResult as CaseResult
 from truespring.calibration.identifiability import Identifiability as Identifiability
 from truespring.calibration.identifiability import identifiability as identifiability
+from truespring.calibration.kinds import UNKNOWNS as UNKNOWNS
+from truespring.calibration.kinds import make_unknowns as make_unknowns
 from truespring.calibration.objective import Objective as Objective
 from truespring.calibration.result import Calibration as Calibration
 from truespring.calibration.turned import turned as turned
-from truespring.calibration.unknowns import UNKNOWNS as UNKNOWNS
 from truespring.calibration.unknowns import Unknowns as Unknowns
-from truespring.calibration.unknowns import make_unknowns as make_unknowns

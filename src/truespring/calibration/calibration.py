@@ -10,10 +10,11 @@ from truespring.calibration.cases import LoadCase, require_one_body
 from truespring.calibration.fitted import CaseResult, error_words
 from truespring.calibration.full_field import Equations, equations, fit_full_field
 from truespring.calibration.identifiability import Identifiability, identifiability
+from truespring.calibration.kinds import make_unknowns
 from truespring.calibration.objective import Objective
 from truespring.calibration.partial import GAUSS_NEWTON, fit_equilibria
 from truespring.calibration.result import Calibration
-from truespring.calibration.unknowns import Unknowns, make_unknowns
+from truespring.calibration.unknowns import Unknowns
 from truespring.deprecation import renamed_argument
 from truespring.equilibrium import Solution, Status, solve
 from truespring.errors import ProblemError
@@ -30,7 +31,7 @@ Progress = Callable[[str, float], None]
 def calibrate(
     cases: LoadCase | Sequence[LoadCase],
     springs: Springs,
-    unknowns: str = "class",
+    unknowns: str | None = None,
     held_out: LoadCase | Sequence[LoadCase] = (),
     regularisation: float = REGULARISATION,
     evaluations: int = 20,
@@ -45,7 +46,7 @@ def calibrate(
     Args:
         cases: load cases to fit.
         springs: springs of a rule to start from.
-        unknowns: a key of UNKNOWNS; unknowns stay non-negative.
+        unknowns: a key of UNKNOWNS, by default the first that suits the springs; unknowns stay non-negative.
         held_out: load cases to test on.
         regularisation: weight of the term toward the rule, see `Objective`.
         evaluations: largest number of evaluations of the objective, each of which solves all cases.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
 from truespring.calibration.fitted import CaseResult, Fitted
 from truespring.report.frame import EDGE, GRID, draw_bar, draw_frame, round_numbers, written
 from truespring.report.lines import draw_lines
@@ -30,8 +30,9 @@ def calibration_figures(found: Fitted) -> Iterator[tuple[str, Sheet]]:
         yield "unknowns", unknowns_figure(found)
     else:
         yield "unknowns", counted_figure(found)
-    if found.unknowns.problem.mesh.dim == 2 and len(found.unknowns.springs) <= _MOST_SPRINGS:
-        yield "lattice", lattice_figure(found)
+    lattice = found.unknowns.lattice(found.values)
+    if lattice is not None and found.unknowns.problem.mesh.dim == 2 and len(lattice[0]) <= _MOST_SPRINGS:
+        yield "lattice", lattice_figure(found.unknowns.problem.mesh.nodes, *lattice)
     for number, one in enumerate(found.cases, 1):
         if len(one.deciding(one.before)) > 1:
             yield f"case_{number}", case_figure(one)
@@ -56,7 +57,7 @@ def unknowns_figure(found: Fitted) -> Sheet:
         _Row(name, [None, float(value)], ["", f"{value:.3g}"])
         for name, value in zip(found.unknowns.names, found.values, strict=True)
     ]
-    return _bars("Calibrated unknowns; the line is the rule", "stiffness over the rule's", rows, mark=1.0)
+    return _bars("Calibrated unknowns; the line is the rule", f"factor on {found.unknowns.of_what}", rows, mark=1.0)
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def counted_figure(found: Fitted) -> Sheet:
     title = f"{len(found.values):,} calibrated unknowns; the line is the rule"
     sheet = Sheet(5.9, 3.2, title)
     area = Area(sheet, 0.7, 0.5, 5.0, 2.3, (0.0, float(edges[-1])), (0.0, 1.05 * float(counts.max())))
-    draw_frame(area, "stiffness over the rule's", "unknowns")
+    draw_frame(area, f"factor on {found.unknowns.of_what}", "unknowns")
     draw_words(sheet, 0.7, sheet.height - 0.19, title, 9, bold=True)
     for low, high, count in zip(edges, edges[1:], counts, strict=False):
         draw_shape(area, np.array([(low, 0.0), (high, 0.0), (high, count), (low, count)]), BLUE)
@@ -140,14 +141,10 @@ def counted_figure(found: Fitted) -> Sheet:
     return sheet
 
 
-def lattice_figure(found: Fitted) -> Sheet:
-    """Return the springs of a plane body, coloured by their stiffness over that of the rule."""
-    unknowns = found.unknowns
-    rule, now = unknowns.stiffness @ unknowns.start, unknowns.stiffness @ found.values
-    ratio = np.divide(now, rule, out=np.ones_like(rule), where=np.abs(rule) > 0)
+def lattice_figure(nodes: Floats, springs: Ints, ratio: Floats) -> Sheet:
+    """Return the springs of a plane body, coloured by their stiffness over that of the rule, `ratio` [-]."""
     widest = min(max(float(ratio.max()), 1 / max(float(ratio.min()), 1 / _WIDEST), 1.05), _WIDEST)
     shares = np.clip(np.log(np.maximum(ratio, 1 / _WIDEST)) / np.log(widest), -1, 1) / 2 + 0.5
-    nodes = unknowns.problem.mesh.nodes
     size = np.ptp(nodes, axis=0)
     width = 5.6
     height = min(width * float(size[1] / size[0]), 5.0)
@@ -157,7 +154,7 @@ def lattice_figure(found: Fitted) -> Sheet:
     lower = nodes.min(axis=0)
     area = Area(sheet, 0.2, 0.75, width, height, (lower[0], lower[0] + size[0]), (lower[1], lower[1] + size[1]))
     draw_words(sheet, 0.2, sheet.height - 0.19, title, 9, bold=True)
-    ends = area.place(nodes[unknowns.springs])
+    ends = area.place(nodes[springs])
     shade = np.rint(shares * (_SHADES - 1)).astype(np.int64)
     for one in np.unique(shade):
         (color,) = _diverging(np.array([one / (_SHADES - 1)]))

@@ -9,7 +9,6 @@ from truespring.calibration.figures import calibration_figures
 from truespring.calibration.fitted import Fitted
 from truespring.calibration.page import render_calibration
 from truespring.report.drawing import drawings, save_drawings
-from truespring.study.spring_files import write_spring_files
 
 #: The name of the calibrated springs in files.
 NAME = "calibrated"
@@ -33,7 +32,7 @@ def write_fitted(
         more: names of further files that the page lists.
         command: the command line that repeats the run.
     """
-    tables = write_spring_files(found.model, folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv")
+    tables = found.unknowns.write(found.values, folder / f"{NAME}.csv", folder / f"{NAME}_volume.csv")
     file, page = folder / "calibrate.json", folder / "report.html"
     file.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     drawn = drawings(calibration_figures(found))

@@ -14,7 +14,7 @@ from truespring.calibration.objective import relative_errors
 from truespring.calibration.unknowns import Unknowns
 from truespring.comparison import compare
 from truespring.equilibrium import Solution, Status
-from truespring.models import PrescribedSprings, Springs
+from truespring.models import Model, Springs
 from truespring.support_errors import Decisive, largest
 
 
@@ -102,7 +102,7 @@ class Fitted:
     rule: Springs
     unknowns: Unknowns
     values: Floats
-    model: PrescribedSprings
+    model: Model
     cases: tuple[CaseResult, ...]
     identifiability: Identifiability
     regularisation: float

@@ -62,7 +62,7 @@ def _of_case(unknowns: Unknowns, case: LoadCase) -> list[tuple[Any, Floats]]:
 
 def _at_level(unknowns: Unknowns, case: LoadCase, state: State, level: float) -> tuple[Any, Floats]:
     forces = unknowns.forces(state.positions)
-    applied = case.problem.loading.force(state.positions, level).ravel()
+    applied = case.problem.loading.force(state.positions, level).ravel() - unknowns.offset(state.positions)
     rows, right = [forces[case.free]], [applied[case.free]]
     for one in case.observations:
         if one.level == level and one.quantity != "displacement":

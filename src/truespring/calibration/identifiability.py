@@ -66,7 +66,8 @@ class Identifiability:
             return f"Whether the data determine the {n} unknowns was not computed: there are more than {_MOST}."
         if self.rank == n:
             condition = self.singular_values[0] / self.singular_values[-1]
-            text = f"The data determine all {n} unknowns (rank {n} of {n}, condition {condition:.1e})."
+            every = f"all {n} unknowns" if n > 1 else "the unknown"
+            text = f"The data determine {every} (rank {n} of {n}, condition {condition:.1e})."
         else:
             text = (
                 f"The data do not determine all unknowns: rank {self.rank} of {n}; {len(self.loose)} unknowns are not "

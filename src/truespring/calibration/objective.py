@@ -164,8 +164,9 @@ class _At:
     def __init__(self, objective: Objective, one: _Seen) -> None:
         case, state = objective.cases[one.case], one.state
         loading, positions = case.problem.loading, state.positions
-        paths = objective._last[1] if objective._last else None
-        assert paths is not None  # a state was seen
+        assert objective._last is not None  # a state was seen
+        values, paths = objective._last
+        assert paths is not None
         potential = paths[one.case].potential
         assert potential is not None  # it was solved
         linear = choose(case.solver.linear, potential.nodes, loading.held)
@@ -179,7 +180,7 @@ class _At:
             raise ModelError(
                 f"{case.name}: at load factor {state.load_factor:g} the tangent is singular, so there is no gradient"
             ) from None
-        self.forces = objective.unknowns.forces(positions)
+        self.forces = objective.unknowns.forces(positions, values)
 
     def apply(self, move: Floats) -> Floats:
         """Return the tangent times a displacement of all nodes [N], shape (n_nodes, dim)."""

@@ -150,6 +150,7 @@ def render_calibration(
         what=what,
         headline=found.headline,
         fitted=fitted_sentence(found),
+        parameters=found.unknowns.sentence(found.values),
         identifiability=identified.sentence,
         trouble=not found.held_out or found.error is None,
         warnings=found.warnings,
@@ -179,7 +180,7 @@ def fitted_sentence(found: Fitted) -> str:
 
 def _method(found: Fitted) -> str:
     return (
-        f"{len(found.unknowns)} unknowns ({found.unknowns.kind}), each a non-negative factor on the stiffness of "
+        f"{found.unknowns.counted} ({found.unknowns.kind}), each a non-negative factor on {found.unknowns.of_what} of "
         f"{found.rule.label}. Method: {found.method}; {found.solves} paths solved; regularisation "
         f"{found.regularisation:g} toward the rule."
     )

@@ -36,7 +36,7 @@ class Calibration(Fitted):
 
         `command` is the command line that repeats the run, for the report.
         """
-        what = f"{self.rule.label} with {len(self.unknowns)} unknowns by {self.unknowns.kind}."
+        what = f"{self.rule.label} with {self.unknowns.counted} by {self.unknowns.kind}."
         with Output(Path(out), "calibrate.json") as output:
             files = write_fitted(self, output.staging, calibration_values(self), ("Calibration", what), (), command)
             output.publish()

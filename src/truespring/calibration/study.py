@@ -9,8 +9,8 @@ from truespring.calibration.calibrated import Calibrated
 from truespring.calibration.calibration import REGULARISATION, Progress, calibrate
 from truespring.calibration.cases import LoadCase, require_one_body
 from truespring.calibration.curve import read_curve
+from truespring.calibration.kinds import UNKNOWNS, make_unknowns
 from truespring.calibration.turned import turned
-from truespring.calibration.unknowns import make_unknowns
 from truespring.comparison import most_moved
 from truespring.equilibrium import Solution, solve
 from truespring.errors import StudyError, TruespringError, nearest
@@ -26,7 +26,7 @@ def calibrate_study(
     study: Study,
     cases: Sequence[Study] = (),
     held_out: Sequence[Study] = (),
-    unknowns: str = "class",
+    unknowns: str | None = None,
     to: str | None = None,
     markers: Path | None = None,
     curve: Path | None = None,
@@ -40,7 +40,7 @@ def calibrate_study(
         cases: studies whose loads are fitted too.
         held_out: studies whose loads are used for testing; by default the load of the study rotated by 45 degrees, if
             its reference converges.
-        unknowns: a key of UNKNOWNS.
+        unknowns: a key of UNKNOWNS; by default the first that suits springs of the study.
         to: name of the reference in the studies; by default neo-Hookean FEM, else FEM with another nonlinear law, else
             the first model that is not springs.
         markers: file of markers measured under the study's load, used as reference.
@@ -50,7 +50,7 @@ def calibrate_study(
 
     Raises StudyError, with the file, if the studies do not fit together.
     """
-    name = springs_of(study)
+    name = springs_of(study, unknowns)
     model = springs_by_rule(study.entries)[name]
     for one in (study, *cases, *held_out):
         _require_newton(one)
@@ -83,13 +83,17 @@ def calibrate_study(
     return Calibrated(study, name, ", ".join(files) or names[0], calibration)
 
 
-def springs_of(study: Study) -> str:
-    """Return the name of the springs to calibrate: the compared model if it is springs of a rule, else the first.
+def springs_of(study: Study, unknowns: str | None = None) -> str:
+    """Return the name of the springs to calibrate: the compared model if these unknowns suit it, else the first.
 
-    Coupled springs are chosen only if there are no others.
+    Without `unknowns`, the first kind of UNKNOWNS that suits springs of the study.
     """
     by_rule = springs_by_rule(study.entries)
-    springs = [name for name, entry in by_rule.items() if not entry.coupled] or list(by_rule)
+    kinds = list(UNKNOWNS) if unknowns is None else [unknowns]
+    suited = [
+        [name for name, entry in by_rule.items() if kind in UNKNOWNS and UNKNOWNS[kind].suits(entry)] for kind in kinds
+    ]
+    springs = next(filter(None, suited), list(by_rule))
     if not springs:
         raise StudyError(
             f"{study.file}: models: none of {', '.join(study.entries)} is springs of a rule or of given stiffness: "

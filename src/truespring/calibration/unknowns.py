@@ -1,62 +1,39 @@
-"""The unknowns of a calibration: stiffness k = P c, where c = 1 is the rule."""
+"""The unknowns of a calibration: factors c on parts of a model, where c = 1 is the rule."""
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from types import MappingProxyType
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from truespring.arrays import Bools, Floats, Ints
-from truespring.errors import ModelError, nearest
-from truespring.mesh import Mesh
-from truespring.mesh.selections import AXES
-from truespring.models import (
-    PAIR_LAWS,
-    PrescribedSprings,
-    SpringNetwork,
-    Springs,
-    VolumeSprings,
-    VolumeTerm,
-    shared_springs,
-)
-from truespring.models.elasticity import lattice_classes
-from truespring.models.links import in_a_row, link_vectors
-from truespring.models.pair_law import PairLaw
-from truespring.models.pair_laws import STRAIGHT
+from truespring.arrays import Floats, Ints
+from truespring.models import Model
+from truespring.potential import Potential
 from truespring.problem import Problem
 
+#: A sparse matrix with a column for each unknown.
 Columns = sparse.csr_array[Any, tuple[int, int]]
-
-# Components of a direction below this share of its length are rounding errors; heights closer than this share of the
-# shortest spring are equal.
-_ROUNDING = 1e-6
-# Unknowns with a stiffness below this share of the largest are dropped.
-_NO_WEIGHT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Unknowns:
-    """The unknowns of a calibration: each c scales a part of the stiffness of a rule.
+class Unknowns(ABC):
+    """The unknowns of a calibration: non-negative factors, 1 is the rule.
 
     Attributes:
         kind: a key of UNKNOWNS.
         names: of the unknowns, of length n.
-        problem, springs: the body, and node numbers of its springs, shape (n_springs, 2).
-        law: force law of the springs, a key of PAIR_LAWS.
-        stiffness: P, each spring's stiffness per unknown [N/m], sparse, shape (n_springs, n); its rows sum to the rule.
-        kappa: modulus of each element's volume term per unknown [Pa], sparse, shape (n_elements, n); None without one.
+        problem: the body.
+        of_what: what the unknowns are factors on, in words.
     """
 
     kind: str
     names: tuple[str, ...]
     problem: Problem
-    springs: Ints
-    law: str
-    stiffness: Columns
-    kappa: Columns | None = None
+
+    of_what = "the rule"
 
     def __len__(self) -> int:
         return len(self.names)
@@ -66,213 +43,57 @@ class Unknowns:
         """The rule: all ones [-], shape (n,)."""
         return np.ones(len(self))
 
-    def model(self, values: Floats, label: str = "springs (calibrated)") -> PrescribedSprings:
-        """Return the springs with these unknowns (n,), which `solve` accepts for any problem on the same mesh."""
-        kappa = np.zeros(0) if self.kappa is None else self.kappa @ values
-        return PrescribedSprings(self.springs, self.stiffness @ values, kappa, label, self.law)
+    @property
+    def counted(self) -> str:
+        """The number of unknowns in words: "3 unknowns"."""
+        return f"{len(self)} unknown{'s' * (len(self) != 1)}"
 
-    def potential(self, values: Floats) -> SpringNetwork | VolumeSprings:
-        """Return the potential with these unknowns (n,), without the check for mechanisms."""
-        network = SpringNetwork(self.problem.mesh.nodes, self.springs, self.stiffness @ values, law=self.law)
-        if self.kappa is None:
-            return network
-        return VolumeSprings(network, VolumeTerm(self.problem, np.asarray(self.kappa @ values)))
+    @abstractmethod
+    def model(self, values: Floats) -> Model:
+        """Return the model with these unknowns (n,), which `solve` accepts for any problem on the same mesh."""
 
-    def forces(self, positions: Floats) -> Columns:
+    @abstractmethod
+    def potential(self, values: Floats) -> Potential:
+        """Return the potential with these unknowns (n,); raise ModelError if there is none."""
+
+    @abstractmethod
+    def forces(self, positions: Floats, values: Floats | None = None) -> Columns:
         """Return the derivative of the internal force by each unknown [N], sparse, shape (n_dof, n).
 
-        The internal force is this times the unknowns, at any deformation: spring s adds its tension times n to its
-        second node and takes it from its first, the volume term of an element adds kappa (V / V0 - 1) dV/dx. Tensions
-        are proportional to the stiffness.
+        At `values`, by default those of the rule.
         """
-        found = _spring_forces(self.problem.mesh.nodes, self.springs, PAIR_LAWS[self.law], positions) @ self.stiffness
-        if self.kappa is not None:
-            found = found + self._volume_forces(positions) @ self.kappa
-        return sparse.csr_array(found)
 
-    def _volume_forces(self, positions: Floats) -> Columns:
-        values = self._unit_term.element_forces(positions)
-        elements, dim = self.problem.mesh.elements, positions.shape[1]
-        rows = (elements[:, :, None] * dim + np.arange(dim)).reshape(values.shape)
-        columns = np.repeat(np.arange(len(elements)), values.shape[1])
-        return sparse.csr_array((values.ravel(), (rows.ravel(), columns)), shape=(positions.size, len(elements)))
+    @abstractmethod
+    def offset(self, positions: Floats) -> Floats:
+        """Return the part of the internal force that no unknown scales [N], shape (n_dof,).
 
-    @cached_property
-    def _unit_term(self) -> VolumeTerm:
-        return VolumeTerm(self.problem, np.ones(len(self.problem.mesh.elements)))
+        The internal force is `forces(positions) @ values` plus this, exactly or to first order about the rule.
+        """
 
+    @abstractmethod
+    def entry(self, study: dict[str, Any], name: str, values: Floats, files: Sequence[str]) -> dict[str, Any]:
+        """Return the entry of the calibrated springs for the `[models]` of a study.
 
-def _spring_forces(nodes: Floats, springs: Ints, law: PairLaw, positions: Floats) -> Columns:
-    """Return the derivative of the internal force by the stiffness of each spring [m], shape (n_dof, n_springs)."""
-    first, second = springs.T
-    rest = np.linalg.norm(nodes[second] - nodes[first], axis=1)
-    across = positions[second] - positions[first]
-    length = np.linalg.norm(across, axis=1)
-    pull = (law.tension(np.ones(len(springs)), rest, length, nodes.shape[1]) / length)[:, None] * across
-    dim = nodes.shape[1]
-    rows = [(ends[:, None] * dim + np.arange(dim)).ravel() for ends in (second, first)]
-    columns = np.repeat(np.arange(len(springs)), dim)
-    return sparse.csr_array(
-        (np.concatenate([pull.ravel(), -pull.ravel()]), (np.concatenate(rows), np.tile(columns, 2))),
-        shape=(nodes.size, len(springs)),
-    )
+        Args:
+            study: the tables of the study, which may be changed.
+            name: of the springs of the rule in the study.
+            values: the unknowns (n,).
+            files: names of the files that `write` wrote.
+        """
 
+    def lattice(self, values: Floats) -> tuple[Ints, Floats] | None:
+        """Return springs and their stiffness over that of the rule [-]; None if they have none of their own."""
+        return None
 
-def make_unknowns(problem: Problem, springs: Springs, kind: str = "class") -> Unknowns:
-    """Return the unknowns of a kind, a key of UNKNOWNS, for the springs of a problem.
+    def write(self, values: Floats, file: Path, volume: Path) -> tuple[Path, ...]:
+        """Write files that the study needs, named `file` and `volume`; return those written."""
+        return ()
 
-    Raises ModelError for coupled springs, and for a kind or a rule that is unknown or does not fit the mesh.
-    """
-    if kind not in UNKNOWNS:
-        raise ModelError(f"unknowns = '{kind}' is unknown{nearest(kind, UNKNOWNS)}; allowed: {', '.join(UNKNOWNS)}")
-    if springs.coupled:
-        raise ModelError(
-            f"rule = '{springs.rule}': its springs are coupled and have no individual stiffness to fit: use another "
-            "rule, such as least-squares"
-        )
-    springs.potential(problem)  # raises the usual errors
-    pairs, place = shared_springs(problem.mesh)
-    by_link = in_a_row(problem.mesh, springs.element_stiffness(problem))
-    if springs.sharing == "single":
-        by_link = by_link / np.bincount(place)[place]
-    labels, group = UNKNOWNS[kind](problem, np.asarray(pairs), np.asarray(place))
-    shape = (len(pairs), len(labels))
-    law = springs.law or STRAIGHT
-    stiffness = sparse.csr_array((by_link, (place, group)), shape=shape)
-    kappas = springs.kappa(problem) if springs.volume else np.zeros(len(problem.mesh.elements))
-    if not kappas.any():
-        return _weighted(Unknowns(kind, tuple(labels), problem, np.asarray(pairs, dtype=np.int64), law, stiffness))
-    terms, of = _volume_groups(problem, kind)
-    elements = np.arange(len(kappas))
-    kappa = sparse.csr_array((kappas, (elements, len(labels) + of)), shape=(len(kappas), len(labels) + len(terms)))
-    wide = sparse.csr_array((stiffness.data, stiffness.indices, stiffness.indptr), shape=(len(pairs), kappa.shape[1]))
-    return _weighted(
-        Unknowns(kind, (*labels, *terms), problem, np.asarray(pairs, dtype=np.int64), law, wide, kappa),
-    )
+    def sentence(self, values: Floats) -> str:
+        """Return the parameters of the calibrated model as a sentence; empty if they are in files."""
+        return ""
 
 
-def _weighted(unknowns: Unknowns) -> Unknowns:
-    """Return the unknowns without those of springs to which the rule gives no stiffness."""
-    weight = np.zeros(len(unknowns), dtype=bool)
-    for part in (unknowns.stiffness, unknowns.kappa):
-        if part is not None:
-            size = np.asarray(abs(part).max(axis=0).todense()).ravel()
-            weight |= size > _NO_WEIGHT * size.max()
-    kept = np.flatnonzero(weight)
-    return Unknowns(
-        unknowns.kind,
-        tuple(unknowns.names[number] for number in kept),
-        unknowns.problem,
-        unknowns.springs,
-        unknowns.law,
-        sparse.csr_array(unknowns.stiffness[:, kept]),
-        None if unknowns.kappa is None else sparse.csr_array(unknowns.kappa[:, kept]),
-    )
-
-
-#: Groups of springs: their names, and the number of the group of each link of each element, (n_elements * links,).
-Groups = tuple[list[str], Ints]
-
-
-def _classes(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Group edges, face diagonals and body diagonals; on lattices, edges by axis."""
-    words = []
-    for numbers, part in problem.mesh.blocks:
-        kind = part.kind
-        own = ["edge"] * len(kind.edges) + ["diagonal"] * len(kind.diagonals) + ["body"] * len(kind.body_diagonals)
-        words.append(np.tile(np.array(own, dtype=object), len(numbers)))
-    per_link = np.concatenate(words)
-    if lattice_classes(problem.mesh) is not None:
-        axis = _axis_of(problem.mesh)
-        for number, name in enumerate(AXES[: problem.mesh.dim]):
-            per_link[(axis == number) & (per_link == "edge")] = f"edge along {name}"
-    return _numbered(per_link)
-
-
-def _regions(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Group by class and material."""
-    if len(problem.materials) < 2:
-        raise ModelError("unknowns = 'region' needs a body of several materials, this one has one: use 'class'")
-    names, group = _classes(problem, pairs, place)
-    numbers = problem.material_numbers
-    blocks = problem.mesh.blocks
-    material = np.concatenate([np.repeat(numbers[own], len(part.kind.links)) for own, part in blocks])
-    return _numbered(
-        np.array(
-            [f"{names[g]}, {_material(m)}" for g, m in zip(group.tolist(), material.tolist(), strict=True)],
-            dtype=object,
-        )
-    )
-
-
-def _material(number: int) -> str:
+def material_name(number: int) -> str:
+    """Return the name of a material in `Problem.materials`."""
     return f"region {number}" if number else "body"
-
-
-def _directions_and_rows(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Group springs by height and direction, up to signs of components."""
-    mesh = problem.mesh
-    if mesh.element not in ("quadrilateral", "hexahedron") or not _axis_aligned(mesh):
-        raise ModelError(
-            "unknowns = 'direction-row' needs rectangles or bricks along the axes: use 'class' or 'spring'"
-        )
-    along = _components(mesh)
-    names = np.array(
-        ["along " + "".join(a for a, there in zip(AXES, row, strict=False) if there) for row in along], dtype=object
-    )
-    height = mesh.nodes[pairs, 1].mean(axis=1)
-    smallest = np.linalg.norm(mesh.nodes[pairs[:, 1]] - mesh.nodes[pairs[:, 0]], axis=1).min()
-    heights = np.round((height - height.min()) / (_ROUNDING * smallest)).astype(np.int64)[place]
-    row = np.zeros(len(place), dtype=np.int64)
-    for name in set(names):
-        own = names == name
-        row[own] = np.unique(heights[own], return_inverse=True)[1] + 1
-    return _numbered(np.array([f"{name} in row {r}" for name, r in zip(names, row, strict=True)], dtype=object))
-
-
-def _springs(problem: Problem, pairs: Ints, place: Ints) -> Groups:
-    """Use one group per spring."""
-    return [f"spring {a}-{b}" for a, b in pairs.tolist()], np.asarray(place, dtype=np.int64)
-
-
-def _volume_groups(problem: Problem, kind: str) -> Groups:
-    """Return the groups of the volume term: one, or one per region."""
-    if kind == "region":
-        used = [f"volume term, {_material(number)}" for number in range(len(problem.materials))]
-        return used, problem.material_numbers
-    return ["volume term"], np.zeros(len(problem.mesh.elements), dtype=np.int64)
-
-
-def _numbered(names: Any) -> Groups:
-    """Return the distinct names in natural order, and the number of each name."""
-    found = sorted(set(names), key=lambda name: [int(part) if part.isdigit() else part for part in _parts(name)])
-    number = {name: place for place, name in enumerate(found)}
-    return found, np.array([number[name] for name in names], dtype=np.int64)
-
-
-def _parts(name: str) -> list[str]:
-    head, _, row = name.rpartition("row ")
-    return [head, row] if row.isdigit() else [name, "0"]
-
-
-def _components(mesh: Mesh) -> Bools:
-    """Return which components of each link of each element are not zero, shape (n_elements * links, dim)."""
-    vectors = np.abs(np.concatenate([link_vectors(part).reshape(-1, mesh.dim) for _, part in mesh.blocks]))
-    return np.asarray(vectors > _ROUNDING * vectors.max(axis=1, keepdims=True))
-
-
-def _axis_of(mesh: Mesh) -> Ints:
-    """Return the axis of each link, -1 if it is along none, shape (n_elements * links,)."""
-    along = _components(mesh)
-    return np.where(along.sum(axis=1) == 1, along.argmax(axis=1), -1)
-
-
-def _axis_aligned(mesh: Mesh) -> bool:
-    n_links, n_edges = len(mesh.kind.links), len(mesh.kind.edges)
-    return bool((_axis_of(mesh).reshape(-1, n_links)[:, :n_edges] >= 0).all())
-
-
-#: Kinds of unknowns by name.
-UNKNOWNS: MappingProxyType[str, Callable[[Problem, Ints, Ints], Groups]] = MappingProxyType(
-    {"class": _classes, "region": _regions, "direction-row": _directions_and_rows, "spring": _springs}
-)

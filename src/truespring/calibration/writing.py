@@ -12,7 +12,6 @@ from truespring.calibration.files import NAME, write_fitted
 from truespring.calibration.fitted_study import FittedStudy
 from truespring.calibration.page import calibration_values, fitted_sentence
 from truespring.errors import StudyError
-from truespring.models.pair_laws import STRAIGHT
 from truespring.outputs import Output
 from truespring.study import schema
 from truespring.study.read import Study
@@ -56,7 +55,7 @@ def what_was_fitted(found: FittedStudy) -> str:
     fitted = found.calibration
     loads = ", ".join(one.case.name for one in fitted.cases if not one.held_out)
     return (
-        f"{fitted.rule.label[:1].upper()}{fitted.rule.label[1:]} with {len(fitted.unknowns)} unknowns by "
+        f"{fitted.rule.label[:1].upper()}{fitted.rule.label[1:]} with {fitted.unknowns.counted} by "
         f"{fitted.unknowns.kind}, fitted to {found.reference} under {loads}."
     )
 
@@ -74,13 +73,8 @@ def calibrated_study(found: FittedStudy, folder: Path, tables: list[str]) -> str
         own = model.get("stiffness")
         if isinstance(own, dict):
             _move(own, ("file", "volume"), found.study.file.parent, folder)
-    stiffness = {"file": tables[0], **({"volume": tables[1]} if len(tables) > 1 else {})}
     name = _free_name(study["models"])
-    entry: dict[str, Any] = {"kind": "springs", "stiffness": stiffness}
-    if found.calibration.model.law != STRAIGHT:
-        entry["law"] = found.calibration.model.law
-    if (found.calibration.model.stiffness < 0).any():
-        entry["allow_negative"] = True
+    entry = found.calibration.unknowns.entry(study, found.springs, found.calibration.values, tables)
     study["models"] = {name: entry, **study["models"]}
     compare = dict(study.get("compare", {}))
     references = [one for one in compare.get("references", found.study.references) if one != name]
@@ -106,6 +100,7 @@ def _head(found: FittedStudy) -> list[str]:
     lines = [
         f"Springs calibrated by truespring {version('truespring')}: {what_was_fitted(found)}",
         fitted_sentence(fitted),
+        *filter(None, [fitted.unknowns.sentence(fitted.values)]),
         fitted.headline,
         fitted.identifiability.sentence,
     ]

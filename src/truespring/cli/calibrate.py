@@ -21,10 +21,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--unknowns",
-        default="class",
         metavar="KIND",
         **one_of(UNKNOWNS),
-        help=f"springs that share one unknown stiffness: {', '.join(UNKNOWNS)}; default: class",
+        help=f"what is unknown: {', '.join(UNKNOWNS)}; default: the first that suits springs of the study",
     )
     parser.add_argument(
         "--to", metavar="NAME", help="reference model of the studies, default: neo-Hookean FEM if they have it"
@@ -71,6 +70,9 @@ def _run(options: argparse.Namespace) -> int:
     screen = console(options)
     screen.print(found.calibration.headline, soft_wrap=True)
     screen.print(calibration_table(f"{study.stem}: springs fitted to {found.reference}", found.calibration))
+    parameters = found.calibration.unknowns.sentence(found.calibration.values)
+    if parameters:
+        screen.print(parameters, soft_wrap=True)
     screen.print(found.calibration.identifiability.sentence, soft_wrap=True)
     for text in found.calibration.warnings:
         screen.print(f"warning: {text}", soft_wrap=True)

@@ -81,7 +81,7 @@ def realised_values(realised: Realised) -> dict[str, Any]:
         ),
         "fit": fitness.fit,
         "reasons": list(fitness.reasons),
-        "better": None if better is None else {"rule": better.rule, "volume": better.volume},
+        "better": None if better is None else {key: getattr(better, key) for key in ("rule", "element", "volume")},
         "sentence": fitness.sentence,
         "findings": finding_values(fitness.findings),
     }

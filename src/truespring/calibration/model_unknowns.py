@@ -1,0 +1,179 @@
+"""Unknown parameters of a model: the stiffness of hourglass modes, and the moduli of the materials."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Floats
+from truespring.calibration.unknowns import Columns, Unknowns, material_name
+from truespring.material import Material
+from truespring.models import LAWS, Model, Springs
+from truespring.models.gaussian_weights import check_hourglass, default_hourglass
+from truespring.potential import Potential
+from truespring.problem import Problem
+from truespring.units import to_si
+
+# Step of central differences by an unknown, of size 1.
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class ModelUnknowns(Unknowns):
+    """Factors on parameters of springs whose potential is built anew for each value.
+
+    Attributes:
+        springs: the springs of the rule.
+    """
+
+    springs: Springs
+
+    def potential(self, values: Floats) -> Potential:
+        """Return the potential with these unknowns (n,); raise ModelError if there is none."""
+        return self.model(values).potential(self.problem)
+
+    def forces(self, positions: Floats, values: Floats | None = None) -> Columns:
+        """Return the derivative of the internal force by each unknown [N], sparse, shape (n_dof, n).
+
+        By central differences: exact where the force is linear or quadratic in an unknown.
+        """
+        at = self.start if values is None else values
+        columns = []
+        for step in _STEP * np.eye(len(self)):
+            ahead, behind = (self.potential(one).gradient(positions) for one in (at + step, at - step))
+            columns.append((ahead - behind).ravel() / (2 * _STEP))
+        return sparse.csr_array(np.stack(columns, axis=1))
+
+    def offset(self, positions: Floats) -> Floats:
+        """Return the internal force of the rule minus its derivative by the unknowns [N], shape (n_dof,)."""
+        whole = self.potential(self.start).gradient(positions).ravel()
+        return np.asarray(whole - self.forces(positions) @ self.start)
+
+
+@dataclass(frozen=True, eq=False)
+class HourglassUnknown(ModelUnknowns):
+    """A factor on `hourglass`, the stiffness of the hourglass modes over that of finite elements."""
+
+    of_what = "hourglass"
+
+    @property
+    def _rule(self) -> float:
+        """The value of the springs of the rule; by default that for the material of the body."""
+        given = self.springs.hourglass
+        return given if given is not None else default_hourglass(self.problem, self.problem.materials[0].poisson)
+
+    def _value(self, values: Floats) -> float:
+        return float(values[0]) * self._rule
+
+    def model(self, values: Floats) -> Springs:
+        """Return the springs with this factor (1,)."""
+        return replace(self.springs, hourglass=self._value(values))
+
+    def entry(self, study: dict[str, Any], name: str, values: Floats, files: Sequence[str]) -> dict[str, Any]:
+        """Return the entry of the springs of the rule with the calibrated `hourglass`."""
+        return {**study["models"][name], "hourglass": self._value(values)}
+
+    def sentence(self, values: Floats) -> str:
+        """Return the calibrated `hourglass` and that of the rule as a sentence."""
+        return f"hourglass = {self._value(values):.6g}, by the rule {self._rule:.6g}."
+
+
+def hourglass_unknown(problem: Problem, springs: Springs, kind: str) -> HourglassUnknown:
+    """Return the unknown `hourglass`; raise ModelError if the elements have no hourglass modes."""
+    found = HourglassUnknown(kind, ("hourglass",), problem, springs)
+    check_hourglass(problem.mesh, found.model(found.start).hourglass)
+    found.potential(found.start)  # raises the usual errors
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialUnknowns(ModelUnknowns):
+    """Factors on the moduli of the materials of a body, to which the internal force is proportional."""
+
+    of_what = "the moduli of a material"
+
+    def model(self, values: Floats) -> "ScaledMaterials":
+        """Return the springs of the rule with scaled materials, by the factors (n,)."""
+        return ScaledMaterials(self.springs, tuple(zip(self.problem.materials, values.tolist(), strict=True)))
+
+    def entry(self, study: dict[str, Any], name: str, values: Floats, files: Sequence[str]) -> dict[str, Any]:
+        """Return the entry of the springs of the rule; the moduli in `[material]` and `[[region]]` are changed."""
+        factors = dict(zip(self.problem.materials, values.tolist(), strict=True))
+        materials = [self.problem.material, *(region.material for region in self.problem.regions)]
+        for table, material in zip([study["material"], *study.get("region", [])], materials, strict=True):
+            _scale_table(table, factors.get(material, 1.0) if material is not None else 1.0)
+        return dict(study["models"][name])
+
+    def sentence(self, values: Floats) -> str:
+        """Return the factors as a sentence."""
+        factors = (f"{name} by {value:.6g}" for name, value in zip(self.names, values.tolist(), strict=True))
+        return f"Moduli multiplied: {', '.join(factors)}."
+
+
+def material_unknowns(problem: Problem, springs: Springs, kind: str) -> MaterialUnknowns:
+    """Return a factor on the moduli of each material of a body."""
+    names = tuple(material_name(number) for number in range(len(problem.materials)))
+    found = MaterialUnknowns(kind, names, problem, springs)
+    found.potential(found.start)  # raises the usual errors
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledMaterials(Model):
+    """Springs on a body whose materials have their moduli multiplied by factors.
+
+    Attributes:
+        springs: the springs.
+        factors: materials and their factors; others are unchanged.
+    """
+
+    springs: Springs
+    factors: tuple[tuple[Material, float], ...]
+
+    kind = "springs"
+    has_springs = True
+
+    @property
+    def label(self) -> str:
+        """Name in figures and tables."""
+        return f"{self.springs.label}, moduli calibrated"
+
+    @property
+    def lines(self) -> str:
+        """Name of the lines of the potential in figures."""
+        return self.springs.lines
+
+    def potential(self, problem: Problem) -> Potential:
+        """Return the potential of the springs on a body with scaled moduli."""
+        return self.springs.potential(self._scaled(problem))
+
+    def _scaled(self, problem: Problem) -> Problem:
+        """Return a problem with scaled moduli."""
+        factors = dict(self.factors)
+        assert problem.material is not None  # see make_unknowns
+        changed = {material: scaled(material, factors.get(material, 1.0)) for material in problem.materials}
+        regions = [replace(one, material=changed.get(one.material, one.material)) for one in problem.regions]
+        own = changed.get(problem.material, problem.material)
+        return replace(problem, material=own, regions=tuple(regions))
+
+
+def scaled(material: Material, factor: float) -> Material:
+    """Return a material whose moduli, and constants of laws with the unit of a modulus, are multiplied by a factor."""
+    constants = {
+        name: value * (factor if _is_modulus(name) else 1.0) for name, value in dict(material.constants).items()
+    }
+    return replace(material, young=factor * material.young, constants=constants)
+
+
+def _is_modulus(name: str) -> bool:
+    """Return whether a constant of a law has the unit of a modulus."""
+    return any(law.constants[name].dimension == "stress" for law in LAWS.values() if name in law.constants)
+
+
+def _scale_table(table: dict[str, Any], factor: float) -> None:
+    """Multiply the moduli in a table `[material]` or `[[region]]` of a study."""
+    for key, value in table.items():
+        if key == "young" or _is_modulus(key):
+            table[key] = factor * to_si(value, "stress")

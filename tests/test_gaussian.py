@@ -1,0 +1,387 @@
+"""Gaussian springs: the patch test of every law, finite elements on simplices, closed forms, an independent program."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from tests.closed_forms import lame, material_of, nominal_stress
+from tests.law_contract import Body, in_section, settled
+from tests.meshes import plane_of_two, random_mesh, shaken, solid_of_four
+from truespring.arrays import Floats
+from truespring.mesh.kinds import ELEMENT_KINDS
+from truespring.models import LAWS
+from truespring.models.fitness import judge
+from truespring.models.gaussian import GaussianElements
+from truespring.models.gaussian_rule import GAUSSIAN_LAWS
+from truespring.models.gaussian_weights import HOURGLASS_LIMITS, laplacians
+from truespring.models.heml import HEML_LAWS
+from truespring.models.law import Constants
+from truespring.models.laws import law_constants
+
+YOUNG, THICKNESS = 900.0, 0.3
+SECTIONS = {"plane stress": ts.PlaneStress(THICKNESS), "plane strain": ts.PlaneStrain(THICKNESS)}
+MIXED = ("plane of two kinds", "solid of four kinds")
+KINDS = (*(name for name, kind in ELEMENT_KINDS.items() if kind.dim > 1), *MIXED)
+
+
+def mesh_of(kind: str) -> ts.Mesh:
+    """Distorted elements of a kind."""
+    match kind:
+        case "plane of two kinds":
+            return shaken(plane_of_two((3.0, 2.0), (3, 2)), 0.15)
+        case "solid of four kinds":
+            return shaken(solid_of_four(1.0), 0.1)
+    return random_mesh(kind, np.random.default_rng(1943))
+
+
+PLACES = [
+    (kind, section)
+    for kind in KINDS
+    for section in (SECTIONS if kind == MIXED[0] or kind in ("triangle", "quadrilateral") else ("space",))
+]
+SIMPLICES = [place for place in PLACES if place[0] in ("triangle", "tetrahedron")]
+
+
+def body(
+    mesh: ts.Mesh, section: str = "", poisson: float = 0.3, law: str = "neo-hookean", young: float = YOUNG, **more
+) -> ts.Problem:
+    """A body that is held and loaded only because a problem must be."""
+    last, material = mesh.n_nodes - 1, material_of(law, young, poisson)
+    held, load = [ts.Fixed(on=range(last))], [ts.Force(on=[last], total=[1.0] * mesh.dim)]
+    return ts.Problem(mesh, material, SECTIONS.get(section), held, load, **more)
+
+
+def gradient_of(dim: int, seed: int) -> Floats:
+    """A large deformation gradient: turned, sheared and stretched."""
+    generator = np.random.default_rng(seed)
+    turn = np.linalg.qr(generator.normal(size=(dim, dim)))[0]
+    turn[0] *= np.sign(np.linalg.det(turn))
+    return np.asarray(turn @ (np.eye(dim) + generator.uniform(-0.35, 0.35, (dim, dim))))
+
+
+def law_in(law: str, material: ts.Material, section: str, dim: int) -> Body:
+    constants = Constants(*lame(material.young, material.poisson), section == "plane stress", dict(material.constants))
+    return Body(LAWS[law], constants, dim)
+
+
+def energy_and_stress(of: Body, F: Floats) -> tuple[float, Floats]:
+    """Energy density [Pa] and nominal stress P [Pa] of a law's formula in principal stretches."""
+    left, stretch, right = np.linalg.svd(F)
+    three = in_section(of, stretch)
+    P = left @ np.diag(nominal_stress(of.law, of.constants, three)[: of.dim]) @ right
+    return float(np.real(of.law.density(three, of.constants))), np.asarray(P)
+
+
+def facet_areas(nodes: Floats) -> Floats:
+    """Integral of N n over a facet for each of its nodes, anticlockwise from outside [m^(d-1)], shape (k, dim)."""
+    if len(nodes) == 2:
+        (x, y) = nodes[1] - nodes[0]
+        return np.array([[y, -x]] * 2) / 2
+    if len(nodes) == 3:
+        return np.tile(np.cross(nodes[1] - nodes[0], nodes[2] - nodes[0]) / 6, (3, 1))
+    signs, found = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), np.zeros((4, 3))
+    for r, s in signs / np.sqrt(3):
+        shape = (1 + r * signs[:, 0]) * (1 + s * signs[:, 1]) / 4
+        along = (signs[:, 0] * (1 + s * signs[:, 1]) / 4) @ nodes
+        across = (signs[:, 1] * (1 + r * signs[:, 0]) / 4) @ nodes
+        found += np.outer(shape, np.cross(along, across))
+    return found
+
+
+def nodal_forces(mesh: ts.Mesh, stress: Sequence[Floats]) -> Floats:
+    """Nodal forces of a uniform nominal stress in each element, over its facets alone [N], shape (n_nodes, dim)."""
+    found = np.zeros(mesh.nodes.shape)
+    for numbers, part in mesh.blocks:
+        for number, element in zip(np.atleast_1d(numbers), part.elements, strict=True):
+            for facet in part.kind.facets:
+                nodes = element[list(dict.fromkeys(facet))]
+                found[nodes] += facet_areas(mesh.nodes[nodes]) @ stress[number].T
+    return found * (THICKNESS if mesh.dim == 2 else 1.0)
+
+
+def apart(one: Floats, other: Floats) -> float:
+    """The largest difference over the largest value of what is compared with."""
+    size = float(np.abs(other).max())
+    assert size > 0
+    return float(np.abs(one - other).max()) / size
+
+
+def gaussian(problem: ts.Problem, **keys: object):
+    return ts.Springs("gaussian", **keys).potential(problem)
+
+
+# --- uniform strain ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hourglass", [None, 1.4])
+@pytest.mark.parametrize("law", GAUSSIAN_LAWS)
+@pytest.mark.parametrize(("kind", "section"), PLACES)
+def test_patch_test(kind: str, section: str, law: str, hourglass: float | None) -> None:
+    """No force at rest; at a uniform F of any size, energy and nodal forces of the law, in regions of two materials."""
+    mesh = mesh_of(kind)
+    if hourglass is not None and not HOURGLASS_LIMITS.keys() & set(mesh.element_kinds):
+        return
+    of = [body(mesh, section, poisson, law, young).material for poisson, young in ((0.3, YOUNG), (-0.2, 0.4 * YOUNG))]
+    problem = body(mesh, section, 0.3, law, regions=[ts.Region([0], of[1])])
+    potential = gaussian(problem, law=law, hourglass=hourglass)
+    scale = YOUNG * float(np.ptp(mesh.nodes)) ** (mesh.dim - 1)
+    assert np.abs(potential.gradient(mesh.nodes)).max() <= 1e-13 * scale
+    for seed in (1, 2):
+        F = gradient_of(mesh.dim, seed)
+        (density, P), (first_density, first_P) = (
+            energy_and_stress(law_in(law, one, section, mesh.dim), F) for one in of
+        )
+        moved = mesh.nodes @ F.T + 1.0
+        stress = [first_P, *[P] * (len(mesh.elements) - 1)]
+        assert apart(potential.gradient(moved), nodal_forces(mesh, stress)) < 1e-12
+        volumes = mesh.measures * (THICKNESS if mesh.dim == 2 else 1.0)
+        energy = first_density * volumes[0] + density * volumes[1:].sum()
+        assert potential.energy(moved) == pytest.approx(energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("poisson", [-0.2, 0.0, 1 / 3, 0.49, 0.499])
+def test_patch_test_at_any_poisson_ratio(poisson: float) -> None:
+    for kind, section in (("quadrilateral", "plane stress"), ("quadrilateral", "plane strain"), ("hexahedron", "")):
+        problem = body(mesh_of(kind), section, poisson)
+        assert problem.material is not None
+        F = gradient_of(problem.mesh.dim, 4)
+        _, P = energy_and_stress(law_in("neo-hookean", problem.material, section, problem.mesh.dim), F)
+        expected = nodal_forces(problem.mesh, [P] * len(problem.mesh.elements))
+        assert apart(gaussian(problem).gradient(problem.mesh.nodes @ F.T), expected) < 1e-12
+
+
+@pytest.mark.parametrize("law", GAUSSIAN_LAWS)
+@pytest.mark.parametrize("section", ["plane stress", "plane strain", "space"])
+@pytest.mark.parametrize("load", ["uniaxial", "equibiaxial", "simple shear"])
+def test_closed_forms_of_a_solution(load: str, section: str, law: str) -> None:
+    """Stretches, forces and true stress, so the thickness too, of a distorted block, against the law's formula."""
+    dim = 3 if section == "space" else 2
+    mesh = ts.box((1.0, 1.0, 1.0), (2, 2, 2)) if dim == 3 else ts.rectangle((1.0, 1.0), (3, 3))
+    inner = ((mesh.nodes > 0.1) & (mesh.nodes < 0.9)).all(axis=1)
+    mesh = ts.Mesh(mesh.nodes + 0.08 * inner[:, None] * np.arange(1.0, dim + 1) / dim, mesh.elements, mesh.element)
+    material, F = material_of(law, YOUNG, 0.3), np.eye(dim)
+    if load == "simple shear":
+        F[0, 1] = 0.4
+        rim = np.flatnonzero(~inner)
+        supports = [ts.Fixed([node], displacement=mesh.nodes[node] @ (F - np.eye(dim)).T) for node in rim]
+    else:
+        both = load == "equibiaxial"
+        free = [False, not both, section != "plane strain"]
+        given = np.where(free, 0.85, [1.4, 1.4 if both else 1.0, 1.0])
+        F = np.diag(settled(law_in(law, material, section, dim), given, free)[:dim])
+        sides = [ts.Fixed(side, [axis]) for side, axis in zip(("left", "bottom", "back"), "xyz"[:dim], strict=False)]
+        moved = [ts.Fixed("right", ["x"], [0.4, *[0.0] * (dim - 1)])]
+        moved += [ts.Fixed("top", ["y"], [0.0, 0.4, 0.0][:dim])] if load == "equibiaxial" else []
+        supports = sides + moved
+    problem = ts.Problem(mesh, material, SECTIONS.get(section), supports)
+    path = ts.solve(problem, ts.Springs("gaussian", law=law), ts.Newton(load_steps=2, tolerance=1e-12))
+    assert path.status is ts.Status.CONVERGED
+    state, (_, P) = path.states[-1], energy_and_stress(law_in(law, material, section, dim), F)
+    assert state.displacement == pytest.approx(mesh.nodes @ (F - np.eye(dim)).T, abs=1e-8)
+    area = THICKNESS if dim == 2 else 1.0
+    right = np.isclose(mesh.nodes[:, 0], 1)
+    if load != "simple shear":
+        assert state.reaction[right, 0].sum() == pytest.approx(P[0, 0] * area, rel=1e-8)
+    potential = path.potential
+    assert isinstance(potential, GaussianElements)
+    thickness = in_section(law_in(law, material, section, dim), np.linalg.svd(F)[1])[2] if dim == 2 else 1.0
+    true = P @ F.T / np.linalg.det(F) / thickness
+    found = potential.cauchy_stress(state.positions)[:, :dim, :dim]
+    assert np.abs(found - true).max() <= 1e-8 * np.abs(true).max()
+
+
+# --- the same as finite elements --------------------------------------------------------------------------------------
+
+
+def check_same(springs: object, other: object, seed: int = 3) -> None:
+    """Energy, gradient and Hessian of two potentials of the same nodes are equal at a deformed state."""
+    nodes = springs.nodes
+    size = np.ptp(nodes, axis=0).max()
+    moved = nodes @ gradient_of(nodes.shape[1], seed).T
+    moved = moved + 0.03 * size * np.random.default_rng(seed).uniform(-1, 1, nodes.shape)
+    assert springs.energy(moved) == pytest.approx(other.energy(moved), rel=1e-12)
+    assert springs.energy(moved) > 0
+    assert apart(springs.gradient(moved), other.gradient(moved)) < 1e-12
+    assert apart(springs.hessian(moved).toarray(), other.hessian(moved).toarray()) < 1e-12
+
+
+@pytest.mark.parametrize("law", GAUSSIAN_LAWS)
+@pytest.mark.parametrize(("kind", "section"), SIMPLICES)
+def test_simplices_are_finite_elements(kind: str, section: str, law: str) -> None:
+    problem = body(mesh_of(kind), section, 0.4, law)
+    springs = gaussian(problem, law=law)
+    check_same(springs, ts.Fem(law, "linear").potential(problem))
+    if law in HEML_LAWS:
+        check_same(springs, ts.Heml(law).potential(problem))
+
+
+@pytest.mark.parametrize(("kind", "section"), SIMPLICES)
+def test_springs_of_second_order_are_finite_elements(kind: str, section: str) -> None:
+    """In plane stress, and if lam is zero, of the law at the points; else with its lam part at the mean volume."""
+    for poisson in (0.0, 0.45):
+        at_points = section == "plane stress" or poisson == 0
+        element = "quadratic" if at_points else "quadratic-mean-dilatation"
+        problem = body(mesh_of(kind), section, poisson)
+        springs = gaussian(problem, element="quadratic")
+        check_same(springs, ts.Fem("neo-hookean", element).potential(problem))
+        assert np.abs(springs.gradient(springs.nodes)).max() <= 1e-13 * YOUNG * np.ptp(springs.nodes) ** 2
+
+
+# --- weights ----------------------------------------------------------------------------------------------------------
+
+
+def weights(sides: Sequence[float], poisson: float, hourglass: float | None = None) -> list[float]:
+    """The stiffness of edges by axis, face diagonals by plane yz, xz, xy and body diagonals of a brick over mu."""
+    dim = len(sides)
+    mesh = (ts.rectangle if dim == 2 else ts.box)(sides, (1,) * dim)
+    problem = body(mesh, "plane stress" if dim == 2 else "", poisson)
+    found = ts.Springs("gaussian", hourglass=hourglass).element_stiffness(problem)[0]
+    found /= lame(YOUNG, poisson)[1] * (THICKNESS if dim == 2 else 1.0)
+    links = mesh.elements[0][np.array(mesh.kind.links)]
+    along = ~np.isclose(mesh.nodes[links[:, 0]], mesh.nodes[links[:, 1]])
+    by_class: dict[tuple[bool, ...], float] = {}
+    for key, value in zip(map(tuple, along.tolist()), found, strict=True):
+        assert by_class.setdefault(key, value) == pytest.approx(value, abs=1e-13)
+    return [by_class[key] for key in sorted(by_class, key=lambda key: (sum(key), [-one for one in key]))]
+
+
+@pytest.mark.parametrize("hourglass", [0.3, 1.0, 4 / 3])
+def test_squares(hourglass: float) -> None:
+    expected = [hourglass / 6] * 2 + [1 / 2 - hourglass / 6]
+    assert weights((0.7, 0.7), 0.2, hourglass) == pytest.approx(expected, abs=1e-14)
+
+
+def test_squares_have_the_weights_of_finite_elements_by_default() -> None:
+    assert weights((0.7, 0.7), 0.2) == pytest.approx(weights((0.7, 0.7), 0.2, 1.0), abs=1e-14)
+
+
+@pytest.mark.parametrize("A", [0.5, 1.0, 1.9])
+def test_rectangles(A: float) -> None:
+    B = 1.3
+    expected = [B / (3 * A) - A / (6 * B), A / (3 * B) - B / (6 * A), (B / A + A / B) / 6]
+    assert weights((A, B), 0.3) == pytest.approx(expected, abs=1e-14)
+
+
+def test_cubes_by_default() -> None:
+    """Face diagonals s = 1/(12 (1 + nu^2)) mu h, body diagonals 1/4 - 2 s, no edges."""
+    h = 0.02
+    edges, faces, (body_diagonal,) = np.split(np.array(weights((h, h, h), 0.45)) / h, [3, 6])
+    assert edges == pytest.approx([0] * 3, abs=1e-13)
+    assert faces == pytest.approx([0.0693001] * 3, abs=5e-8)
+    assert body_diagonal == pytest.approx(0.1113998, abs=7e-8)
+
+
+@pytest.mark.parametrize("hourglass", [0.6, 1.0, 1.2, 2.0])
+def test_cubes(hourglass: float) -> None:
+    """Up to 1 without edges; above, with the stiffness of the xyz mode of finite elements."""
+    s, h = hourglass / 12, 0.5
+    c = 1 / 4 - 2 * s if hourglass <= 1 else (5 / 6 - 6 * s) / 4
+    a = 2 * s - 1 / 4 + c
+    expected = np.array([*[a] * 3, *[s - a] * 3, c])
+    assert weights((h, h, h), 0.45, hourglass) == pytest.approx(expected * h, abs=1e-14)
+
+
+def test_triangles_have_cotangent_weights() -> None:
+    """mu t cot(opposite angle) / 2; negative across an obtuse angle, which is reported and not an error."""
+    corners = np.array([[0.0, 0.0], [2.0, 0.1], [0.9, 0.6]])
+    problem = body(ts.Mesh(corners, [[0, 1, 2]], "triangle"), "plane stress")
+    sides = np.roll(corners, -1, axis=0) - corners  # 01, 12, 20
+    angles = [
+        np.arccos(-(a @ b) / np.linalg.norm(a) / np.linalg.norm(b))
+        for a, b in zip(sides, np.roll(sides, -1, 0), strict=True)
+    ]
+    opposite = np.roll(angles, 2)  # the angle of sides 01 and 12 is opposite to 20
+    mu = lame(YOUNG, 0.3)[1]
+    found = ts.Springs("gaussian").element_stiffness(problem)[0]
+    assert found == pytest.approx(mu * THICKNESS / np.tan(opposite) / 2, rel=1e-12)
+    assert found.min() < 0
+    codes = {finding.code: finding.numbers for finding in judge(problem, ts.Springs("gaussian")).findings}
+    assert codes["negative-weights"]["n_negative"] == 1 and "negative" not in codes
+    assert gaussian(problem).stiffness.min() == pytest.approx(found.min(), rel=1e-12)
+
+
+@pytest.mark.parametrize("element", HOURGLASS_LIMITS)
+def test_hourglass_limits(element: str) -> None:
+    """At the limit an element has a mode without stiffness, just above none; at or below is an error."""
+    flat, limit = element == "quadrilateral", HOURGLASS_LIMITS[element]
+    mesh = ts.rectangle((1.0, 1.0), (1, 1)) if flat else ts.box((1.0, 1.0, 1.0), (1, 1, 1))
+    problem = body(mesh, "plane stress" if flat else "")
+    rigid = mesh.dim * (mesh.dim + 1) // 2
+
+    def stiffness(hourglass: float) -> Floats:
+        weights = laplacians(problem, np.array([hourglass]))
+        law = LAWS["neo-hookean"]
+        potential = GaussianElements(problem, law, law_constants(problem, "neo-hookean"), weights)
+        values = np.linalg.eigvalsh(potential.hessian(mesh.nodes).toarray())
+        return np.asarray(values / values[-1])
+
+    assert (np.abs(stiffness(limit)) < 1e-12).sum() > rigid
+    assert stiffness(limit - 0.01)[0] < -1e-4
+    for hourglass in (limit + 0.01, 1.0, 3.0):
+        assert np.abs(stiffness(hourglass)[:rigid]).max() < 1e-12 and stiffness(hourglass)[rigid] > 1e-4
+    for hourglass in (limit, limit - 0.2, np.nan, np.inf):
+        with pytest.raises(ts.TruespringError, match="hourglass"):
+            gaussian(problem, hourglass=hourglass)
+
+
+# --- an independent program -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("force", "hourglass", "expected"),
+    [
+        ((0.0, -0.0428), 1.0, (-0.0278922439, -0.0853381957)),
+        ((0.0, -0.0428), 4 / 3, (-0.0273396828, -0.0845909046)),
+        ((1.2, 0.0), 1.0, (0.0605480099, 0.0)),
+        ((1.2, 0.0), 4 / 3, (0.0605412574, 0.0)),
+    ],
+)
+def test_an_independent_program_gives_the_same(
+    force: tuple[float, float], hourglass: float, expected: tuple[float, float]
+) -> None:
+    """Plane stress; springs and pressure by formulas of their own, in another language of arrays, solved by Newton."""
+    mesh = ts.rectangle((0.16, 0.04), (16, 4))
+    supports, load = [ts.Fixed("left")], [ts.Force("right", force)]
+    problem = ts.Problem(mesh, ts.Material(1e4, 1 / 3), ts.PlaneStress(0.01), supports, load)
+    path = ts.solve(problem, ts.Springs("gaussian", hourglass=hourglass), ts.Newton(load_steps=3, tolerance=1e-10))
+    middle = np.flatnonzero((np.abs(mesh.nodes - [0.16, 0.02]) < 1e-9).all(axis=1))[0]
+    assert path.status is ts.Status.CONVERGED
+    assert path.states[-1].displacement[middle] == pytest.approx(expected, abs=1e-9)
+
+
+# --- errors -----------------------------------------------------------------------------------------------------------
+
+SQUARES, TRIANGLES = (ts.rectangle((2.0, 1.0), (2, 1), kind) for kind in ("quadrilateral", "triangle"))
+
+
+@pytest.mark.parametrize(
+    ("keys", "mesh", "named"),
+    [
+        ({"sharing": "single"}, SQUARES, "sharing"),
+        ({"volume": True}, SQUARES, "volume"),
+        ({"element": "quadratic"}, SQUARES, "quadrilateral"),
+        ({"element": "cubic"}, TRIANGLES, "quadratic"),
+        ({"element": "quadratic", "law": "gent"}, TRIANGLES, "gent"),
+        ({"element": "quadratic", "hourglass": 1.0}, TRIANGLES, "hourglass"),
+        ({"hourglass": 1.0}, TRIANGLES, "hourglass"),
+        ({"law": "hencky"}, SQUARES, "neo-hookean"),
+        ({"law": "neo-hokean"}, SQUARES, "neo-hookean"),
+        ({"law": "gent"}, SQUARES, "jm"),
+        ({"k_body": 0.1}, SQUARES, "k_body"),
+    ],
+)
+def test_errors(keys: dict[str, object], mesh: ts.Mesh, named: str) -> None:
+    problem = ts.Problem(
+        mesh, ts.Material(1e4, 0.3), ts.PlaneStress(0.01), [ts.Fixed("left")], [ts.Force("right", (1.0, 0.0))]
+    )
+    with pytest.raises(ts.TruespringError, match=named):
+        ts.Springs("gaussian", **keys).check(problem)
+
+
+@pytest.mark.parametrize("keys", [{"hourglass": 1.0}, {"law": "gent"}, {"element": "quadratic"}])
+def test_keys_of_the_rule_are_of_no_other(keys: dict[str, object]) -> None:
+    for springs in ({"rule": "isotropic"}, {"stiffness": ts.UserStiffness(0.4, 0.4)}):
+        with pytest.raises(ts.TruespringError, match=next(iter(keys))):
+            ts.Springs(**springs, **keys).potential(body(SQUARES, "plane stress"))
