@@ -171,7 +171,7 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
         assert text in " ".join(shown.split())
     assert "Zener" not in shown
     brief = " ".join(shown.split())
-    assert in_order(brief, "8.824", "(material 10 kPa, 0.300)", "'springs'", "not fit", 'rule = "isotropic"', "-v")
+    assert in_order(brief, "8.824", "(material 10 kPa, 0.300)", "'springs'", "not fit", 'rule = "gaussian"', "-v")
     assert shown.splitlines()[-1] == f"picture: {out / 'study' / 'check.png'}"
     assert {one.name for one in (out / "study").iterdir()} == {"check.png", ".truespring.json"}
     assert (out / "study" / "check.png").read_bytes().startswith(b"\x89PNG")
@@ -181,7 +181,7 @@ def test_check_solves_nothing_and_shows_the_moduli(tmp_path: Path, capsys: pytes
         assert text in shown
     assert main(["check", str(file), "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
-    assert not plan["models"]["springs"]["fit"] and 'rule = "isotropic"' in plan["models"]["springs"]["sentence"]
+    assert not plan["models"]["springs"]["fit"] and 'rule = "gaussian"' in plan["models"]["springs"]["sentence"]
     reasons = plan["models"]["springs"]["sentence"].split(". ")[0]
     assert in_order(reasons, "0.882", "1.105", "0.263", "0.412", "0.300")
     assert reasons in " ".join(shown.split()) and reasons not in brief
@@ -354,7 +354,13 @@ def test_a_network_is_checked_and_solved_as_any_study(tmp_path: Path, capsys: py
     truss = str(Path(__file__).parent.parent / "examples" / "truss.toml")
     assert main(["check", truss, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["models"]["truss"] == {"kind": "network", "label": "springs", "n_springs": 2, "warnings": []}
+    assert told["models"]["truss"] == {
+        "kind": "network",
+        "label": "springs",
+        "law": "straight",
+        "n_springs": 2,
+        "warnings": [],
+    }
     assert told["material"] is None and told["load_steps"] == 18
     assert main(["check", truss, "--out", str(tmp_path)]) == 0 and "total force (0, -4) N" in capsys.readouterr().out
     assert main(["verify", truss, "--out", str(tmp_path)]) == 0

@@ -571,7 +571,12 @@ def _named(feature: Feature, problem: ts.Problem, springs: SpringData) -> tuple[
         (load,) = problem.loads
         assert load.instead
         return load.words(), load.instead
-    return {Feature.VOLUME_TERM: ("volume = true",), Feature.COUPLING: ("biquadratic", "rule")}[feature]
+    return {
+        Feature.VOLUME_TERM: ("volume = true",),
+        Feature.COUPLING: ("biquadratic", "rule"),
+        Feature.PRESSURE: ("gaussian", "npz or json"),
+        Feature.FORCE_LAW: ("neo-hookean",),
+    }[feature]
 
 
 @pytest.mark.parametrize("feature", Feature)

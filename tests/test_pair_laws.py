@@ -11,7 +11,7 @@ import truespring as ts
 from tests.closed_forms import difference_errors, observed_orders
 from tests.studies import STUDY, written
 from truespring.arrays import Floats
-from truespring.calibration.unknowns import make_unknowns
+from truespring.calibration import make_unknowns
 from truespring.errors import ModelError
 from truespring.models import PAIR_LAWS
 from truespring.study import read_study

@@ -14,9 +14,9 @@ import pytest
 import truespring as ts
 from tests.test_report import words
 from tests.wording import in_order
+from truespring.calibration import make_unknowns
 from truespring.calibration.calibration import _warnings
 from truespring.calibration.fitted import CaseResult
-from truespring.calibration.unknowns import make_unknowns
 from truespring.cli import main
 from truespring.comparing import compare_sources, find_sources
 from truespring.reactions import leading_support
