@@ -346,7 +346,7 @@ def test_regions_have_fibres_of_their_own() -> None:
     assert fibres is not None and fibres.k1.tolist() == [K1, 7.0] and fibres.k2.tolist() == [K2, 8.0]
     assert fibres.directions == pytest.approx(np.array([[[0.5**0.5] * 2, [0, 1]], [[0, 0], [1, 0]]]))
     assert hash(other) == hash(replace(other)) and other != problem.material
-    assert all(twin.fibres is None for twin in problem.homogeneous)
+    assert [twin.fibres for twin in (*problem.homogeneous, *body(mesh, (1.0, 0.0)).homogeneous)] == [None] * 3
 
 
 # --- errors -------------------------------------------------------------------------------------------
