@@ -15,7 +15,7 @@ from truespring.report.summary import summary
 from truespring.study import read_study, run
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-NAMES = ("stretching", "bending", "soft_block", "tissue")
+NAMES = ("stretching", "bending", "soft_block", "tissue", "muscle")
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +120,16 @@ def test_gaussian_springs_follow_fem_that_does_not_lock(results: dict[str, Resul
     )
     gaussian = result.paths["gaussian"].states[-1]
     assert gaussian.displacement[result.probe, 1] / 0.16 == pytest.approx(-0.56, abs=0.01)
+
+
+def test_a_muscle_shortens_and_its_tendon_is_stretched(results: dict[str, Result]) -> None:
+    result = results["muscle"]
+    assert result.converged
+    assert result.comparisons["neo-hookean"].rms_error < 0.015
+    moved = result.paths["springs"].states[-1].displacement
+    nodes = result.problem.mesh.nodes
+    ends = {x: moved[np.isclose(nodes[:, 0], x), 0].mean() for x in (0.06, 0.08)}
+    assert ends[0.06] < -0.1 * 0.06 and 0 < ends[0.08] - ends[0.06] < 0.05 * 0.02
 
 
 def test_springs_on_an_imported_mesh_are_finite_elements(results: dict[str, Result]) -> None:

@@ -23,6 +23,7 @@ ALLOWED = {
         "converging",
         "equilibrium",
         "exports",
+        "fibres",
         "models",
         "outputs",
         "reference",

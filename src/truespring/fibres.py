@@ -45,6 +45,13 @@ class Fibres:
         """The direction of each family: a vector, or the name of an array of the mesh."""
         return self.along  # type: ignore[return-value]  # see __post_init__
 
+    def words(self) -> str:
+        """Return the fibres in words: "fibres along (1, 0), k1 = 5000 Pa, k2 = 10"."""
+        named = [
+            f"'{one}'" if isinstance(one, str) else f"({', '.join(f'{x:.4g}' for x in one)})" for one in self.families
+        ]
+        return f"fibres along {' and '.join(named)}, k1 = {self.k1:g} Pa, k2 = {self.k2:g}"
+
     def directions(self, mesh: Mesh, elements: Ints) -> Floats:
         """Return unit vectors along the fibres of `elements`, shape (n_families, n, dim).
 

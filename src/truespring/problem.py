@@ -110,10 +110,21 @@ class Problem:
 
     @cached_property
     def homogeneous(self) -> "tuple[Problem, ...]":
-        """For each of `materials` the problem with the whole body of that material."""
+        """For each of `materials` the problem with the whole body of that material, without fibres."""
         if not self.regions:
-            return (self,)
-        return tuple(replace(self, material=material, regions=()) for material in self.materials)
+            return (self.without_fibres,)
+        plain = self.without_fibres
+        alone = [one if one.fibres is None else replace(one, fibres=None) for one in self.materials]
+        return tuple(replace(plain, material=material, regions=()) for material in alone)
+
+    @cached_property
+    def without_fibres(self) -> "Problem":
+        """The body without fibres, and without supports and loads, which may act along them; `self` if it has none."""
+        if self.fibres is None or self.material is None:
+            return self
+        regions = [replace(region, material=replace(region.material, fibres=None)) for region in self.regions]
+        material = replace(self.material, fibres=None)
+        return replace(self, material=material, regions=regions, supports=(), loads=(), stated=False)
 
     @cached_property
     def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":

@@ -69,6 +69,13 @@ def _draw(options: argparse.Namespace, study: "Study", required: bool) -> None:
         print_file(options, "picture", picture)
 
 
+def _fibre_words(material: dict[str, Any]) -> str:
+    from truespring.fibres import Fibres
+
+    fibres = material.get("fibres")
+    return f", {Fibres(**fibres).words()}" if fibres else ""
+
+
 def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
     """Print the plan of a study as lines of text."""
     held = ", ".join(f"{count} along {axis}" for axis, count in plan["held"].items())
@@ -77,9 +84,11 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
     across = f", {section['kind']}, thickness {section['thickness']:g} m" if section else ""
     screen.print(f"{plan['title']}\n{size}{across}")
     if material:
-        screen.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}")
+        fibres = _fibre_words(material)
+        screen.print(f"Young's modulus {material['young']:g} Pa, Poisson's ratio {material['poisson']:g}{fibres}")
     for region in plan["regions"]:
-        screen.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}")
+        fibres = _fibre_words(region)
+        screen.print(f"  in {region['n_elements']} elements {region['young']:g} Pa and {region['poisson']:g}{fibres}")
     screen.print(f"{plan['n_nodes']} nodes, {plan['n_elements']} elements, {plan['n_unknowns']} unknowns")
     for note in plan["mesh_notes"]:
         screen.print(f"note on the mesh: {note}")

@@ -225,6 +225,8 @@ def _directions(dim: int) -> Floats:
 def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     """Return the effective moduli of springs on the mesh of a problem, all of it of the material of the problem.
 
+    Fibres are left out: the moduli are those of the material between them.
+
     On a lattice whose nodes are centres of symmetry, a uniform strain is an equilibrium, and
     C_ijkl = sum k L^2 n_i n_j n_k n_l over the springs of a cell, divided by its volume, is exact (Born and Huang,
     Dynamical Theory of Crystal Lattices, 1954). On an irregular mesh, a uniform strain is applied to the boundary and
@@ -232,7 +234,8 @@ def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     Raises ModelError if the springs do not resist every strain.
     """
     material, section = require_body(problem)
-    alone = replace(problem, regions=()) if problem.regions else problem
+    plain = problem.without_fibres
+    alone = replace(plain, regions=()) if plain.regions else plain
     mesh = alone.mesh
     classes = lattice_classes(mesh)
     if springs.coupled:

@@ -150,7 +150,8 @@ def _element_facts(result: Result) -> list[tuple[str, str]]:
 
 
 def _material_words(material: Material) -> str:
-    return f"Young’s modulus {input_quantity(material.young, 'Pa')}, Poisson’s ratio {material.poisson:.4g}"
+    words = f"Young’s modulus {input_quantity(material.young, 'Pa')}, Poisson’s ratio {material.poisson:.4g}"
+    return words if material.fibres is None else f"{words}, {material.fibres.words()}"
 
 
 def _region_fact(problem: Problem, region: Region) -> tuple[str, str]:
