@@ -249,8 +249,7 @@ def _values(material: Material, name: str) -> dict[str, float]:
         value = has.get(key, constant.default)
         if value is None:
             raise ModelError(
-                f"law = '{name}' requires {key} [{constant.unit}], {constant.meaning}: add it to the material, next to "
-                "young and poisson"
+                f"law = '{name}' requires {key} [{constant.unit}], {constant.meaning}: add it to the material"
             )
         if not constant.allows(value):
             raise ModelError(f"{key} = {value:g} {constant.unit}: law = '{name}' takes {constant.range_words}")
