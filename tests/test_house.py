@@ -70,6 +70,7 @@ ALLOWED = {
         "support_errors",
         "equilibrium",
         "linear",
+        "material",
         "mesh",
         "models",
         "outputs",
