@@ -72,6 +72,7 @@ ALLOWED = {
         "mesh",
         "models",
         "outputs",
+        "potential",
         "problem",
         "reactions",
         "reference",
