@@ -338,7 +338,7 @@ CASES = {
     **_metric(),
     **_blocks(),
 }
-# What bodies of several kinds store is a sum of what each kind stores, and a law answers a strain alike on all elements:
+# What bodies of several kinds store is a sum of what each kind stores, and a law is the same function on all elements:
 # neo-Hookean bodies of several kinds, and laws with constants on the bodies of HELD, are held every time, all others in
 # verification.
 HELD = {
