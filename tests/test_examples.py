@@ -73,7 +73,9 @@ def test_every_model_of_the_shipped_studies_converges(name: str, results: dict[s
         assert path.load_factors == pytest.approx(np.linspace(0, 1, 11))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.verification) if name == "tissue" else name for name in NAMES]
+)
 def test_the_python_twin_gives_the_same(name: str, results: dict[str, Result]) -> None:
     twins: dict[str, ts.Comparison] = script(name).main()
     assert list(twins) == list(results[name].comparisons)
@@ -128,8 +130,9 @@ def test_a_muscle_shortens_and_its_tendon_is_stretched(results: dict[str, Result
     assert result.comparisons["neo-hookean"].rms_error < 0.015
     moved = result.paths["springs"].states[-1].displacement
     nodes = result.problem.mesh.nodes
-    ends = {x: moved[np.isclose(nodes[:, 0], x), 0].mean() for x in (0.06, 0.08)}
-    assert ends[0.06] < -0.1 * 0.06 and 0 < ends[0.08] - ends[0.06] < 0.05 * 0.02
+    ends = {x: moved[np.isclose(nodes[:, 0], x)].mean(axis=0) for x in (0.06, 0.08)}
+    tendon = np.linalg.norm(ends[0.08] - ends[0.06] + [0.02, 0.0])  # it turns, too
+    assert ends[0.06][0] < -0.1 * 0.06 and 1.0 < tendon / 0.02 < 1.05
 
 
 def test_springs_on_an_imported_mesh_are_finite_elements(results: dict[str, Result]) -> None:
