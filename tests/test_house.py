@@ -72,6 +72,7 @@ ALLOWED = {
         "linear",
         "material",
         "mesh",
+        "material",
         "models",
         "outputs",
         "potential",
