@@ -72,7 +72,6 @@ ALLOWED = {
         "linear",
         "material",
         "mesh",
-        "material",
         "models",
         "outputs",
         "potential",
