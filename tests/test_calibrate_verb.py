@@ -180,6 +180,29 @@ def test_a_volume_term_is_calibrated_and_read_again(tmp_path: Path) -> None:
     assert again.kappa.tolist() == found.calibration.model.kappa.tolist() and again.kappa.any()
 
 
+@pytest.mark.parametrize("kind", ["hourglass", "material"])
+def test_parameters_are_calibrated_and_read_again(kind: str, tmp_path: Path) -> None:
+    """The calibrated study contains the parameters; it has the error that the calibration states."""
+    text = changed(REFERENCE, ('rule = "lloyd"', 'rule = "gaussian"')).replace('"10 kPa"', '"9 kPa"')
+    text = text.replace('law = "neo-hookean"', 'law = "neo-hookean"\nelement = "linear"')
+    study = written(tmp_path, text)
+    assert main(["calibrate", str(study), "--unknowns", kind, "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    folder = tmp_path / "out" / "study"
+    assert "calibrated.csv" not in {file.name for file in folder.iterdir()}
+    (factor,) = [one["value"] for one in json.loads((folder / "calibrate.json").read_text(encoding="utf-8"))["values"]]
+    assert abs(factor - 1) > 1e-3
+    tables = tomllib.loads((folder / "calibrated.toml").read_text(encoding="utf-8"))
+    found = read_study(folder / "calibrated.toml")
+    springs = found.entries["calibrated"]
+    assert isinstance(springs, Springs)
+    if kind == "hourglass":
+        assert tables["models"]["calibrated"] == {"kind": "springs", "rule": "gaussian", "hourglass": springs.hourglass}
+        assert springs.hourglass == pytest.approx(factor, rel=1e-9)
+    else:
+        assert tables["material"]["young"] == pytest.approx(9e3 * factor, rel=1e-9)
+        assert found.problem.material is not None and found.problem.material.poisson == 0.3
+
+
 def test_files_of_a_study_are_found_from_where_the_calibrated_one_stands(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     write_mesh(rectangle((0.04, 0.01), (8, 2)), tmp_path / "there" / "body.vtu")

@@ -133,7 +133,7 @@ def _cubes(poisson: float) -> Problem:
 
 @pytest.mark.parametrize("body", ["squares", "cubes"])
 def test_hourglass_and_moduli_are_recovered_from_the_displacement(body: str) -> None:
-    """On distorted cubes the force is a nonlinear function of `hourglass` with a kink at 1, where the search begins."""
+    """On distorted cubes the force is nonlinear in `hourglass`, with a kink at 1, where the search begins."""
     problem = cantilever((8, 2)) if body == "squares" else _cubes(0.0)
     springs = ts.Springs("gaussian", hourglass=1.0)
     known = case_of(problem, ts.Springs("gaussian", hourglass=1.3), 2)

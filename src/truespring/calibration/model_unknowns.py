@@ -160,20 +160,24 @@ class ScaledMaterials(Model):
 
 
 def scaled(material: Material, factor: float) -> Material:
-    """Return a material whose moduli, and constants of laws with the unit of a modulus, are multiplied by a factor."""
+    """Return a material whose moduli, of laws and fibres too, are multiplied by a factor [-]."""
     constants = {
-        name: value * (factor if _is_modulus(name) else 1.0) for name, value in dict(material.constants).items()
+        name: value * (factor if name in _moduli() else 1.0) for name, value in dict(material.constants).items()
     }
-    return replace(material, young=factor * material.young, constants=constants)
+    fibres = None if material.fibres is None else replace(material.fibres, k1=factor * material.fibres.k1)
+    return replace(material, young=factor * material.young, constants=constants, fibres=fibres)
 
 
-def _is_modulus(name: str) -> bool:
-    """Return whether a constant of a law has the unit of a modulus."""
-    return any(law.constants[name].dimension == "stress" for law in LAWS.values() if name in law.constants)
+def _moduli() -> set[str]:
+    """Return the keys of a material that are moduli, and the key k1 of its fibres."""
+    of_laws = {name for law in LAWS.values() for name, one in law.constants.items() if one.dimension == "stress"}
+    return of_laws | {"young", "mu", "bulk", "k1"}
 
 
 def _scale_table(table: dict[str, Any], factor: float) -> None:
-    """Multiply the moduli in a table `[material]` or `[[region]]` of a study."""
+    """Multiply the moduli in a table `[material]` or `[[region]]` of a study, and in the table of its fibres."""
     for key, value in table.items():
-        if key == "young" or _is_modulus(key):
+        if isinstance(value, dict):
+            _scale_table(value, factor)
+        elif key in _moduli():
             table[key] = factor * to_si(value, "stress")
