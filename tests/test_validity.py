@@ -589,6 +589,25 @@ def test_all_rules_have_a_volume_term_where_poisson_asks_for_one(
         assert all(one.springs.volume == one.name.endswith("+volume") for one in found)
 
 
+def test_variants_of_gaussian_springs_are_mapped(tmp_path: Path) -> None:
+    """By name and in sentences; those of second order on triangles alone."""
+    springs = ('rule = "lloyd"\n', 'rule = "gaussian"\nhourglass = 1.2\nlaw = "gent"\n')
+    for name, changes in (
+        ("squares", ()),
+        ("triangles", (("elements = [8, 2]\n", 'elements = [8, 2]\nelement = "triangle"\n'),)),
+    ):
+        study = read_study(written(tmp_path, changed(*changes)))
+        found = {one.name: one for one in mapped_springs(study, ["all"], False)}
+        assert ("gaussian+quadratic" in found) == (name == "triangles")
+        assert found["gaussian"].words == "Gaussian springs"
+        assert not {"isotropic+quadratic", "gaussian+volume"} & set(found)
+    assert found["gaussian+quadratic"].words == "Gaussian springs of second order"
+    text = changed(springs, ("poisson = 0.3\n", "poisson = 0.3\njm = 30\n"))
+    (own,) = mapped_springs(read_study(written(tmp_path, text)), None, False)
+    assert own.name == "springs" and own.words == "Gaussian springs with law gent, hourglass 1.2"
+    assert mapped_springs(study, ["gaussian+quadratic"], False)[0].springs.element == "quadratic"
+
+
 def test_what_is_mapped_is_named_by_what_is_its_own() -> None:
     assert _spot(Spot(poisson=0.25)) == " (Poisson's ratio 0.25)" and _spot(Spot()) == ""
     depths = np.array([1.0, 2.0, 3.0, 4.0])

@@ -9,6 +9,7 @@ from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_wor
 def _add(parser: argparse.ArgumentParser) -> None:
     from truespring.models import LAWS, RULES
     from truespring.validity import LOAD_TYPES
+    from truespring.validity.rules import VARIANTS
 
     parser.add_argument("study", help="study file (TOML)")
     parser.add_argument(
@@ -31,7 +32,8 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--rule",
         action="append",
         metavar="R",
-        help=f"springs model of the study, a rule ({', '.join(RULES)}), RULE+volume, or all, the rules for its mesh; "
+        help=f"springs model of the study, a rule ({', '.join(RULES)}), RULE+VARIANT ({', '.join(VARIANTS)}), "
+        "or all, the rules for its mesh; "
         "repeat for several; default: the springs of the study, or all",
     )
     parser.add_argument("--x", default="load", metavar="A", help="load, depth, aspect or poisson; default: load")

@@ -82,16 +82,20 @@ class Springs(Model):
             raise ModelError(f"k_body = {self.k_body}: must be finite")
         if self.k_body is not None and self.rule is None:
             raise ModelError("k_body requires the rule isotropic; with stiffness, use its key body")
-        name = next((name for name in self._parameters if name != "law"), None)
+        name = next((name for name in self.parameters if name != "law"), None)
         if self.rule is None and name is not None:
             owners = [rule for rule, entry in RULES.items() if name in entry.parameters]
             raise ModelError(f"{name} requires a rule ({', '.join(owners)}), not stiffness")
-        if self.sharing == "single" and (self.volume or self.coupled):
-            what = "volume = true" if self.volume else f"rule = '{self.rule}'"
-            raise ModelError(f"{what} requires sharing = 'summed', not sharing = 'single'")
         if self.volume and self.coupled:
             raise ModelError(
-                f"rule = '{self.rule}' has the Poisson's ratio of the material without a volume term: remove volume"
+                f"volume = true: the law of rule = '{self.rule}' contains the energy of the change of volume, so that "
+                "the Poisson's ratio is that of the material: remove volume"
+            )
+        if self.sharing == "single" and (self.volume or self.coupled):
+            what = "volume = true" if self.volume else f"rule = '{self.rule}'"
+            raise ModelError(
+                f"sharing = 'single': with {what} the springs of an element have the moduli of the material, and those "
+                "that elements share sum: remove sharing"
             )
         if self.law is not None:
             check_law(self.law, self.rule)
@@ -130,7 +134,7 @@ class Springs(Model):
     def label(self) -> str:
         """Name in figures and tables."""
         words = [self.rule or "own stiffness"]
-        words += [f"{name} {value}" for name, value in self._parameters.items()]
+        words += [f"{name} {value}" for name, value in self.parameters.items()]
         words += ["single"] if self.sharing == "single" else []
         words += ["volume"] if self.volume else []
         return f"springs ({', '.join(words)})"
@@ -157,10 +161,10 @@ class Springs(Model):
         """Return the stiffness of links [N/m], shape (n_elements, links), before scaling for a volume term."""
         if self.stiffness is not None:
             return user_stiffness(problem, self.stiffness)
-        return rule_stiffness(problem, str(self.rule), self._parameters)
+        return rule_stiffness(problem, str(self.rule), self.parameters)
 
     @property
-    def _parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, Any]:
         """Parameters of the rule that are set, by name."""
         names = dict.fromkeys(name for rule in RULES.values() for name in rule.parameters)
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
@@ -204,8 +208,8 @@ class Springs(Model):
         """Return the potential of the springs; raise ModelError if one has a negative stiffness, unless allowed."""
         build = None if self.rule is None else RULES[self.rule].potential
         if build is not None:
-            check_rule(problem, str(self.rule), self._parameters)
-            return build(problem, **self._parameters)
+            check_rule(problem, str(self.rule), self.parameters)
+            return build(problem, **self.parameters)
         network = self.network(problem, self.element_stiffness(problem))
         return VolumeSprings(network, VolumeTerm(problem, self.kappa(problem))) if self.volume else network
 

@@ -79,11 +79,12 @@ def _section(moduli: Moduli, depth: int) -> str:
 
 
 def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
-    """Return a table of the stiffness rules: elements, idea, effective moduli and source."""
+    """Return a table of the stiffness rules: elements, idea, effective moduli, keys and source."""
     table = new_table("Stiffness rules", "rule", "", "uses nu", "")
     for name, rule in rules.items():
         uses = "yes" if rule["follows_poisson"] else "no"
-        words = f"{rule['idea']}\n{rule['realises']}\nSource: {rule['source']}"
+        keys = f"\nOptional keys: {', '.join(rule['parameters'])}" if rule["parameters"] else ""
+        words = f"{rule['idea']}\n{rule['realises']}{keys}\nSource: {rule['source']}"
         table.add_row(name, "\n".join(rule["elements"]), uses, words, end_section=True)
     return table
 

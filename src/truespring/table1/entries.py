@@ -67,6 +67,10 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("MSM", "Lloyd; least squares on cubes", lambda d, nu: _lloyd(d), chief=True),
     Entry("MSM", "isotropic", lambda d, nu: Springs(rule="isotropic")),
     Entry("MSM", "isotropic with volume term", lambda d, nu: Springs(rule="isotropic", volume=True)),
+    Entry("MSM", "Gaussian", lambda d, nu: Springs(rule="gaussian")),
+    Entry(
+        "MSM", "Gaussian of second order", lambda d, nu: Springs(rule="gaussian", element="quadratic"), simplices=True
+    ),
     Entry("HEML", "squares, cubes; St. Venant-Kirchhoff", lambda d, nu: Heml("saint-venant-kirchhoff"), chief=True),
     Entry("HEML", "simplices; St. Venant-Kirchhoff", lambda d, nu: Heml("saint-venant-kirchhoff"), simplices=True),
     Entry("HEML", "simplices; neo-Hookean", lambda d, nu: Heml("neo-hookean"), simplices=True),

@@ -54,7 +54,7 @@ def map_validity(
         study: a study or its file.
         law: law of the reference, a key of LAWS; the reference is solved on finer meshes until it converges.
         loads: load types, keys of LOAD_TYPES, or "all"; by default the load of the study.
-        rules: names of springs models of the study, rules, "RULE+volume", or "all"; by default the springs of the
+        rules: names of springs models of the study, rules, "RULE+VARIANT", or "all"; by default the springs of the
             study, or all rules if it has none.
         x: "load", "depth", "aspect" or "poisson"; without the load, errors are those at its last size.
         y: another of them, "rule", "load-type" or None; for a mesh from a file "depth" becomes "rule".

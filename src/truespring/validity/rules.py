@@ -1,7 +1,10 @@
 """The springs of a map: those of the study, or all rules for its elements."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +23,15 @@ _WORDS = {
     "projected": "projected springs",
     "van-gelder": "springs by Van Gelder's rule",
     "biquadratic": "biquadratic springs",
+    "gaussian": "Gaussian springs",
 }
+
+#: Variants of a rule by their name after RULE+: attributes of Springs.
+VARIANTS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {"volume": {"volume": True}, "quadratic": {"element": "quadratic"}}
+)
+
+_ALL_PARAMETERS = {name for rule in RULES.values() for name in rule.parameters}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,15 +51,19 @@ class MappedSprings:
             if one.rule is None
             else _WORDS.get(one.rule, f"{one.rule} springs")
         )
-        words += f" with k_body {one.k_body:g}" if one.k_body is not None else ""
+        words += " of second order" if one.element is not None else ""
+        parameters = {name: value for name, value in one.parameters.items() if name != "element"}
+        words += " with " if parameters else ""
+        words += ", ".join(f"{name} {value}" for name, value in parameters.items())
         words += ", unsummed," if one.sharing == "single" else ""
         return words + (" with a volume term" if one.volume else "")
 
 
 def mapped_springs(study: Study, names: Sequence[str] | None, varies_poisson: bool) -> list[MappedSprings]:
-    """Return springs by names of models of the study, rules, "RULE+volume" or "all"; None is those of the study.
+    """Return springs by names of models of the study, rules, RULE+VARIANT or "all"; None is those of the study.
 
-    "all" are the distinct rules for the mesh; if Poisson's ratio is not that of plain springs, also with a volume term.
+    "all" are the distinct rules for the mesh and their variants, those with a volume term only if Poisson's ratio is
+    not that of plain springs.
     Raises StudyError for unknown names.
     """
     own = springs_by_rule(study.entries)
@@ -68,36 +83,49 @@ def mapped_springs(study: Study, names: Sequence[str] | None, varies_poisson: bo
 
 
 def _rule_name(springs: Springs) -> str:
-    """Return RULE or RULE+volume if it gives exactly these springs, else an empty text."""
-    plain = springs.rule is not None and springs == Springs(springs.rule, volume=springs.volume)
-    return f"{springs.rule}{'+volume' if springs.volume else ''}" if plain else ""
+    """Return RULE or RULE+VARIANT if it gives exactly these springs, else an empty text."""
+    if springs.rule is None:
+        return ""
+    known = {springs.rule: Springs(springs.rule), **_variants(springs.rule)}
+    return next((name for name, one in known.items() if one == springs), "")
+
+
+def _variants(rule: str) -> dict[str, Springs]:
+    """Return the variants of a rule by name; the mesh may not suit them."""
+    found = {}
+    for name, attributes in VARIANTS.items():
+        with suppress(ModelError):
+            found[f"{rule}+{name}"] = Springs(rule, **attributes)
+    needed = {f"{rule}+{name}": attributes.keys() & _ALL_PARAMETERS for name, attributes in VARIANTS.items()}
+    return {name: one for name, one in found.items() if needed[name] <= set(RULES[rule].parameters)}
 
 
 def _named(name: str, own: dict[str, Springs], study: Study) -> Springs:
     if name in own:
         return own[name]
-    rule, _, volume = name.partition("+")
-    if rule not in RULES or volume not in ("", "volume"):
-        allowed = [*own, *RULES, *(f"{one}+volume" for one in RULES if not RULES[one].coupled), "all"]
+    known = {known: springs for rule in RULES for known, springs in {rule: Springs(rule), **_variants(rule)}.items()}
+    if name not in known:
+        allowed = [*own, *RULES, *(one for one in known if one not in RULES), "all"]
         raise StudyError(f"rule '{name}' is unknown{nearest(name, allowed)}; allowed: {', '.join(allowed)}")
+    rule = str(known[name].rule)
     if not RULES[rule].takes(study.problem.mesh):
         fit = [one for one in RULES if RULES[one].takes(study.problem.mesh)]
         raise StudyError(
             f"rule '{rule}' is not for {study.problem.mesh.kinds} elements, those of this study; "
             f"allowed: {', '.join(fit)}"
         )
-    return Springs(rule, volume=bool(volume))
+    return known[name]
 
 
 def _all(problem: Problem, varies_poisson: bool) -> dict[str, Springs]:
     found = {name: Springs(name) for name, rule in RULES.items() if rule.takes(problem.mesh)}
     assert problem.material is not None and problem.section is not None  # a body has both
     _, poisson = problem.section.apparent_moduli(problem.material)
-    if varies_poisson or abs(poisson - _CAUCHY[problem.mesh.dim]) > _SAME:
-        for name in list(found):
-            springs = None if found[name].coupled else Springs(name, volume=True)
-            if springs is not None and _goes(problem, springs):
-                found[f"{name}+volume"] = springs
+    is_cauchy = not varies_poisson and abs(poisson - _CAUCHY[problem.mesh.dim]) <= _SAME
+    for rule in list(found):
+        for name, springs in _variants(rule).items():
+            if not (springs.volume and is_cauchy) and _goes(problem, springs):
+                found[name] = springs
     return found
 
 

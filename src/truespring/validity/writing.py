@@ -122,7 +122,12 @@ def _map_values(validity: Maps, one: Map) -> dict[str, Any]:
         "size_scale": one.load.scale,
         "rule": one.rule.name,
         "same_springs": list(one.rule.same),
-        "springs": {"rule": springs.rule, "volume": springs.volume, "sharing": springs.sharing},
+        "springs": {
+            "rule": springs.rule,
+            "volume": springs.volume,
+            "sharing": springs.sharing,
+            **springs.parameters,
+        },
         "verdict": verdict(validity, one),
         "refused": one.unavailable or None,
         "x": one.x,
