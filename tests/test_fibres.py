@@ -441,6 +441,16 @@ def test_no_model_ignores_fibres(name: str) -> None:
         assert ts.solve(without, model).states[-1].displacement[:, 0].min() < 0
 
 
+def test_an_active_tension_inside_a_block_of_boundary_elements_is_an_error() -> None:
+    mesh = ts.rectangle((4.0, 2.0), (8, 4))
+    left, right = (np.flatnonzero(side) for side in (mesh.centres[:, 0] < 2, mesh.centres[:, 0] > 2.5))
+    tension = ts.ActiveTension(1e-3, on=left)  # type: ignore[arg-type]
+    problem = body(mesh, (1.0, 0.0), k1=0.0, loads=[tension], supports=[ts.Fixed("left")])
+    with pytest.raises(ModelError, match="inside"):
+        ts.BemSprings(block=left).potential(problem)  # type: ignore[arg-type]
+    assert ts.solve(problem, ts.BemSprings(block=right)).status is ts.Status.CONVERGED  # type: ignore[arg-type]
+
+
 def test_exports_do_not_leave_fibres_out(tmp_path: Path) -> None:
     pull, left = ts.Force("right", (0.01, 0.0)), ts.Fixed("left")
     problem = body(ts.rectangle((1.0, 1.0), (2, 2)), (1.0, 0.0), loads=[pull], supports=[left])

@@ -130,7 +130,7 @@ def _check_inside(problem: Problem, inside: Ints) -> None:
     """Raise ModelError if a load or support acts inside the block."""
     everywhere = next((load.words() for load in problem.loads if load.on is None), None)
     loading = problem.loading
-    loaded = np.flatnonzero(loading.external_force[inside].any(axis=1))
+    loaded = np.flatnonzero(loading.force(problem.mesh.nodes)[inside].any(axis=1))
     held = np.flatnonzero(loading.held[inside].any(axis=1))
     if everywhere or loaded.size:
         where = (

@@ -78,7 +78,8 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
     out. VTK (.vtk, .vtu, .vtp, .vts, .vtr, and .pvtu and the like with their pieces in the same folder):
     unstructured grids, surfaces and structured grids; pieces are joined where their points coincide. An integer
     cell array with at most 64 values becomes groups named ARRAY-VALUE, of the cells of the highest dimension that
-    have the value; an integer point array of values 0 and 1 becomes the group ARRAY, of the points with 1.
+    have the value; an integer point array of values 0 and 1 becomes the group ARRAY, of the points with 1. A cell
+    array of three components becomes one of `Mesh.element_vectors`, for the directions of fibres.
 
     The elements of the highest dimension form the body, in the file's order; cells of a lower dimension only
     define groups: those of one dimension less define facets of the body. Each group of elements or facets
