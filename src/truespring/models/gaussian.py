@@ -17,7 +17,7 @@ from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
 from truespring.models.laws import LAWS
 from truespring.models.spring_data import PRESSURE, SpringData
-from truespring.models.summed import Summed
+from truespring.models.summed import SummedSprings
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
@@ -400,32 +400,16 @@ class GaussianElements:
         return np.asarray(stress / (state.ratio * np.sqrt(C_33))[:, None, None])
 
 
-class SummedGaussian(Summed[GaussianElements]):
+class SummedGaussian(SummedSprings[GaussianElements]):
     """Gaussian springs on elements of several kinds."""
 
     cell_note = CHANGE_OF_TENSION
-
-    @cached_property
-    def _shared(self) -> tuple[Ints, Ints]:
-        """Springs, each pair of nodes once, and the number of the spring of each line of the parts."""
-        lines = np.sort(np.concatenate([part.springs for part in self.parts]), axis=1)
-        springs, of = np.unique(lines, axis=0, return_inverse=True)
-        return springs, of.ravel()
-
-    @property
-    def springs(self) -> Ints:
-        """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
-        return self._shared[0]
 
     @property
     def stiffness(self) -> Floats:
         """Stiffness of the undeformed springs [N/m], shape (n_springs,)."""
         own = np.concatenate([part.stiffness for part in self.parts])
         return np.bincount(self._shared[1], own, len(self.springs)).astype(np.float64, copy=False)
-
-    def stretch(self, positions: Floats) -> Floats:
-        """Return length over undeformed length of each part's springs [-], kind by kind, shape (n,)."""
-        return np.concatenate([part.stretch(positions) for part in self.parts])
 
     def spring_data(self) -> SpringData:
         """Return springs, elements and constants of the volume function as arrays; see docs/export/arrays.md."""

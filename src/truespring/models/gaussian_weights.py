@@ -29,7 +29,7 @@ _MODES = np.stack([*(np.delete(_SIGNS, axis, axis=1).prod(axis=1) for axis in ra
 
 
 def default_hourglass(problem: Problem, poisson: float) -> float:
-    """Return the default of `hourglass` for a material on the mesh of a problem; see docs/models.md for its source."""
+    """Return the default of `hourglass` for a material on the mesh of a problem; see docs/hourglass.md."""
     if problem.mesh.dim == 2:
         return 1.0
     return STEPPED_HOURGLASS if has_stepped_surface(problem.mesh) else 1 / (1 + poisson**2)

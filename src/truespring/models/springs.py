@@ -52,7 +52,7 @@ class Springs(Model):
             of the material, from 0 to 0.5; the springs are rescaled.
         k_body: stiffness of each body diagonal of a cube in E h, for the rule isotropic.
         hourglass: stiffness of the hourglass modes over that of finite elements, for the rule gaussian; by default,
-            None, 1 in the plane, and in space a function of Poisson's ratio (see docs/models.md).
+            None, 1 in the plane, and in space a function of Poisson's ratio (see docs/hourglass.md).
         element: "quadratic" for springs between all nodes of triangles or tetrahedra of second order, for the rule
             gaussian.
         law: of the rule gaussian the constitutive law, one of GAUSSIAN_LAWS, by default, None, neo-hookean; of other

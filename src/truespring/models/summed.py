@@ -14,7 +14,7 @@ from truespring.models.fem_potential import FemPotential
 from truespring.models.law import Law
 from truespring.models.linked import LinkedElements
 from truespring.models.spring_data import COUPLING, SpringData
-from truespring.potential import Projectable, SparseMatrix, Stressed
+from truespring.potential import Projectable, SparseMatrix, Stressed, Stretched
 from truespring.problem import Problem
 
 
@@ -26,7 +26,12 @@ class SummablePart(Stressed, Projectable, Protocol):
         ...
 
 
+class SummableSprings(SummablePart, Stretched, Protocol):
+    """A potential of springs on elements of one kind."""
+
+
 Part = TypeVar("Part", bound=SummablePart)
+SpringPart = TypeVar("SpringPart", bound=SummableSprings)
 
 
 class _Blocks(NamedTuple):
@@ -148,8 +153,8 @@ class SummedElements(Summed[FemPotential]):
         return self._by_part(lambda part: part.cell_fields(positions))
 
 
-class SummedLinks(Summed[Any]):
-    """Elements of several kinds whose energy is a function of the squared lengths of links."""
+class SummedSprings(Summed[SpringPart]):
+    """Elements of several kinds with springs between their nodes."""
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints]:
@@ -164,8 +169,12 @@ class SummedLinks(Summed[Any]):
         return self._shared[0]
 
     def stretch(self, positions: Floats) -> Floats:
-        """Return length over rest length of each element's links [-], kind by kind, shape (n,)."""
+        """Return length over undeformed length of each part's springs [-], kind by kind, shape (n,)."""
         return np.concatenate([part.stretch(positions) for part in self.parts])
+
+
+class SummedLinks(SummedSprings[Any]):
+    """Elements of several kinds whose energy is a function of the squared lengths of links."""
 
     def spring_data(self) -> SpringData:
         """Return the springs and, for each kind of element, numbers, links and coupling [J/m^4], as arrays."""
