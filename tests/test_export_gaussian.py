@@ -19,6 +19,7 @@ _MIXED = ts.Mesh.of_kinds(
 )
 _SHEET, _SLICE = ts.PlaneStress(0.01), ts.PlaneStrain(0.01)
 _STIFF = ts.Material(20e3, 0.4, constants={"jm": 20.0})
+_FIBRES = ts.Fibres([(1.0, 0.5), (0.0, 1.0)], 5e3, 2.0)
 
 #: Mesh, section and parameters of the rule.
 BODIES: dict[str, tuple[ts.Mesh, Any, dict[str, Any]]] = {
@@ -27,8 +28,10 @@ BODIES: dict[str, tuple[ts.Mesh, Any, dict[str, Any]]] = {
     "plane stress": (_STRIP, _SHEET, {"hourglass": 1.3}),
     "mixed": (_MIXED, _SHEET, {}),
     "gent": (_MIXED, _SLICE, {"law": "gent"}),
+    "fibres": (_STRIP, _SHEET, {}),
     "ten nodes": (ts.box((0.02, 0.01, 0.01), (1, 1, 1), element="tetrahedron"), None, {"element": "quadratic"}),
     "six nodes": (ts.rectangle((0.02, 0.01), (2, 1), element="triangle"), _SHEET, {"element": "quadratic"}),
+    "six nodes, fibres": (ts.rectangle((0.02, 0.01), (2, 1), element="triangle"), _SLICE, {"element": "quadratic"}),
 }
 
 
@@ -36,7 +39,7 @@ def solved(body: str) -> Exported:
     mesh, section, rule = BODIES[body]
     problem = ts.Problem(
         mesh,
-        ts.Material(10e3, 0.3, constants={"jm": 30.0}),
+        ts.Material(10e3, 0.3, constants={"jm": 30.0}, fibres=_FIBRES if "fibres" in body else None),
         section,
         supports=[ts.Fixed(on="left")],
         loads=[ts.Force(on="right", total=(0.02, 0.03, 0.01)[: mesh.dim])],
@@ -94,10 +97,26 @@ def elements(own: Mapping[str, Any], values: Mapping[str, Any], x: Floats, force
         np.add.at(force, nodes[:, own["links"][:, 1]], pull)
     else:
         density, pressure = volume_function(own, values, log, own["mu"], own["lam"], 0.0)
+    for weights in own.get("fibre_weights", ()):
+        ends = x[nodes[:, own["links"]]]
+        across = ends[:, :, 1] - ends[:, :, 0]
+        of_fibres, slope_4 = fibre_energy((weights * (across**2).sum(axis=2)).sum(axis=1) / V0, own)
+        density = density + of_fibres
+        pull = 2 * slope_4[:, None, None] * weights[:, :, None] * across
+        np.add.at(force, nodes[:, own["links"][:, 0]], -pull)
+        np.add.at(force, nodes[:, own["links"][:, 1]], pull)
     pushes = (pressure / np.exp(log))[:, None, None, None] * slope
     np.add.at(force, simplices[:, :, 1:], pushes)
     np.add.at(force, simplices[:, :, 0], -pushes.sum(axis=2))
     return float((V0 * density).sum())
+
+
+def fibre_energy(I4: Floats, own: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Return the energy density of fibres [J/m^3] and its derivative by the square of the stretch [Pa]."""
+    k1, k2 = (own[name].reshape(-1, *[1] * (I4.ndim - 1)) for name in ("k1", "k2"))
+    strain = np.maximum(I4 - 1, 0.0)
+    safe = np.where(k2 > 0, k2, 1.0)
+    return k1 / (2 * safe) * np.expm1(k2 * strain**2), k1 * strain * np.exp(k2 * strain**2)
 
 
 def volume_function(own: Any, values: Any, log: Floats, mu: Floats, lam: Floats, mean: Any) -> tuple[Floats, Floats]:
@@ -129,6 +148,12 @@ def points(own: Mapping[str, Any], values: Mapping[str, Any], x: Floats, force: 
         energy = ((missing * mu - mu * np.log(J) + lam / 2 * np.log(mean) ** 2) * volume).sum()
         pressure = lam * np.log(mean) * J / mean - mu
     np.add.at(force, nodes, np.einsum("ep,epji,epaj->eai", pressure * volume, inverse, gradients))
+    for directions in own.get("fibre_directions", ()):
+        along = np.einsum("epij,ej->epi", F, directions)
+        density, slope = fibre_energy((along**2).sum(axis=2), own)
+        energy += (density * volume).sum()
+        parts = 2 * slope * volume, along, gradients, directions
+        np.add.at(force, nodes, np.einsum("ep,epi,epaj,ej->eai", *parts))
     return float(energy)
 
 

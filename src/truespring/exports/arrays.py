@@ -24,6 +24,8 @@ _UNITS = {
     "lam": "Pa",
     "mu": "Pa",
     "link_weights": "m",
+    "fibre_weights": "m",
+    "k1": "Pa",
     "gradients": "1/m",
     "point_volume": "m^3",
     "prescribed_displacement": "m",

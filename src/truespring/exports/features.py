@@ -78,14 +78,15 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
 
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
     """Raise UntakenError for the first feature of springs or loads that is not in `takes`, ExportError for fibres."""
-    refuse_fibres(problem, program)
+    if springs.beyond != PRESSURE:  # the arrays of these contain the fibres
+        refuse_fibres(problem, program)
     for feature, where in features(problem, springs):
         if feature not in takes:
             raise UntakenError(feature, f"{program} does not support {feature}: {where}")
 
 
 def refuse_fibres(problem: Problem, program: str) -> None:
-    """Raise ExportError if the material has fibres with a stiffness, which no target has."""
+    """Raise ExportError if the material has fibres with a stiffness."""
     if stiff_fibres(problem) is not None:
         raise ExportError(
             f"{program}: the fibres of the material are not exported: solve it here, or remove the fibres or set their "

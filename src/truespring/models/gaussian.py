@@ -305,7 +305,8 @@ class GaussianElements:
     def element_arrays(self) -> dict[str, Any]:
         """Return the elements as arrays: undeformed volumes, constants of the law, simplices of an element.
 
-        If the stiffness of the springs is not constant, also the weight of each link; see docs/export/arrays.md.
+        If the law does not have springs of constant stiffness, also the weight of each link, and if there are fibres
+        those of each family; see docs/export/arrays.md.
         """
         constants, kind, n = self._by_element, self.problem.mesh.kind, len(self._volumes)
         values = {"lam": constants.lam, "mu": constants.mu, **constants.values}
@@ -313,9 +314,13 @@ class GaussianElements:
         found |= {"simplices": np.array(kind.simplices), "simplex_weight": np.array(kind.simplex_weight)}
         if self.constant:
             return found
-        links = np.array(kind.links)
-        weights = -self.laplacians.matrices[:, :, links[:, 0], links[:, 1]][:, self.laplacians.of]
-        return found | {"links": links, "link_weights": weights[0]}
+        found |= {"links": np.array(kind.links)}
+        weights = self._link_weights()
+        if not self.law.constant_springs:
+            found |= {"link_weights": weights[0]}
+        if self.fibres is not None:
+            found |= {"fibre_weights": weights[1:], "k1": self.fibres.k1, "k2": self.fibres.k2}
+        return found
 
     @cached_property
     def _shared(self) -> tuple[Ints, Ints, Ints]:
@@ -324,16 +329,15 @@ class GaussianElements:
         from truespring.kernels.threads import writable
 
         mesh = self.problem.mesh
-        weights = np.abs(self._link_weights(np.ones(len(mesh.elements))))
+        weights = np.abs(self._link_weights()).max(axis=0)
         present = np.flatnonzero(weights.ravel() > _ROUNDING * weights.max())
         pairs = mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2)[present]
         return (*unique_pairs(writable(pairs), mesh.n_nodes), present)
 
-    def _link_weights(self, factors: Floats) -> Floats:
-        """Return twice `factors` [Pa] times the weight of each link [N/m], shape (n_elements, links)."""
+    def _link_weights(self) -> Floats:
+        """Return the weight of each link in each quadratic form [m], shape (n_forms, n_elements, links)."""
         links = np.array(self.problem.mesh.kind.links)
-        own = -self.laplacians.matrices[0][:, links[:, 0], links[:, 1]]
-        return np.asarray(2 * factors[:, None] * own[self.laplacians.of])
+        return np.asarray(-self.laplacians.matrices[:, :, links[:, 0], links[:, 1]][:, self.laplacians.of])
 
     @property
     def springs(self) -> Ints:
@@ -351,7 +355,8 @@ class GaussianElements:
         return self._stiffness(self._at_rest)
 
     def _stiffness(self, state: _State) -> Floats:
-        return self._summed(self._link_weights(state.law.at.by_trace))
+        factors = self._stress(state)[:-1]
+        return self._summed(2 * np.einsum("fe,fel->el", factors, self._link_weights()))
 
     def stretch(self, positions: Floats) -> Floats:
         """Return length over undeformed length of each spring [-], shape (n_springs,)."""

@@ -122,6 +122,8 @@ class _BetweenAllNodes(QuadraticPotential):
             "gradients": gradients,
             "point_volume": volumes,
         }
+        if self.fibres is not None:
+            arrays |= {"fibre_directions": self.fibres.directions, "k1": self.fibres.k1, "k2": self.fibres.k2}
         return SpringData(None, arrays, PRESSURE)
 
     @property
