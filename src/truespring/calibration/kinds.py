@@ -82,7 +82,7 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str | None = None) -
     if springs.element is not None:
         raise ModelError(
             f"element = '{springs.element}': springs between all nodes cannot be calibrated: they are finite elements "
-            "of second order; remove element, or fit the material by another program"
+            "of second order; remove element"
         )
     if not UNKNOWNS[kind].suits(springs):
         allowed = ", ".join(name for name, one in UNKNOWNS.items() if one.suits(springs))
