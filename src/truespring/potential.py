@@ -79,6 +79,16 @@ class Stressed(Potential, Protocol):
 
 
 @runtime_checkable
+class Unstressed(Potential, Protocol):
+    """A potential that may state without an eigenvalue problem that its undeformed body is stable."""
+
+    @property
+    def semidefinite_at_rest(self) -> bool:
+        """Whether the Hessian at `nodes` is known to have no negative eigenvalue, but for rounding errors."""
+        ...
+
+
+@runtime_checkable
 class Stretched(Potential, Protocol):
     """A potential of springs."""
 

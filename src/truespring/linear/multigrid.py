@@ -163,12 +163,13 @@ class Hierarchy:
     Attributes:
         transfers: prolongation to the finest level, then to each coarser one.
         levels: levels between the finest and the coarsest one.
-        inverse: inverse of the coarsest matrix, shape (n, n).
+        inverse: inverse of the coarsest matrix, shape (n, n); None if the coarsest level is only smoothed, as its nodes
+            have no strong neighbours.
     """
 
     transfers: list[Transfer]
     levels: list[Level]
-    inverse: Floats
+    inverse: Floats | None
 
     @cached_property
     def _room(self) -> list[tuple[Floats, Floats]]:
@@ -180,7 +181,8 @@ class Hierarchy:
     def n_bytes(self) -> int:
         """Memory of all levels [bytes]."""
         transfers = sum(transfer.n_bytes for transfer in self.transfers)
-        return self.inverse.nbytes + transfers + sum(level.n_bytes for level in self.levels)
+        dense = 0 if self.inverse is None else self.inverse.nbytes
+        return dense + transfers + sum(level.n_bytes for level in self.levels)
 
     def cycle(self, finest: Level, turns: Floats, residual: Floats) -> Floats:
         """Return an approximate solution z [m] of A z = residual by one V-cycle, shape (n_nodes, dim).
@@ -193,19 +195,33 @@ class Hierarchy:
 
     def _cycle(self, depth: int, level: Level, r: Floats, turns: Floats | None) -> Floats:
         """Return an approximate solution on the level `depth`; only the finest has `turns`."""
-        from truespring.kernels import blocks, multigrid
-        from truespring.kernels.threads import run, run_on
+        from truespring.kernels import blocks
+        from truespring.kernels.threads import run_on
 
-        if depth == len(self.transfers):
+        coarsest = depth == len(self.transfers)
+        if coarsest and self.inverse is not None:
             solution = np.empty(r.size)
             blocks.dense(0, r.size, self.inverse, r.ravel(), solution)
             return solution.reshape(r.shape)
-        n, size = level.shape
-        zero, bounds = (0.0,) * size, level.bounds
+        zero, bounds = (0.0,) * level.shape[1], level.bounds
         matrix = (level.starts, level.columns, level.lower)
-        z, left = self._room[depth]
+        z, left = (np.empty(r.shape), np.empty(r.shape)) if coarsest else self._room[depth]
         run_on(level.pieces, blocks.sweep_forward, *matrix, level.inverse, level.added, r, z, left, zero)
+        if not coarsest:
+            blocks.subtract_across(bounds, *matrix, z, left, zero)
+            self._correct(depth, level, z, left, turns)
+        left[:] = r
         blocks.subtract_across(bounds, *matrix, z, left, zero)
+        run_on(level.pieces, blocks.sweep_backward, *matrix, level.inverse, level.added, left, z, zero)
+        return z
+
+    def _correct(self, depth: int, level: Level, z: Floats, left: Floats, turns: Floats | None) -> None:
+        """Add the correction of the coarser levels to z on the level `depth`; its residual `left` is overwritten."""
+        from truespring.kernels import multigrid
+        from truespring.kernels.threads import run
+
+        n, size = level.shape
+        zero = (0.0,) * size
         if turns is not None:
             run(multigrid.turn_back, n, turns, left, zero)
         transfer = self.transfers[depth]
@@ -223,10 +239,6 @@ class Hierarchy:
             run(multigrid.prolong, n, *by_row, correction, z, modes, zero, smallest=share)
         else:
             run(multigrid.prolong_turned, n, *by_row, turns, correction, z, modes, zero, smallest=share)
-        left[:] = r
-        blocks.subtract_across(bounds, *matrix, z, left, zero)
-        run_on(level.pieces, blocks.sweep_backward, *matrix, level.inverse, level.added, left, z, zero)
-        return z
 
 
 def build(finest: Level, matrix: Matrix, scale: float, modes: Floats) -> Hierarchy:
@@ -237,10 +249,10 @@ def build(finest: Level, matrix: Matrix, scale: float, modes: Floats) -> Hierarc
     transfers: list[Transfer] = []
     levels: list[Level] = []
     level = finest
-    while level.shape[0] * level.shape[1] > _COARSEST and len(transfers) < _MAX_LEVELS:
-        coarsened = _coarsen(level, matrix, scale, modes)
+    while level.shape[0] * level.shape[1] > _COARSEST:
+        coarsened = _coarsen(level, matrix, scale, modes) if len(transfers) < _MAX_LEVELS else None
         if coarsened is None:
-            break
+            return Hierarchy(transfers, levels, None)
         transfer, modes, matrix = coarsened
         level, scale = empty_level(matrix.starts, matrix.columns, modes.shape[2], np.float64), 1.0
         condense(level, matrix, scale)
@@ -289,7 +301,10 @@ def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple
 
 
 def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:
-    """Return the aggregate of each node, shape (n_nodes,), -1 for none, and the number of aggregates."""
+    """Return the aggregate of each node, shape (n_nodes,), and the number of aggregates.
+
+    It is -1 for nodes without strong neighbours, for which the smoother suffices.
+    """
     from pyamg.aggregation import standard_aggregation
 
     from truespring.kernels import multigrid
@@ -305,7 +320,7 @@ def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:
     joined = sparse.csr_array(standard_aggregation(graph)[0])
     aggregate = np.full(n, -1, np.int32)
     aggregate[np.diff(joined.indptr) > 0] = joined.indices
-    return aggregate, joined.shape[1]
+    return aggregate, int(aggregate.max()) + 1
 
 
 def _largest_eigenvalue(level: Level) -> float:

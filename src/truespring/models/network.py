@@ -19,6 +19,9 @@ from truespring.models.spring_data import SpringData
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
+# Springs whose length differs from their rest length by at most this share of it have no tension, but for rounding.
+_UNSTRESSED = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class SpringNetwork(Model):
@@ -146,6 +149,12 @@ class SpringNetwork(Model):
         length = np.empty(len(self.springs))
         self._run(springs.lengths, positions, self._pattern.elements, length)
         return length
+
+    @property
+    def semidefinite_at_rest(self) -> bool:
+        """Whether no spring has a negative stiffness or a tension at rest: the Hessian is then a sum of k n n^T."""
+        change = np.abs(self.lengths(self.nodes) - self.rest_length)
+        return bool((self.stiffness >= 0).all() and (change <= _UNSTRESSED * self.rest_length).all())
 
     def stretch(self, positions: Floats) -> Floats:
         """Return length over rest length of each spring [-], shape (n_springs,)."""

@@ -29,6 +29,11 @@ class VolumeSprings:
         """Node numbers of the springs, shape (n_springs, 2)."""
         return self.network.springs
 
+    @property
+    def semidefinite_at_rest(self) -> bool:
+        """Whether the springs are, and no volume term is negative: at rest its Hessian is kappa / V0 s s^T."""
+        return self.network.semidefinite_at_rest and bool((self.term.kappa >= 0).all())
+
     def energy(self, positions: Floats) -> float:
         """Return the stored energy [J]."""
         return self.network.energy(positions) + float(self.term.element_energies(positions).sum())

@@ -13,7 +13,7 @@ from truespring.errors import ProblemError
 from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
-from truespring.potential import Potential, SparseMatrix
+from truespring.potential import Potential, SparseMatrix, Unstressed
 from truespring.solvers.cost import Cost
 
 #: Called after each iteration with load factor, iteration and relative residual.
@@ -183,11 +183,18 @@ class Balance:
             tangent = self.ready(self.hessian(state.positions, state.load_factor), state.positions)
         except SingularMatrixError:
             return Found(replace(state, negative_eigenvalues=None))
+        if not tangent.lasting and self._stable_at_rest(state):
+            return Found(replace(state, negative_eigenvalues=0))
         negative = tangent.negative_eigenvalues
         if negative is None and not tangent.lasting and self.go_direct("stability was not determined"):
             return self.judged(state)
         judged = replace(state, negative_eigenvalues=negative)
         return Found(judged, tangent if tangent.lasting else None)
+
+    def _stable_at_rest(self, state: Equilibrium) -> bool:
+        """Return whether a state is the undeformed one without load, and the potential knows that it is stable."""
+        at_rest = state.load_factor == 0 and state.positions is self.potential.nodes
+        return at_rest and isinstance(self.potential, Unstressed) and self.potential.semidefinite_at_rest
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
         """Return a tangent prepared for solving, factorised if multigrid has no coarse levels for it.
