@@ -143,6 +143,7 @@ ALLOWED = {
         "mesh",
         "material",
     },
+    "coarsening": {"models", "problem", "material", "mesh", "conditions", "potential"},
     "comparison": {"carrying", "support_errors", "solution", "problem", "mesh"},
     "support_errors": {"reactions", "solution"},
     "refining": {"comparison", "equilibrium", "models", "solvers", "potential", "problem", "mesh", "richardson"},
