@@ -15,7 +15,7 @@ from truespring.models import LAWS
 from truespring.models.fitness import judge
 from truespring.models.gaussian import GaussianElements
 from truespring.models.gaussian_rule import GAUSSIAN_LAWS
-from truespring.models.gaussian_weights import HOURGLASS_LIMITS, laplacians
+from truespring.models.gaussian_weights import HOURGLASS_LIMITS, STEPPED_HOURGLASS, default_hourglass, laplacians
 from truespring.models.heml import HEML_LAWS
 from truespring.models.law import Constants
 from truespring.models.laws import law_constants
@@ -385,3 +385,14 @@ def test_keys_of_the_rule_are_of_no_other(keys: dict[str, object]) -> None:
     for springs in ({"rule": "isotropic"}, {"stiffness": ts.UserStiffness(0.4, 0.4)}):
         with pytest.raises(ts.TruespringError, match=next(iter(keys))):
             ts.Springs(**springs, **keys).potential(body(SQUARES, "plane stress"))
+
+
+def test_stepped_bodies_are_recognised_however_they_are_turned() -> None:
+    turn = np.array([[np.cos(0.6), -np.sin(0.6), 0.0], [np.sin(0.6), np.cos(0.6), 0.0], [0.0, 0.3, 1.0]])
+    full = ts.box((4.0, 2.0, 2.0), (4, 2, 2))
+    used, numbers = np.unique(full.elements[1:], return_inverse=True)
+    stepped = ts.Mesh(full.nodes[used], numbers.reshape(-1, 8), full.element)
+    for mesh, expected in ((full, 1 / (1 + 0.45**2)), (stepped, STEPPED_HOURGLASS)):
+        for nodes in (mesh.nodes, mesh.nodes @ turn.T):
+            problem = body(ts.Mesh(nodes, mesh.elements, mesh.element), poisson=0.45)
+            assert default_hourglass(problem, 0.45) == expected

@@ -39,8 +39,8 @@ _ADVICE = {
     Status.CONVERGED: "a stable equilibrium was found at every load level",
     Status.UNSTABLE: "a real body would leave such a state; reduce the load, or add a small side force to choose a "
     "branch",
-    Status.INVERTED: "an element is inverted; reduce the load or use more load_steps: springs and "
-    "St. Venant-Kirchhoff do not resist inversion",
+    Status.INVERTED: "an element is inverted, at a corner at least; reduce the load, use more load_steps or a finer "
+    "mesh, or with rule = 'gaussian' a larger hourglass: other springs and St. Venant-Kirchhoff resist no inversion",
     Status.READ: "read from a file, which does not state whether it converged",
     Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; reduce the load, use more "
     "load_steps or another law: each has a largest load",

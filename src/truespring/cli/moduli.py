@@ -34,10 +34,9 @@ def print_moduli(screen: "Console", stem: str, several: "Iterable[Realised]", wh
 
 def _better(fitness: "Fitness") -> str:
     """Return the end of a sentence that names the rule that fits better, empty without one."""
-    better = fitness.better
-    if better is None:
-        return ""
-    return f', rule = "{better.rule}"{" with volume = true" if better.volume else ""} fits better'
+    from truespring.models.fitness import keys
+
+    return "" if fitness.better is None else f", {keys(fitness.better)} fits better"
 
 
 def _add(parser: argparse.ArgumentParser) -> None:

@@ -45,7 +45,7 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
         yield (
             Feature.PRESSURE,
             "springs of zero rest length, as those of the rule gaussian, are kept apart by a pressure in each element: "
-            "use npz or json, or a rule of pair forces, such as isotropic with law = 'neo-hookean'",
+            "use npz or json, or a rule of straight springs such as isotropic",
         )
     network = springs.network
     if network is not None:

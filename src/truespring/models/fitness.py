@@ -145,7 +145,7 @@ class _Judge:
             yield from self._remarks(springs)
             yield from self._bending(springs)
             return
-        yield f"Better: {_keys(better)}: {self._moduli(better)}."
+        yield f"Better: {keys(better)}: {self._moduli(better)}."
         yield from self._but(better)
         yield from self._remarks(better)
         yield from self._alternative()
@@ -155,7 +155,7 @@ class _Judge:
         """Yield a sentence on springs for programs that support pair forces only."""
         plain, element = self.plain(), self.problem.mesh.element
         if plain is not None:
-            yield f"For programs that support pair forces only: {_keys(plain)}."
+            yield f"For programs that support pair forces only: {keys(plain)}."
         elif min(self._above_cauchy()) >= -self.tolerance and element in _ISOTROPIC_MESH:  # else on no mesh
             yield f"Springs of pair forces only require another mesh: {_ISOTROPIC_MESH[element]}."
 
@@ -205,12 +205,12 @@ def recommended(problem: Problem) -> Springs:
     return Springs("gaussian", element="quadratic" if problem.mesh.element in SIMPLICES else None)
 
 
-def _keys(springs: Springs) -> str:
+def keys(springs: Springs) -> str:
     """Return springs as keys of a study."""
-    keys = [f'rule = "{springs.rule}"']
-    keys += [f'element = "{springs.element}"'] if springs.element else []
-    keys += ["volume = true"] if springs.volume else []
-    return ", ".join(keys)
+    found = [f'rule = "{springs.rule}"']
+    found += [f'element = "{springs.element}"'] if springs.element else []
+    found += ["volume = true"] if springs.volume else []
+    return ", ".join(found)
 
 
 def follows_poisson(rule: str) -> bool:

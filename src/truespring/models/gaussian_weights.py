@@ -20,7 +20,7 @@ HOURGLASS_LIMITS: Mapping[str, float] = MappingProxyType({"quadrilateral": 0.0, 
 
 #: Default of `hourglass` on lattices of bricks with a stepped surface, such as voxels.
 STEPPED_HOURGLASS = 1.2
-# Share of the bounding box below which equal bricks have a stepped surface.
+# Share of the elements of a bounding box below which equal bricks have a stepped surface.
 _FILLED = 0.99
 
 # Hourglass modes of a hexahedron, the products yz, xz, xy and xyz of its corners' signs, shape (8, 4).
@@ -36,10 +36,16 @@ def default_hourglass(problem: Problem, poisson: float) -> float:
 
 
 def has_stepped_surface(mesh: Mesh) -> bool:
-    """Return whether a mesh consists of equal hexahedra that do not fill its bounding box, as voxels do."""
+    """Return whether a mesh consists of equal hexahedra that do not fill their bounding box, as voxels do.
+
+    The box has the directions of the edges of the elements.
+    """
     if mesh.element != "hexahedron" or not mesh.forms.single:
         return False
-    return bool(mesh.measures.sum() < _FILLED * np.prod(mesh.upper - mesh.lower))
+    corners = mesh.nodes[mesh.elements[0]]
+    edges = corners[[1, 3, 4]] - corners[0]
+    counts = np.ptp(mesh.nodes @ np.linalg.inv(edges), axis=0)
+    return bool(len(mesh.elements) < _FILLED * np.prod(counts))
 
 
 def hourglass_values(problem: Problem, hourglass: float | None) -> Floats:

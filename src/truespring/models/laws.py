@@ -148,7 +148,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             quadratic=False,
             trace="logarithmic",
             invariants=gent,
-            limit="Gent's law ends where I1 - 3 at constant volume reaches jm: the body cannot be stretched further",
+            limit="Gent's law has no finite energy where I1 - 3 at constant volume reaches jm; this may be the reason",
             constants=MappingProxyType(
                 {
                     "jm": Constant(

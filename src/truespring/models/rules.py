@@ -25,6 +25,7 @@ from truespring.models.biquadratic import BiquadraticSprings
 from truespring.models.fem_potential import fem_of_one_kind
 from truespring.models.gaussian_rule import GAUSSIAN_LAWS, gaussian_potential, gaussian_stiffness
 from truespring.models.interpolation import SIMPLICES
+from truespring.models.laws import LAWS
 from truespring.models.linked import LinkedElements
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
 from truespring.models.pair_laws import PAIR_LAWS, STRAIGHT
@@ -146,12 +147,13 @@ def check_law(law: str, rule: str | None) -> None:
     allowed = tuple(PAIR_LAWS) if rule is None else RULES[rule].laws
     if law in allowed:
         return
-    owners = [name for name, other in RULES.items() if law in other.laws] + ["stiffness"] * (law in PAIR_LAWS)
+    owners = [f"rule = '{name}'" for name, other in RULES.items() if law in other.laws]
+    owners += ["stiffness"] * (law in PAIR_LAWS) + ["kind = 'fem'"] * (law in LAWS)
     whose = "stiffness" if rule is None else f"rule = '{rule}'"
     raise ModelError(
         f"law = '{law}' is not available with {whose}"
-        + nearest(law, allowed)
-        + (f"; allowed: {', '.join(allowed)}" if allowed else "; it has no key law")
+        + ("" if owners else nearest(law, allowed))
+        + (f"; allowed: {', '.join(allowed)}" if allowed else "; this rule has no other law")
         + (f"; available with {', '.join(owners)}" if owners else "")
     )
 

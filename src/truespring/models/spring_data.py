@@ -10,7 +10,7 @@ from truespring.potential import Potential
 
 #: Features beyond plain springs: a modulus for the area or volume of each element, a coupling of lengths, or a pressure
 #: in each element that keeps springs of zero rest length apart.
-VOLUME_TERM, COUPLING, PRESSURE = "volume term", "coupling", "pressure"
+VOLUME_TERM, COUPLING, PRESSURE = "volume term", "coupling", "pressure in each element"
 
 
 class PlainSprings(Potential, Protocol):

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from truespring.comparison import Comparison
 from truespring.report.quantity import ROUNDING, percent, tolerance_percent
 from truespring.report.result import Result
@@ -64,12 +66,16 @@ def _number(value: float) -> str:
 def equally_wrong_sentence(result: Result, who: str, plural: bool, called: dict[str, str]) -> str | None:
     """Return a warning if the model agrees with references whose own errors exceed the tolerance; else None.
 
+    Without a warning are references whose refined solution the model agrees with, too.
+
     `who` is the name of the model, `plural` whether it is plural; `called` has the display name of each reference.
     """
     names = [
         name
         for name, one in result.comparisons.items()
-        if _agrees(one) and (known := result.standings.get(name)) and (known.value or 0.0) > result.tolerance
+        if _agrees(one)
+        and (known := result.standings.get(name))
+        and min(known.value or 0.0, np.inf if known.refined_error is None else known.refined_error) > result.tolerance
     ]
     if not names:
         return None

@@ -44,11 +44,12 @@ def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[s
     verb = ("stay" if starts else "come") + ("" if plural else "s")
     if len(groups) > 1:
         clauses = [
-            f"of {listed([display_name(result, name) for name in names])} {where}" for where, names in groups.items()
+            f"of {listed([_named(result, measured, name) for name in names])} {where}"
+            for where, names in groups.items()
         ]
         return f"{who} {verb} within {tolerance_percent(result.tolerance)} {listed(clauses, ', and ')}", False
     ((where, names),) = groups.items()
-    references = everyone(result, names)
+    references = everyone(result, names) if len(names) > 1 else _named(result, measured, names[0])
     if where == NEVER:
         do = "do" if plural else "does"
         some = references if len(names) == 1 else "any reference"
@@ -59,9 +60,20 @@ def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[s
     return f"{who} {verb} {within} {references} {where}", False
 
 
+def _named(result: Result, measured: dict[str, Comparison], name: str) -> str:
+    """Return a reference by its name, with the errors at full load if `_is_complete`."""
+    shown, one = display_name(result, name), measured[name]
+    return f"{shown} ({_off(one)} at {full_level(result)})" if _is_complete(one) else shown
+
+
+def _is_complete(one: Comparison) -> bool:
+    """Return whether forces are compared too, and the model agrees at every level up to full load."""
+    return one.agrees_up_to_load_factor == 1.0 and bool(np.isfinite(one.force_errors[-1]))
+
+
 def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
-    """Return the errors at full load, smallest first; None if no reference reaches it together with the model."""
-    known = {name: one.error for name, one in measured.items() if one.error is not None}
+    """Return the errors at full load that are not known yet, smallest first; None without a reference that has some."""
+    known = {name: one.error for name, one in measured.items() if one.error is not None and not _is_complete(one)}
     if not known:
         return None
     parts = [

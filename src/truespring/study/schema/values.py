@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidat
 from truespring.errors import TruespringError, nearest, shown
 from truespring.material import SECTIONS
 from truespring.mesh import DIAGONALS, PLANE_ELEMENTS, SOLID_ELEMENTS, Box, Near, Plane, Selection
-from truespring.models import ELEMENTS, GAUSSIAN_LAWS, LAWS, PAIR_LAWS, RULES
+from truespring.models import ELEMENTS, LAWS, PAIR_LAWS, RULES
 from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
 
 
@@ -73,7 +73,8 @@ _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
 PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
 _LAWS = {"description": "; ".join(f"{name}: {law.source}" for name, law in LAWS.items())}
 LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
-_SPRINGS_LAWS = list(dict.fromkeys((*GAUSSIAN_LAWS, *PAIR_LAWS)))
+# Laws that no spring has are an error of the model, with the reason.
+_SPRINGS_LAWS = list(dict.fromkeys((*LAWS, *PAIR_LAWS)))
 SpringsLawName = Annotated[str, _key_of(_SPRINGS_LAWS), WithJsonSchema({"enum": _SPRINGS_LAWS})]
 FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
 PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
