@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test verification validity table1 bench viewer clean
+.PHONY: demo test verification validity table1 hourglass bench viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -27,6 +27,10 @@ table1: .venv/test
 # Solves the validity maps of all rules and rebuilds docs/validity.md and its pictures; takes a quarter of an hour.
 validity: .venv/test
 	$(BIN)/python docs/build_validity.py
+
+# Measures the stiffness of Gaussian springs against hourglass and rebuilds docs/hourglass.md; takes some minutes.
+hourglass: .venv/test
+	$(BIN)/python docs/build_hourglass.py
 
 # Times truespring, CalculiX (ccx on the path), FElupe and scikit-fem, and rebuilds docs/performance.md in 1 to 2 hours.
 # Results are kept in benchmarks/.cache, so an interrupted run resumes. SIZES=small makes a short trial run.

@@ -162,8 +162,8 @@ DEFAULTS = (
     (
         "hexahedra",
         "1 / (1 + nu^2)",
-        "within 2 % in bending from 2 elements deep on at any nu; at 1, torsion is 5 % too stiff at 4 deep, less is "
-        "better still",
+        "within 2 % in bending from 2 elements deep on at any nu; at 1, torsion is 5 % too stiff at 4 deep, and "
+        "less is better still",
     ),
     (
         "equal bricks that do not fill their bounding box, such as voxels",
@@ -185,8 +185,8 @@ The tables show what it changes: the error of the stiffness of a bar of length {
 under a small load. Bending and stretching are by a force on the other end, shear by moving that end sideways without
 rotation, torsion by turning it. The truth is finite elements of {BODIES["cubes"].finest} elements through the depth
 ({BODIES["squares"].finest} in the plane), extrapolated with the order observed on three meshes. Columns are values of
-`hourglass`; the last is linear finite elements with full integration, which lock near nu = 1/2. `python
-docs/build_hourglass.py` measures them again.
+`hourglass`; the last is linear finite elements with full integration, and from nu = 0.45 on in plane strain and in
+space with mean dilatation, since full integration locks near nu = 1/2. `make hourglass` measures them again.
 
 ## The default
 

@@ -1,5 +1,6 @@
 """The README and the pages of docs: their Python runs, their studies are read, their numbers and keys are true."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -111,6 +112,13 @@ def test_the_table_of_the_readme_is_that_of_the_page_that_measures_it() -> None:
     assert len(laws) == 4
     for law in laws:
         assert f"| {law} | {' | '.join(shown[model, law] for model in models)} |" in readme.replace("*", "")
+
+
+def test_the_page_on_hourglass_is_that_of_its_values() -> None:
+    from docs.build_hourglass import DOCS, page
+
+    found = json.loads((DOCS / "hourglass.json").read_text(encoding="utf-8"))
+    assert page(found) == (DOCS / "hourglass.md").read_text(encoding="utf-8")
 
 
 def test_links_of_the_pages_lead_somewhere() -> None:

@@ -42,16 +42,20 @@ class Constant:
 
     @property
     def range_words(self) -> str:
-        """The allowed range in words: "0 to 1", or "more than 0"."""
-        words = f"{self.smallest:g} to {self.largest:g}"
-        if not self.exclusive:
-            return words
-        return f"more than {self.smallest:g}" if np.isinf(self.largest) else f"{words}, without {self.smallest:g}"
+        """The allowed range in words: "a value from 0 to 1", or "a value above 0"."""
+        if np.isinf(self.largest):
+            return f"a value {'above' if self.exclusive else 'of at least'} {self.smallest:g}"
+        return f"a value from {self.smallest:g} to {self.largest:g}{f', without {self.smallest:g}' * self.exclusive}"
 
     @property
     def unit(self) -> str:
         """The SI unit, "-" for a dimensionless number."""
         return "-" if self.dimension is None else SI_UNITS[self.dimension][0]
+
+    @property
+    def unit_after_value(self) -> str:
+        """The SI unit after a space; empty for a dimensionless number."""
+        return "" if self.dimension is None else f" {self.unit}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,7 +75,7 @@ def _check_quadratic(problem: Problem, hourglass: float | None, element: str, la
             f"{problem.mesh.kinds} elements: remove element; springs on these do not lock"
         )
     if hourglass is not None:
-        raise ModelError(f"hourglass = {hourglass:g}: {problem.mesh.kinds} elements have no hourglass modes: remove it")
+        raise ModelError(f"hourglass = {hourglass:g} has no effect on {problem.mesh.kinds} elements: remove it")
     if law != DEFAULT_LAW:
         raise ModelError(
             f"law = '{law}' is not available with element = 'quadratic' of rule = 'gaussian'; allowed: {DEFAULT_LAW}; "

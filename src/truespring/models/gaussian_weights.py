@@ -56,15 +56,14 @@ def hourglass_values(problem: Problem, hourglass: float | None) -> Floats:
 
 
 def check_hourglass(mesh: Mesh, hourglass: float | None) -> None:
-    """Raise ModelError if a mesh has no hourglass modes, or if one would have no stiffness."""
+    """Raise ModelError if `hourglass` has no effect on a mesh, or if a mode of a brick would have no stiffness."""
     if hourglass is None:
         return
     limits = [HOURGLASS_LIMITS[kind] for kind in mesh.element_kinds if kind in HOURGLASS_LIMITS]
     if not limits:
-        allowed = ", ".join(HOURGLASS_LIMITS)
         raise ModelError(
-            f"hourglass = {hourglass:g}: {mesh.kinds} elements have no hourglass modes; remove hourglass, or use a "
-            f"mesh of {allowed} elements"
+            f"hourglass = {hourglass:g} has no effect on {mesh.kinds} elements: remove it, or use "
+            f"{' or '.join(HOURGLASS_LIMITS)} elements"
         )
     if not max(limits) < hourglass < np.inf:
         raise ModelError(

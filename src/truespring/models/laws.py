@@ -252,7 +252,8 @@ def _values(material: Material, name: str) -> dict[str, float]:
                 f"law = '{name}' requires {key} [{constant.unit}], {constant.meaning}: add it to the material"
             )
         if not constant.allows(value):
-            raise ModelError(f"{key} = {value:g} {constant.unit}: law = '{name}' takes {constant.range_words}")
+            found = f"{key} = {value:g}{constant.unit_after_value}"
+            raise ModelError(f"{found}: law = '{name}' requires {constant.range_words}")
         values[key] = value
     fault = law.fault(material.lame, values) if law.fault is not None else ""
     if fault:

@@ -47,7 +47,8 @@ class Springs(Model):
         stiffness: user-defined stiffness, instead of a rule.
         sharing: stiffness of a spring that several elements share: "summed" is the sum over the elements, "single" the
             mean.
-        allow_negative: allow springs with negative stiffness, which some rules give on some meshes.
+        allow_negative: allow springs with negative stiffness, which some rules give on some meshes; coupled rules
+            always do.
         volume: add the area or volume term that gives an isotropic lattice the Young's modulus and the Poisson's ratio
             of the material, from 0 to 0.5; the springs are rescaled.
         k_body: stiffness of each body diagonal of a cube in E h, for the rule isotropic.
@@ -94,8 +95,7 @@ class Springs(Model):
         if self.sharing == "single" and (self.volume or self.coupled):
             what = "volume = true" if self.volume else f"rule = '{self.rule}'"
             raise ModelError(
-                f"sharing = 'single': with {what} the springs of an element have the moduli of the material, and those "
-                "that elements share sum: remove sharing"
+                f"sharing = 'single': {what} requires the sum over the elements that share a spring: remove sharing"
             )
         if self.law is not None:
             check_law(self.law, self.rule)

@@ -132,7 +132,11 @@ class SpringsKeys(ModelKeys):
         default="summed",
         description="whether a spring sums the stiffness of all elements that share it, or takes that of one",
     )
-    allow_negative: bool = Field(default=False, description="whether springs of negative stiffness are accepted")
+    allow_negative: bool = Field(
+        default=False,
+        description="whether springs of negative stiffness are accepted; no effect with the rules biquadratic and "
+        "gaussian",
+    )
     volume: bool = Field(
         default=False,
         description="whether an area or volume term is added, so that the body has the Poisson's ratio of the material",
