@@ -12,12 +12,13 @@ from truespring.assembly import Pattern
 from truespring.errors import ModelError
 from truespring.fibres import Families
 from truespring.mesh import Mesh
+from truespring.models.carried import advanced, pressure_of
 from truespring.models.fibres import stiff_fibres, with_fibres
 from truespring.models.law import Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
 from truespring.models.strain import voigt_pairs
-from truespring.models.symmetric import contracted, identity, voigt_places
+from truespring.models.symmetric import contracted, identity, inverted, swapped, voigt_places
 from truespring.potential import Potential, SparseMatrix
 from truespring.problem import Problem
 
@@ -198,15 +199,39 @@ class FemPotential:
         return self._everywhere(lambda first, last: self._respond(self._points(positions, first, last)).stress)
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
-        """Return the stress [Pa], shape as `stress`, extrapolated along `step` [m] by the elasticity of the law."""
+        """Return the stress [Pa], shape as `stress`, extrapolated along `step` [m] by the elasticity of the law.
+
+        If the pressure is carried apart, see `carried`, the result is not linear in the step.
+        """
 
         def extrapolated(first: int, last: int) -> Floats:
             at = self._points(positions, first, last)
             response = self._respond(at)
-            change = self._strain_change(at, self._gradient_of(step, at.gradients, first, last))
-            return response.stress + self._stress_change(at, response, change)
+            growth = self._strain_change(at, self._gradient_of(step, at.gradients, first, last))
+            change = self._stress_change(at, response, growth)
+            if not self._carries_pressure:
+                return response.stress + change
+            reached = self._strain(self._points(positions + step, first, last))
+            return advanced(response.stress, change, self._strain(at), growth, reached)
 
         return self._everywhere(extrapolated)
+
+    @property
+    def _carries_pressure(self) -> bool:
+        """Whether the pressure is carried along a step apart from the rest of the stress: if it depends on ln J."""
+        return self.law.finite and self.law.trace == "logarithmic"
+
+    def _excess(self, at: Points, response: Response, stress: Floats | None) -> Floats | None:
+        """Return the pressure of the law over that of a given stress [Pa], axes (element, point); None without."""
+        if stress is None or not self._carries_pressure:
+            return None
+        C = self._strain(at)
+        return pressure_of(response.stress, C) - pressure_of(stress, C)
+
+    def _elasticity(self, at: Points, response: Response, stress: Floats | None) -> Floats:
+        """Return the elasticity [Pa] with the pressure of a given stress, two axes of components, (element, point)."""
+        elasticity, excess = response.elasticity(), self._excess(at, response, stress)
+        return elasticity if excess is None else elasticity + excess * swapped(inverted(self._strain(at)))
 
     def _stress_change(self, at: Points, response: Response, change: Floats) -> Floats:
         """Return the linear change of the stress for a change of strain [Pa], axes (component, element, point)."""
@@ -276,7 +301,8 @@ class FemPotential:
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m]; `stress` [Pa] gives the geometric part, by default that of the law."""
         response = self._respond(at)
-        return self._matrices(at, response.stress if stress is None else stress, response.elasticity())
+        elasticity = self._elasticity(at, response, stress)
+        return self._matrices(at, response.stress if stress is None else stress, elasticity)
 
     def _matrices(self, at: Points, stress: Floats, elasticity: Floats) -> Floats:
         """Return the element matrices of a stress and an elasticity [N/m], shape (n, k * dim, k * dim)."""

@@ -94,7 +94,7 @@ class MeanDilatationPotential(FemPotential):
         exchange, response, dim = self._exchange(at), self._respond(at), self.mesh.dim
         metric, inverse = exchange.metric, exchange.inverse
         own = exchange.scale * (response.stress if stress is None else stress)
-        elasticity = exchange.scale**2 * response.elasticity()
+        elasticity = exchange.scale**2 * self._elasticity(at, response, stress)
         pressure = contracted(own, metric) / dim
         mixed = contracted(elasticity, metric) / dim
         second = contracted(mixed, metric) / dim

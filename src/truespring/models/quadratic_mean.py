@@ -18,6 +18,7 @@ class _Volume(NamedTuple):
     """The part of lam in the energy: a function of the mean v of the trace of the strain, or of the volume ratio.
 
     Attributes:
+        mean: v, axes (element, 1).
         energy: lam/2 v^2, or lam/2 (ln v)^2 of the volume ratio [J/m^3], axes (element, 1).
         pressure, stiffness: first and second derivative of `energy` with respect to v [Pa], axes (element, 1).
         slope: derivative of the trace or ratio at a point with respect to the strain, axes (component, element, point).
@@ -25,6 +26,7 @@ class _Volume(NamedTuple):
         across: derivative of the trace or ratio with respect to the strain of the third direction.
     """
 
+    mean: Floats
     energy: Floats
     pressure: Floats
     stiffness: Floats
@@ -50,13 +52,14 @@ class QuadraticMeanPotential(QuadraticPotential):
             own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
             mean = _mean(own, at)
             flat = partial(np.zeros, (len(strain), *strain.shape))
-            return _Volume(lam / 2 * mean**2, lam * mean, lam + 0 * mean, eye, flat, np.ones_like(own))
+            return _Volume(mean, lam / 2 * mean**2, lam * mean, lam + 0 * mean, eye, flat, np.ones_like(own))
         J = determinant(at.F)
         mean = _mean(J, at)
         valid = (J > 0) & (mean > 0)
         inverse = inverted(np.where(valid, strain, eye))
         log = np.log(np.where(mean > 0, mean, np.nan))
         return _Volume(
+            mean,
             lam / 2 * log**2,
             lam * log / mean,
             lam * (1 - log) / mean**2,
@@ -81,12 +84,22 @@ class QuadraticMeanPotential(QuadraticPotential):
         grown = _mean(contracted(volume.slope, change), at)
         return super()._stress_change(at, response, change) + volume.stiffness * grown * volume.slope
 
+    def _elasticity(self, at: Points, response: Response, stress: Floats | None) -> Floats:
+        elasticity, excess = super()._elasticity(at, response, stress), self._excess(at, response, stress)
+        if excess is None:
+            return elasticity
+        inverse = inverted(self._strain(at))  # the pressure acts on v, too: see `_tangent`
+        return elasticity - excess * outer(inverse, inverse)
+
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m]: those of a law plus the coupling by the mean."""
         volume = self._volume(at)
         along = self._forces(at, np.ascontiguousarray(volume.slope))  # derivative of the mean times the volume
-        stiffness = (volume.stiffness / at.volumes.sum(axis=1, keepdims=True))[:, :, None]
-        return np.asarray(super()._tangent(at, stress) + stiffness * along[:, :, None] * along[:, None])
+        stiffness, excess = volume.stiffness, self._excess(at, self._respond(at), stress)
+        if excess is not None:
+            stiffness = stiffness + _mean(excess, at) / volume.mean**2
+        coupling = (stiffness / at.volumes.sum(axis=1, keepdims=True))[:, :, None]
+        return np.asarray(super()._tangent(at, stress) + coupling * along[:, :, None] * along[:, None])
 
 
 def _mean(values: Floats, at: Points) -> Floats:
