@@ -16,13 +16,14 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
 from docs.loads_and_paths import ROWS  # noqa: E402
-from tests.closed_forms import bending_factor, elastica_tip, lattice_tension, principal_state  # noqa: E402
+from tests.closed_forms import bending_factor, elastica_tip, lattice_tension, material_of, principal_state  # noqa: E402
 from tests.test_fem import TRUE_DEFLECTION  # noqa: E402
+from tests.test_gaussian import INDEPENDENT, pulled_strip  # noqa: E402
 from tests.test_moduli import JITTERED, pulled_modulus, triangulated  # noqa: E402
 
 import truespring as ts  # noqa: E402
 from truespring.mesh import in_simplices, refined  # noqa: E402
-from truespring.models import LAWS  # noqa: E402
+from truespring.models import GAUSSIAN_LAWS, LAWS  # noqa: E402
 from truespring.report.standing import own_errors  # noqa: E402
 from truespring.study import read_study, run  # noqa: E402
 
@@ -85,11 +86,11 @@ def two_springs() -> Iterator[Row]:
         yield Row(f"two springs, large deflection: {what}", float(value), printed, "Ansys VM9, as printed")
 
 
-def tensile(stress: float, poisson: float = 1 / 3) -> ts.Problem:
-    """A 6 by 4 block of E = 1 under uniform tension, free to contract."""
+def tensile(stress: float, law: str = "linear") -> ts.Problem:
+    """A 6 by 4 block of E = 1, with the constants of a law, under uniform tension, free to contract."""
     return ts.Problem(
         mesh=ts.rectangle((1.5, 1.0), (6, 4)),
-        material=ts.Material(1.0, poisson),
+        material=material_of(law, 1.0, 1 / 3),
         section=ts.PlaneStress(1.0),
         supports=[ts.Fixed("left", ["x"]), ts.Fixed("left-bottom")],
         loads=[ts.Force("right", (stress, 0.0))],
@@ -97,21 +98,29 @@ def tensile(stress: float, poisson: float = 1 / 3) -> ts.Problem:
 
 
 def uniform_tension() -> Iterator[Row]:
-    """Springs against the lattice's closed form, FEM against its law's, at a nominal stress of 0.3 E (Hencky too)."""
+    """Straight springs against the lattice's closed form, other models against the law's, at a stress of 0.3 E."""
     for rule, (edge, diagonal) in {"lloyd": (5 / 16, 7 / 16), "isotropic": (3 / 8, 3 / 8)}.items():
         stretch, _ = lattice_tension(0.3, (1.0, 1.0), (edge, edge), diagonal)
         state = ts.solve(tensile(0.3), ts.Springs(rule)).states[-1]
         found = 1 + float(state.displacement[:, 0].max()) / 1.5
         yield Row(f"tension 0.3 E, {rule} springs: stretch", found, stretch, "closed form of the lattice")
-    for law in LAWS:
-        path = ts.solve(tensile(0.3), ts.Fem(law))
+    models = [*((law, ts.Fem(law)) for law in LAWS), *((law, ts.Springs("gaussian", law=law)) for law in GAUSSIAN_LAWS)]
+    for law, model in models:
+        problem = tensile(0.3, law)
+        path = ts.solve(problem, model)
         found = 1 + float(path.states[-1].displacement[:, 0].max()) / 1.5
         _, stress = principal_state(law, 1.0, 1 / 3, (found, None, None))
-        what, own = (
-            f"tension, {ts.Fem(law).label}: stress at stretch {found:.6f}",
-            ts.reference_error(tensile(0.3), ts.Fem(law)),
-        )
-        yield Row(what, 0.3, float(stress[0]), "the law", own)
+        own = None if model.has_springs else ts.reference_error(problem, model)
+        yield Row(f"tension, {model.label}: stress at stretch {found:.6f}", 0.3, float(stress[0]), "the law", own)
+
+
+def gaussian_strip() -> Iterator[Row]:
+    """A strip of 16 by 4 squares of Gaussian springs, against an independent program."""
+    for force, hourglass, expected in INDEPENDENT:
+        _, found = pulled_strip(force, hourglass)
+        axis = int(np.argmax(np.abs(expected)))
+        what = f"strip, gaussian springs, force {force} N, hourglass {hourglass:.4g}: u{'xy'[axis]} [m]"
+        yield Row(what, float(found[axis]), expected[axis], "an independent program, `tests/test_gaussian.py`")
 
 
 def moduli() -> Iterator[Row]:
@@ -440,7 +449,7 @@ def page() -> str:
     parts = [HEAD.format(versions=f"Python {platform.python_version()}, {versions}")]
     for title, rows in (
         ("Springs", (two_springs, uniform_tension, moduli, lattices, irregular, elastica)),
-        ("Any Poisson's ratio", (volume_terms, biquadratic_springs)),
+        ("Any Poisson's ratio", (gaussian_strip, volume_terms, biquadratic_springs)),
         ("Inaccurate springs, as predicted by their effective moduli", (cook_springs,)),
         ("Loads and paths past limit points", (loads_and_paths,)),
         ("Finite elements", (cook, locking)),
