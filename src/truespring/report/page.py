@@ -40,6 +40,8 @@ from truespring.report.viewer import viewer
 
 # Largest number of values in all interactive views of a page, about a megabyte.
 _BUDGET = 400_000
+# Components of the total force below this share of the sum of all forces are rounding errors.
+_ROUNDING = 1e-12
 
 
 def write_page(results: Sequence[Result], file: Path, command: str | None) -> None:
@@ -172,7 +174,9 @@ def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
         return [("loads and supports", "not in the file")]
     facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
     facts += [("load", load.words()) for load in problem.loads]
-    total = problem.loading.force(problem.mesh.nodes).sum(axis=0)
+    forces = problem.loading.force(problem.mesh.nodes)
+    total = forces.sum(axis=0)
+    total = np.where(np.abs(total) > _ROUNDING * np.abs(forces).sum(), total, 0.0)
     if not problem.loading.driven_by_motion:
         facts.append(("total force", f"({', '.join(input_quantity(float(value), 'N') for value in total)})"))
     motion = problem.loading.motion()
