@@ -32,7 +32,7 @@ validity: .venv/test
 hourglass: .venv/test
 	$(BIN)/python docs/build_hourglass.py
 
-# Times truespring, CalculiX (ccx on the path), FElupe and scikit-fem, and rebuilds docs/performance.md in 1 to 2 hours.
+# Times truespring, CalculiX (ccx on the path), FElupe and scikit-fem, and rebuilds docs/performance.md in at most 1.5 hours.
 # Results are kept in benchmarks/.cache, so an interrupted run resumes. SIZES=small makes a short trial run.
 bench: .venv/test .venv-peers/installed
 	$(BIN)/python -m benchmarks $(if $(filter small,$(SIZES)),--small)

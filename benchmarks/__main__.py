@@ -5,34 +5,82 @@ import json
 import sys
 from dataclasses import asdict
 
-from benchmarks import machine, runs
-from benchmarks.cases import LADDER, REFERENCE, SIZES
+from benchmarks import commands, machine, older, organ, runs
+from benchmarks.cases import LADDER, OLDER, REFERENCE, SIZES
 from benchmarks.page import build
+from benchmarks.runs import HERE, PROGRAMS, ROOT, SPRINGS, Job, Log
 
 # Meshes of --small, for development: each is measured once, and the page is written elsewhere.
 _SMALL = {2: SIZES[2][:2], 3: SIZES[3][:2]}
-_SMALL_LADDER = {2: LADDER[2][:6], 3: LADDER[3][:4]}
+_SMALL_LADDER = {key: depths[:3] for key, depths in LADDER.items()}
+_SMALL_OLDER = {2: 25, 3: 10}
+
+# Programs whose loops are timed, by dimension and depth of the mesh; the first of a program and dimension explains it.
+_LOOPS = (
+    (SPRINGS, 3, REFERENCE[3]),
+    (SPRINGS, 2, REFERENCE[2]),
+    ("fem-nh", 3, REFERENCE[3]),
+    ("fem-nh", 2, REFERENCE[2]),
+    (SPRINGS, 3, OLDER[3]),
+    (SPRINGS, 2, OLDER[2]),
+    ("isotropic", 3, OLDER[3]),
+    ("lloyd", 2, OLDER[2]),
+)
 
 
 def measured(small: bool) -> dict:
     """Return all measurements of the page."""
+    log = Log()
     sizes, ladder = (_SMALL, _SMALL_LADDER) if small else (SIZES, LADDER)
-    limits = runs.bandwidth()
-    found = runs.measure_all(runs.jobs(sizes, ladder), 1 if small else runs.REPEATS)
+    repeats = 1 if small else runs.REPEATS
+    bandwidth = runs.in_process("kernels")
+    log("memory bandwidth: " + ", ".join(f"{name} {value / 1e9:.1f} GB/s" for name, value in bandwidth.items()))
+    command_line = commands.command_line(log, repeats)
+    before = older.compared(log, _SMALL_OLDER if small else OLDER, repeats)
+    bodies = [_on_the_organ(poisson, model, log) for poisson in organ.POISSON for model in organ.MODELS]
+    loads = ((3, "soft block"), (3, "bending"), (2, "bending"), (3, "stretching"), (2, "stretching"))
+    found = runs.measure_all(runs.jobs(sizes, ladder, loads), log, repeats)
+    loops = dict.fromkeys((name, dim, min(depth, sizes[dim][-1])) for name, dim, depth in _LOOPS)
     return {
         "date": machine.today(),
         "commit": machine.commit(),
         "machine": machine.hardware(),
         "versions": machine.versions(),
         "limit_seconds": runs.LIMIT,
-        "bandwidth": limits,
-        "kernels": [
-            runs.kernels(dim, depth)
-            for dim in sizes
-            for depth in sorted({min(REFERENCE[dim], sizes[dim][-1]), sizes[dim][-1]})
-        ],
-        "command_line": runs.command_line(),
+        "bandwidth": bandwidth,
+        "command_line": command_line,
+        "older_commit": older.COMMIT,
+        "older": before,
+        "organ": bodies,
+        "kernels": [_loops(*one, log) for one in loops],
         "runs": [asdict(one) for one in found],
+    }
+
+
+def _on_the_organ(poisson: float, model: str, log: Log) -> dict:
+    """Return the times of a model on the organ, or why there are none."""
+    code = runs.digest(model, [HERE / "organ.py", ROOT / "examples" / "organ.toml"])
+    found = runs.cached(f"organ-{model}-{poisson}", code, lambda: runs.in_process("organ", (str(poisson), model)))
+    log(f"organ, {model}, Poisson's ratio {poisson:g}: {found.get('solve', found.get('failure'))}")
+    return {"key": model, "poisson": poisson, **found}
+
+
+def _loops(name: str, dim: int, depth: int, log: Log) -> dict:
+    """Return the times of the loops of a program in bending, see `kernels.measured`; no rows after a failure."""
+    job = Job(name, dim, "bending", depth)
+    code = runs.digest(name, [HERE / file for file in ("kernels.py", "limits.py", "parts.py", "phases.py", "cases.py")])
+    arguments = PROGRAMS[name].arguments
+    found = runs.cached(f"kernels-{name}-{dim}d-{depth}", code, lambda: runs.on_case("kernels", job, arguments))
+    log(f"loops of {name}, {dim}D, {job.n_nodes:,} nodes: {found.get('failure', 'measured')}")
+    return {
+        "program": name,
+        "dim": dim,
+        "n_nodes": job.n_nodes,
+        "rows": [],
+        "phases": {},
+        "shares": {},
+        "parts": {},
+        **found,
     }
 
 
@@ -42,11 +90,11 @@ def main() -> None:
     parser.add_argument("--small", action="store_true", help="small meshes, once each, written to out/bench")
     small = parser.parse_args().small
     results = measured(small)
-    folder = runs.ROOT / "out" / "bench" if small else None
-    file = (folder or runs.HERE) / "results.json"
+    folder = ROOT / "out" / "bench" if small else None
+    file = (folder or HERE) / "results.json"
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(results, indent=1) + "\n")
-    sys.stdout.write(build(file, folder or runs.ROOT / "docs") + "\n")
+    sys.stdout.write(build(file, folder or ROOT / "docs") + "\n")
 
 
 if __name__ == "__main__":

@@ -1,38 +1,46 @@
-"""Time to the same error of the tip displacement in bending.
+"""Time to the same error of the displacement in bending.
 
-The exact value is the limit of St. Venant-Kirchhoff finite elements of truespring, extrapolated from the three finest
-meshes. CalculiX solves this law, and biquadratic springs converge to it.
+The error of a solution is the rms distance of the nodes of the coarsest mesh (`Case.sampled`) from the limit of fine
+meshes under the law of its program, over the rms displacement. The limit is extrapolated from the three finest meshes
+of truespring's finite elements. Springs of other laws are held against the St. Venant-Kirchhoff law.
 """
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.optimize import brentq
 
-from benchmarks.runs import Measured
+from benchmarks.runs import PROGRAMS, Measured
 
-#: Relative errors of the tip displacement.
+#: Relative errors.
 TARGETS = (0.05, 0.02, 0.01)
 
-TRUTH = "fem-svk"
+# Programs whose limit is the truth of a law.
+_TRUTH = {"neo-Hookean": "fem-nh", "St. Venant-Kirchhoff": "fem-svk", "springs": "fem-svk"}
+
+# Largest ratio of errors over which a time is extrapolated beyond the finest mesh.
+_FARTHEST = 4.0
 
 
-def solved(runs: list[Measured], program: str, dim: int) -> list[Measured]:
-    """Return the successful runs of a program in bending, from coarse to fine."""
-    found = (run for run in runs if (run.program, run.dim, run.load) == (program, dim, "bending") and run.seconds)
+def solved(runs: Iterable[Measured], program: str, dim: int, load: str) -> list[Measured]:
+    """Return the successful runs of a program on a body, from coarse to fine."""
+    found = (run for run in runs if (run.program, run.dim, run.load) == (program, dim, load) and run.seconds)
     return sorted(found, key=lambda run: run.depth)
 
 
-def limit(runs: list[Measured]) -> float:
-    """Return the limit of the tip displacement [m] by tip(h) = limit + c h^p on the three finest meshes (Richardson).
+def limit(runs: Sequence[Measured]) -> np.ndarray | None:
+    """Return the limit of the samples [m] by u(h) = limit + c h^p on the three finest meshes (Richardson).
 
-    Returns that of the finest mesh if no order p from 0.2 to 8 fits, NaN without runs.
+    Returns those of the finest mesh if no order p from 0.2 to 8 fits; None for less than three runs.
     """
     if len(runs) < 3:
-        return runs[-1].tip if runs else math.nan
-    (first, second, third) = (run.tip for run in runs[-3:])
+        return None
+    first, second, third = (np.array(run.samples) for run in runs[-3:])
     h, k, m = (1 / run.depth for run in runs[-3:])
-    ratio = (first - second) / (second - third) if second != third else math.inf
+    closer = np.linalg.norm(second - third)
+    ratio = np.linalg.norm(first - second) / closer if closer else math.inf
 
     def mismatch(order: float) -> float:
         """Return the ratio of two differences for an order of convergence, minus that of the runs."""
@@ -45,52 +53,68 @@ def limit(runs: list[Measured]) -> float:
     return third + (third - second) * m**order / (k**order - m**order)
 
 
+def truth(runs: Sequence[Measured], program: str, dim: int, load: str) -> np.ndarray | None:
+    """Return the limit of the law of a program [m], None if it was not measured."""
+    return limit(solved(runs, _TRUTH[PROGRAMS[program].law], dim, load))
+
+
+def error(run: Measured, exact: np.ndarray) -> float:
+    """Return the relative error of a run [-]."""
+    return float(np.linalg.norm(np.array(run.samples) - exact) / np.linalg.norm(exact))
+
+
 @dataclass(frozen=True)
-class Accuracy:
-    """Accuracy of a program in bending.
+class Reached:
+    """Cost of an error.
 
     Attributes:
-        floor: relative error in the limit of fine meshes [-], positive if too soft.
-        seconds: time to reach each of TARGETS [s], None if not reached.
-        nodes: number of nodes to reach each of TARGETS, interpolated, None if not reached.
-        bounds: true if the coarsest mesh reaches the target: `seconds` and `nodes` are then upper bounds.
+        seconds: time [s].
+        unknowns: number of unknowns, interpolated.
+        bound: whether the coarsest mesh has a smaller error: both are upper bounds.
+        extrapolated: whether the finest mesh has a larger error.
     """
 
-    floor: float
-    seconds: tuple[float | None, ...]
-    nodes: tuple[float | None, ...]
-    bounds: tuple[bool, ...]
+    seconds: float
+    unknowns: float
+    bound: bool = False
+    extrapolated: bool = False
 
 
-def accuracy(runs: list[Measured], truth: float) -> Accuracy:
-    """Return the accuracy of a program from its runs, ordered from coarse to fine; `truth` is the exact tip [m]."""
-    reached = [_reached(runs, truth, target) for target in TARGETS]
-    return Accuracy(
-        floor=limit(runs) / truth - 1,
-        seconds=tuple(one[0] if one else None for one in reached),
-        nodes=tuple(one[1] if one else None for one in reached),
-        bounds=tuple(bool(one and one[2]) for one in reached),
-    )
+def reached(runs: Sequence[Measured], exact: np.ndarray, target: float) -> Reached | None:
+    """Return the cost beyond which all errors of a program are below the target; None if that is too far.
 
-
-def _reached(runs: list[Measured], truth: float, target: float) -> tuple[float, float, bool] | None:
-    """Return time [s] and nodes beyond which all errors are below the target, and whether that is the coarsest mesh.
-
-    None if the finest mesh exceeds the target. Between two meshes, time and nodes are interpolated as powers of the
-    error.
+    `runs` are ordered from coarse to fine. Time and unknowns are powers of the error between two meshes, and beyond
+    the finest mesh, if the last step towards it reduced the error.
     """
-    errors = [abs(run.tip / truth - 1) for run in runs]
-    missed = [place for place, error in enumerate(errors) if error > target]
+    found = [error(run, exact) for run in runs]
+    missed = [place for place, value in enumerate(found) if value > target]
     place = missed[-1] + 1 if missed else 0
-    if place == len(runs):
+    if not runs or len(runs) < 2:
         return None
     if place == 0:
-        return runs[0].median, runs[0].n_nodes, True
+        return Reached(runs[0].median, runs[0].n_unknowns, bound=True)
+    beyond = place == len(runs)
+    place = min(place, len(runs) - 1)
     before, after = runs[place - 1], runs[place]
-    smallest = target / 100  # avoids the logarithm of zero
-    share = math.log(errors[place - 1] / target) / math.log(errors[place - 1] / max(errors[place], smallest))
-    return (
+    coarser, finer = found[place - 1], max(found[place], target / 100)  # avoids the logarithm of zero
+    if beyond and (finer >= coarser or finer > _FARTHEST * target):
+        return None
+    share = math.log(coarser / target) / math.log(coarser / finer)
+    return Reached(
         before.median ** (1 - share) * after.median**share,
-        before.n_nodes ** (1 - share) * after.n_nodes**share,
-        False,
+        before.n_unknowns ** (1 - share) * after.n_unknowns**share,
+        extrapolated=beyond,
     )
+
+
+def to_the_same_error(
+    runs: Sequence[Measured], dim: int, load: str
+) -> dict[str, tuple[Measured, float, list[Reached | None]]]:
+    """Return the finest run of each program on a body of `cases.BODIES`, its error, and the cost of each of TARGETS."""
+    found = {}
+    for name, program in PROGRAMS.items():
+        exact, own = truth(runs, name, dim, load), solved(runs, name, dim, load)
+        if exact is None or (dim, load) not in program.ladder or len(own) < 2:
+            continue
+        found[name] = own[-1], error(own[-1], exact), [reached(own, exact, target) for target in TARGETS]
+    return found

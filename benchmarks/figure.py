@@ -3,20 +3,24 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from benchmarks.cases import SIZES, SPRINGS
-from benchmarks.runs import PROGRAMS, Measured
+from benchmarks.cases import SIZES
+from benchmarks.runs import PROGRAMS, SPRINGS, Measured
 
-# Color and dash: springs in blue, finite elements of truespring in grey, peers in other colors; the dash shows the law.
+# Color and dash: truespring's springs in blue, its finite elements in grey, peers in other colors.
 _STYLES = {
-    "lloyd": ("#1f5fa8", "-"),
-    "isotropic": ("#0b3c75", "-"),
-    "biquadratic": ("#6ba3dc", "-"),
-    "fem-svk": ("#444444", "-"),
-    "fem-nh": ("#999999", "-"),
+    "gaussian": ("#0b3c75", "-"),
+    "isotropic": ("#6ba3dc", "-"),
+    "lloyd": ("#6ba3dc", "-"),
+    "biquadratic": ("#6ba3dc", ":"),
+    "fem-nh": ("#222222", "-"),
+    "fem-svk": ("#888888", "-"),
     "calculix": ("#c0392b", "-"),
-    "felupe-svk": ("#2e8b57", "-"),
-    "felupe-nh": ("#2e8b57", ":"),
-    "skfem": ("#d98e04", ":"),
+    "calculix-c3d8i": ("#c0392b", "--"),
+    "calculix-c3d20r": ("#c0392b", "-."),
+    "calculix-c3d20r-half": ("#c0392b", ":"),
+    "felupe-nh": ("#2e8b57", "-"),
+    "felupe-svk": ("#2e8b57", ":"),
+    "skfem": ("#d98e04", "-"),
 }
 
 
@@ -34,7 +38,7 @@ def draw(runs: Iterable[Measured], file: Path) -> None:
             points = sorted((run.n_nodes, run.median) for run in bent if (run.program, run.dim) == (name, dim))
             if points and dim in program.dims:
                 color, dash = _STYLES[name]
-                width = 2.4 if name == SPRINGS[dim] else 1.4
+                width = 2.4 if name == SPRINGS else 1.4
                 (line,) = ax.loglog(*zip(*points, strict=True), dash, marker="o", ms=4, color=color, lw=width)
                 labelled[program.label] = line
         ax.set(xlabel="nodes", title=f"{dim}D")
@@ -43,6 +47,6 @@ def draw(runs: Iterable[Measured], file: Path) -> None:
         ax.spines[["top", "right"]].set_visible(False)
     figure.legend(labelled.values(), labelled.keys(), loc="outside right center", frameon=False, fontsize=9)
     figure.axes[0].set_ylabel("seconds from the mesh to equilibrium")
-    figure.suptitle("Bending by a force that moves the end of the springs by half the length", fontsize=11)
+    figure.suptitle("Bending by a force that moves the end of Gaussian springs by half the length", fontsize=11)
     with matplotlib.rc_context({"svg.hashsalt": "performance", "svg.fonttype": "path"}):
         FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None})

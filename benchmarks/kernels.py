@@ -1,110 +1,152 @@
-"""Time the kernels of a spring solution against the bytes that they must move.
+"""Time the loops of a solution against the bytes that they must move, and count the bytes of its parts.
 
-python -m benchmarks.kernels CASE.npz RULE prints them as JSON; without arguments, it prints the memory bandwidth.
+python -m benchmarks.kernels CASE.npz MODEL prints them as JSON; without arguments, it prints the memory bandwidth.
 """
 
 import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 import truespring as ts
 from benchmarks.cases import Case
 from benchmarks.limits import Kernel, Moved, bandwidth, measure
+from benchmarks.parts import n_bytes
+from benchmarks.phases import phases
 from benchmarks.programs.common import TOLERANCE
 from benchmarks.programs.truespring import problem_of
 from truespring.kernels import threads
-from truespring.linear.iterative import Multigrid, Preconditioned
-from truespring.linear.multigrid import Hierarchy, Level
+from truespring.linear import iterative
+from truespring.potential import SparseMatrix, Stressed
+from truespring.problem import Problem
 
 # Number of vectors that an iteration of conjugate gradients reads and writes besides product and preconditioner: reads
 # x, r, p, q, writes x, r, p, and converts to and from single precision.
 _VECTORS = 9
 
 
-def kernels(potential: ts.SpringNetwork, positions: np.ndarray, ready: Preconditioned) -> Iterator[Kernel]:
-    """Yield assembly, matrix product and V-cycle at positions [m] of a network."""
+def of_potential(problem: Problem, potential: Stressed, positions: np.ndarray) -> Iterator[Kernel]:
+    """Yield the internal force and the assembly of the tangent at positions [m].
+
+    They must read positions and elements, and write the force, or the tangent.
+    """
+    given = positions.nbytes + problem.mesh.elements.size * 4
+    yield Kernel("force", lambda: potential.gradient(positions), given + positions.nbytes)
     stress = potential.stress(positions)
     matrix = potential.hessian(positions, stress)
-    springs = potential.springs.size * 4 + potential.stiffness.nbytes + stress.nbytes
-    yield Kernel(
-        "assembly", lambda: potential.hessian(positions, stress), positions.nbytes + springs + matrix.data.nbytes
-    )
+    yield Kernel("tangent", lambda: potential.hessian(positions, stress), given + matrix.data.nbytes)
+
+
+def of_solver(used: "Used", memory: int, matrix: SparseMatrix, positions: np.ndarray) -> Iterator[Kernel]:
+    """Yield the matrix product and the V-cycle of conjugate gradients; none if a solution did not use them.
+
+    A product must read half of the symmetric matrix in single precision, with its columns; a V-cycle each level twice.
+    `memory` is that of all levels [bytes].
+    """
+    if used.product is None or used.precondition is None:
+        return
+    product, precondition = used.product, used.precondition
+    n, dim = positions.shape
     x, result = np.ascontiguousarray(positions), np.empty_like(positions)
-    yield Kernel("matrix product", lambda: ready.level.product(x, result), _once(ready.level) + 2 * x.nbytes)
-    residual = (x - potential.nodes).astype(np.float32)
-    yield Kernel(
-        "V-cycle",
-        lambda: ready.coarse.cycle(ready.level, ready.turns, residual),
-        cycle_bytes(ready.level, ready.coarse) + 2 * residual.nbytes + ready.turns.nbytes,
-    )
+    lower = (len(matrix.indices) - n) // 2
+    read = lower * (4 * dim**2 + 4) + n * 4 * dim**2
+    yield Kernel("matrix product", lambda: product(x, result), read + 2 * x.nbytes)
+    residual = np.random.default_rng(7).normal(size=positions.shape).astype(np.float32)
+    yield Kernel("V-cycle", lambda: precondition(residual), 2 * memory + 2 * residual.nbytes)
 
 
-def _once(level: Level) -> int:
-    """Return the bytes of a matrix that a product reads."""
-    return level.columns.nbytes + level.lower.nbytes + level.rest.nbytes
+@dataclass
+class Used:
+    """The product and the preconditioner that a solution gave to conjugate gradients last, None without them."""
+
+    product: Callable[..., Any] | None = None
+    precondition: Callable[..., Any] | None = None
 
 
-def cycle_bytes(finest: Level, coarse: Hierarchy) -> int:
-    """Return the bytes that a V-cycle reads: each matrix twice (down and up), each transfer once each way."""
-    levels = [finest, *coarse.levels]
-    matrices = sum(2 * (level.columns.nbytes + level.lower.nbytes + level.inverse.nbytes) for level in levels)
-    return matrices + sum(transfer.n_bytes for transfer in coarse.transfers) + coarse.inverse.nbytes
+@contextmanager
+def watched() -> Iterator[Used]:
+    """Yield what solutions give to conjugate gradients."""
+    used, iterate = Used(), iterative.conjugate_gradients
+
+    def spied(product: Callable[..., Any], precondition: Callable[..., Any], *rest: Any, **more: Any) -> Any:
+        used.product, used.precondition = product, precondition
+        return iterate(product, precondition, *rest, **more)
+
+    with patch.object(iterative, "conjugate_gradients", spied):
+        yield used
 
 
 @contextmanager
 def profile() -> Iterator[Counter[str]]:
     """Yield a counter of the time of each kernel [s], including the overhead of threads."""
     taken: Counter[str] = Counter()
-    run = threads.run
+    run_on = threads.run_on
 
-    def timed(function: Any, *arguments: Any, **options: Any) -> list[Any]:
+    def timed(ranges: Any, function: Any, *arguments: Any) -> list[Any]:
         """Run a kernel and count its time."""
         started = time.perf_counter()
-        found = run(function, *arguments, **options)
-        module = function.__module__.rpartition(".")[2] if hasattr(function, "py_func") else "assembly"
-        taken[f"{module}: {function.__name__.replace('_', ' ')}"] += time.perf_counter() - started
+        found = run_on(ranges, function, *arguments)
+        named = hasattr(function, "py_func")
+        module = function.__module__.rpartition(".")[2] if named else "pieces"
+        name = getattr(function, "__name__", "a call").strip("<>").replace("_", " ")
+        taken[f"{module}: {name}"] += time.perf_counter() - started
         return found
 
-    threads.run = timed
-    try:
+    with patch.object(threads, "run_on", timed):
         yield taken
-    finally:
-        threads.run = run
 
 
-def measured(case: Case, rule: str) -> tuple[list[Moved], Counter[str]]:
-    """Return times of the kernels at the equilibrium of a case and of the whole solution, and its time by kernel."""
+def measured(case: Case, name: str) -> dict[str, Any]:
+    """Return times of loops at the equilibrium of a case and of the whole solution, its time by loop, and its bytes."""
     problem = problem_of(case)
-    model, newton = ts.Springs(rule), ts.Newton(load_steps=1, tolerance=TOLERANCE, linear="multigrid")
+    model, newton = ts.Fem(name) if name in ts.LAWS else ts.Springs(name), ts.Newton(load_steps=1, tolerance=TOLERANCE)
     ts.solve(problem, model, newton)
     path = ts.solve(problem, model, newton)
-    with profile() as shares:
+    with phases(type(path.potential)) as spent, watched() as used:
         again = ts.solve(problem, model, newton)
-    shares["all else: small loops, NumPy, Python"] = again.seconds - shares.total()
-    positions = path.states[-1].positions
-    solver = Multigrid(path.potential.nodes, problem.loading.held)
-    ready = solver.ready(path.potential.hessian(positions), positions)
-    found = [measure(kernel) for kernel in kernels(path.potential, positions, ready)]
-    assembly, product, cycle = (one.bytes_moved for one in found)
+    spent["all else: sparsity, checks, Python"] = again.seconds - spent.total()
+    with profile() as shares:
+        third = ts.solve(problem, model, newton)
+    shares["all else: small loops, NumPy, Python"] = third.seconds - shares.total()
+    positions, potential = again.states[-1].positions, again.potential
+    matrix = potential.hessian(positions)
+    kernels = [
+        *of_potential(problem, potential, positions),
+        *of_solver(used, again.cost.memory, matrix, positions),
+    ]
+    found = [measure(kernel) for kernel in kernels]
+    moved = Counter({one.name: one.bytes_moved for one in found})
+    tangent, product, cycle = (moved[name] for name in ("tangent", "matrix product", "V-cycle"))
     step = product + cycle + _VECTORS * positions.nbytes
-    whole = path.newton_iterations * assembly + (path.cost.cg_iterations + path.cost.lanczos_iterations) * step
-    return [*found, Moved("whole solve", path.seconds, whole)], shares
+    whole = path.newton_iterations * tangent + (path.cost.cg_iterations + path.cost.lanczos_iterations) * step
+    found.append(Moved("whole solve", path.seconds, whole))
+    parts = {
+        "mesh": problem.mesh,
+        "potential": potential,
+        "tangent": matrix,
+        "linear solver": (used.product, used.precondition),
+    }
+    return {
+        "rows": [asdict(row) for row in found],
+        "phases": dict(spent.most_common()),
+        "shares": dict(shares.most_common()),
+        "parts": n_bytes(parts),
+        "iterations": path.newton_iterations,
+        "cg": path.cost.cg_iterations,
+        "lanczos": path.cost.lanczos_iterations,
+    }
 
 
 def main() -> None:
     """Print the measurements of a case as JSON, or without one the bandwidth."""
-    if len(sys.argv) == 1:
-        found = bandwidth()
-    else:
-        rows, shares = measured(Case.read(sys.argv[1]), sys.argv[2])
-        found = {"rows": [asdict(row) for row in rows], "shares": dict(shares.most_common())}
+    found = bandwidth() if len(sys.argv) == 1 else measured(Case.read(sys.argv[1]), sys.argv[2])
     sys.stdout.write(json.dumps(found) + "\n")
 
 

@@ -9,13 +9,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from subprocess import PIPE
 from typing import Any
 
-from benchmarks.cases import LOADS, REFERENCE, SIZES, SPRINGS, STRETCHED, bar, n_nodes
+import numpy as np
+
+from benchmarks.cases import LADDER, REFERENCE, SIZES, STRETCHED, bar, n_nodes
 from benchmarks.machine import hardware
 
 HERE = Path(__file__).parent
@@ -25,10 +27,13 @@ CACHE = HERE / ".cache"
 #: Time limit of a solution [s]; beyond it the program does not solve larger meshes of that load.
 LIMIT = 120.0
 
-# Time limit of a process [s], with reading, warm-up and failed attempts.
-_PROCESS_LIMIT = 3 * LIMIT
+#: Time limit of all measurements [s]; a run that would start later is left out.
+WHOLE_LIMIT = 90 * 60.0
 
-# Solutions faster than this [s] are repeated REPEATS times, for the median; those of LADDER run once.
+# Time limit of a process [s], with reading, warm-up and failed attempts.
+_PROCESS_LIMIT = 2.5 * LIMIT
+
+# Processes whose solution is faster than this [s] are repeated REPEATS times, for the median; those of LADDER once.
 _SHORT, REPEATS = 20.0, 3
 
 
@@ -39,36 +44,134 @@ class Program:
     Attributes:
         label: name in tables and the figure.
         law: material law.
+        element: kind of element.
         module: module of benchmarks.programs.
         arguments: command-line arguments after the case.
         dims: dimensions of the bodies whose SIZES it runs on.
-        ladder: dimensions of the bodies whose LADDER it runs on, in bending only.
+        ladder: keys of LADDER that it runs on.
         peer: whether it needs the environment of the peers.
+        largest: largest depth of SIZES, by dimension; all if empty.
+        coarser: its mesh has so many times fewer elements over the height than the others, rounded up.
     """
 
     label: str
     law: str
+    element: str
     module: str
     arguments: tuple[str, ...] = ()
     dims: tuple[int, ...] = (2, 3)
-    ladder: tuple[int, ...] = (2, 3)
+    ladder: tuple[tuple[int, str], ...] = ()
     peer: bool = False
+    largest: dict[int, int] = field(default_factory=dict)
+    coarser: int = 1
 
+
+_PLANE, _SPACE, _SOFT = ((2, "bending"),), ((3, "bending"),), ((3, "soft block"),)
+_ALL = (*_PLANE, *_SPACE, *_SOFT)
+_SVK = "St. Venant-Kirchhoff"
+
+#: The springs that the page is about.
+SPRINGS = "gaussian"
 
 PROGRAMS = {
-    "lloyd": Program("truespring, springs (lloyd)", "springs", "truespring", ("lloyd",), (2,), (2,)),
-    "isotropic": Program("truespring, springs (isotropic)", "springs", "truespring", ("isotropic",), (3,), (2, 3)),
-    "biquadratic": Program("truespring, springs (biquadratic)", "St. Venant-Kirchhoff", "truespring", ("biquadratic",)),
+    "gaussian": Program(
+        "truespring, Gaussian springs", "neo-Hookean", "Gaussian springs", "truespring", ("gaussian",), ladder=_ALL
+    ),
+    "fem-nh": Program(
+        "truespring, FEM (neo-Hookean)",
+        "neo-Hookean",
+        "linear; mean dilatation at 0.45",
+        "truespring",
+        ("neo-hookean",),
+        ladder=_ALL,
+        largest=REFERENCE,
+    ),
     "fem-svk": Program(
-        "truespring, FEM (St. Venant-Kirchhoff)", "St. Venant-Kirchhoff", "truespring", ("saint-venant-kirchhoff",)
+        f"truespring, FEM ({_SVK})",
+        _SVK,
+        "linear; mean dilatation at 0.45",
+        "truespring",
+        ("saint-venant-kirchhoff",),
+        ladder=_ALL,
+        largest=REFERENCE,
     ),
-    "fem-nh": Program("truespring, FEM (neo-Hookean)", "neo-Hookean", "truespring", ("neo-hookean",)),
-    "calculix": Program("CalculiX", "St. Venant-Kirchhoff", "calculix", peer=True),
+    "calculix": Program("CalculiX (C3D8; CPE4)", _SVK, "linear", "calculix", ("C3D8",), ladder=_ALL, peer=True),
+    "calculix-c3d8i": Program(
+        "CalculiX (C3D8I)", _SVK, "incompatible modes", "calculix", ("C3D8I",), (3,), (*_SPACE, *_SOFT), peer=True
+    ),
+    "calculix-c3d20r": Program(
+        "CalculiX (C3D20R)",
+        _SVK,
+        "20 nodes, reduced integration",
+        "calculix",
+        ("C3D20R",),
+        (3,),
+        (*_SPACE, *_SOFT),
+        peer=True,
+    ),
+    "calculix-c3d20r-half": Program(
+        "CalculiX (C3D20R, half as many a side)",
+        _SVK,
+        "20 nodes, reduced integration",
+        "calculix",
+        ("C3D20R",),
+        (3,),
+        peer=True,
+        coarser=2,
+    ),
+    "felupe-nh": Program(
+        "FElupe (neo-Hookean)", "neo-Hookean", "linear", "felupe", ("neo-hookean", "linear"), ladder=_ALL, peer=True
+    ),
+    "felupe-mixed": Program(
+        "FElupe (neo-Hookean, three fields)",
+        "neo-Hookean",
+        "mean dilatation",
+        "felupe",
+        ("neo-hookean", "three-field"),
+        (),
+        _SOFT,
+        peer=True,
+    ),
+    "felupe-quadratic": Program(
+        "FElupe (neo-Hookean, 20 nodes)",
+        "neo-Hookean",
+        "20 nodes",
+        "felupe",
+        ("neo-hookean", "quadratic"),
+        (),
+        (*_SPACE, *_SOFT),
+        peer=True,
+    ),
     "felupe-svk": Program(
-        "FElupe (St. Venant-Kirchhoff)", "St. Venant-Kirchhoff", "felupe", ("saint-venant-kirchhoff",), peer=True
+        f"FElupe ({_SVK})",
+        _SVK,
+        "linear",
+        "felupe",
+        ("saint-venant-kirchhoff", "linear"),
+        ladder=(*_PLANE, *_SPACE),
+        peer=True,
     ),
-    "felupe-nh": Program("FElupe (neo-Hookean)", "neo-Hookean", "felupe", ("neo-hookean",), peer=True),
-    "skfem": Program("scikit-fem", "neo-Hookean", "skfem", peer=True),
+    "skfem": Program("scikit-fem", "neo-Hookean", "linear", "skfem", ladder=(*_PLANE, *_SPACE), peer=True),
+    "isotropic": Program(
+        "truespring, springs (isotropic)",
+        "springs",
+        "springs",
+        "truespring",
+        ("isotropic",),
+        (3,),
+        (*_PLANE, *_SPACE),
+        largest={3: 33},
+    ),
+    "lloyd": Program("truespring, springs (lloyd)", "springs", "springs", "truespring", ("lloyd",), (2,), _PLANE),
+    "biquadratic": Program(
+        "truespring, springs (biquadratic)",
+        _SVK,
+        "biquadratic springs",
+        "truespring",
+        ("biquadratic",),
+        ladder=(*_PLANE, *_SPACE),
+        largest=REFERENCE,
+    ),
 }
 
 
@@ -83,8 +186,13 @@ class Job:
 
     @property
     def n_nodes(self) -> int:
-        """The number of nodes of the mesh."""
-        return n_nodes(self.dim, self.depth)
+        """The number of nodes of the mesh of linear elements that the job is compared with."""
+        return n_nodes(self.dim, self.load, self.depth)
+
+    @property
+    def own_depth(self) -> int:
+        """Number of elements over the height of the mesh of the program."""
+        return -(-self.depth // PROGRAMS[self.program].coarser)
 
 
 @dataclass(frozen=True)
@@ -93,8 +201,10 @@ class Measured:
 
     Attributes:
         program, dim, load, depth, n_nodes: the job.
-        seconds: time of each run [s], empty after a failure.
+        seconds: time of each process [s], empty after a failure.
         tip: displacement of the loaded end [m].
+        samples: displacement of the nodes of the coarsest mesh [m], see `Case.sampled`.
+        n_unknowns: displacements of the mesh that are not held.
         iterations, linear_iterations, lanczos_iterations: numbers of iterations of the last run.
         peak_bytes: peak memory of the last run beyond that of an empty Python process [bytes].
         version, notes: version of the program, and remarks on the run.
@@ -108,6 +218,8 @@ class Measured:
     n_nodes: int
     seconds: tuple[float, ...] = ()
     tip: float = float("nan")
+    samples: tuple[tuple[float, ...], ...] = ()
+    n_unknowns: int = 0
     iterations: int = 0
     linear_iterations: int | None = None
     lanczos_iterations: int | None = None
@@ -122,36 +234,64 @@ class Measured:
         return statistics.median(self.seconds)
 
 
-def jobs(sizes: dict[int, tuple[int, ...]], ladder: dict[int, tuple[int, ...]]) -> Iterator[Job]:
-    """Yield all jobs; those of one program and load from small to large."""
-    for dim, load in sorted(LOADS, key=lambda one: one[1]):  # bending first
-        largest = STRETCHED[dim] if load == "stretching" else max(sizes[dim])
+class Log:
+    """A running log on standard error, and the time that is left."""
+
+    def __init__(self, limit: float = WHOLE_LIMIT) -> None:
+        self._started, self._limit = time.monotonic(), limit
+
+    def __call__(self, text: str) -> None:
+        """Print a line with the time since the start."""
+        minutes, seconds = divmod(round(time.monotonic() - self._started), 60)
+        sys.stderr.write(f"[{minutes:3}:{seconds:02}] {text}\n")
+
+    @property
+    def over(self) -> bool:
+        """Whether the time limit is reached."""
+        return time.monotonic() - self._started > self._limit
+
+
+def jobs(
+    sizes: dict[int, tuple[int, ...]], ladder: dict[tuple[int, str], tuple[int, ...]], loads: Iterable[tuple[int, str]]
+) -> Iterator[Job]:
+    """Yield the jobs of bodies; those of one program and load from small to large."""
+    for dim, load in loads:
         for name, program in PROGRAMS.items():
-            rungs = ladder[dim] if load == "bending" and dim in program.ladder else ()
-            elements = name.startswith("fem") or (dim == 3 and name == "biquadratic")
-            most = min(largest, REFERENCE[dim]) if elements else largest
-            depths = [depth for depth in sizes[dim] if depth <= most] if dim in program.dims else []
+            rungs = ladder.get((dim, load), ()) if (dim, load) in program.ladder else ()
+            most = min(program.largest.get(dim, max(sizes[dim])), STRETCHED[dim] if load == "stretching" else 10**9)
+            whole = dim in program.dims and load in ("bending", "stretching")
+            depths = [depth for depth in sizes[dim] if depth <= most] if whole else []
             yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *depths}))
 
 
-def measure_all(planned: Iterable[Job], repeats: int = REPEATS) -> list[Measured]:
-    """Return the results of jobs, cached ones without running; skip jobs that would exceed LIMIT."""
-    empty, last, found = empty_process(), None, []
+def measure_all(planned: Iterable[Job], log: Log, repeats: int = REPEATS) -> list[Measured]:
+    """Return the results of jobs, cached ones without running; skip jobs that would exceed a limit."""
+    empty, found, before = empty_process(), [], []
     for job in planned:
-        same = last is not None and (last.program, last.dim, last.load) == (job.program, job.dim, job.load)
-        reason = too_slow(last, job) if same else ""
-        last = _nothing(job, reason) if reason else measure(job, repeats if job.depth in SIZES[job.dim] else 1)
+        if before and (before[-1].program, before[-1].dim, before[-1].load) != (job.program, job.dim, job.load):
+            before = []
+        reason = too_slow(before, job) if before else ""
+        if log.over:
+            reason = f"left out: the time limit of {WHOLE_LIMIT / 60:g} minutes for all programs"
+        on_ladder = job.depth in LADDER.get((job.dim, job.load), ()) and job.depth not in SIZES[job.dim]
+        last = _nothing(job, reason) if reason else measure(job, 1 if on_ladder else repeats)
+        before.append(last)
         found.append(replace(last, peak_bytes=max(0, last.peak_bytes - empty)))
         result = f"{last.median:.3g} s, tip {last.tip:.7g} m {last.notes}" if last.seconds else last.failure
-        sys.stderr.write(f"{job.program:12} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {result}\n")
+        log(f"{job.program:20} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {result}")
     return found
 
 
-def too_slow(last: Measured, job: Job) -> str:
-    """Return why a job would exceed LIMIT, judged by a smaller mesh and time proportional to nodes; else empty."""
+def too_slow(before: Sequence[Measured], job: Job) -> str:
+    """Return why a job would exceed LIMIT, else empty: time is a power of the nodes, by the last two meshes."""
+    last = before[-1]
     if not last.seconds:
         return last.failure
-    if last.median * job.n_nodes / last.n_nodes > LIMIT:
+    power = 1.0
+    if len(before) > 1 and last.median > 1:
+        coarser = before[-2]
+        power = max(power, float(np.log(last.median / coarser.median) / np.log(last.n_nodes / coarser.n_nodes)))
+    if last.median * (job.n_nodes / last.n_nodes) ** power > LIMIT:
         return f"the next size would exceed {LIMIT:g} s ({last.median:.0f} s at {last.n_nodes:,} nodes)"
     return ""
 
@@ -160,11 +300,16 @@ def measure(job: Job, repeats: int) -> Measured:
     """Return the results of a job, repeated if it is fast."""
     runs: list[dict] = []
     while len(runs) < repeats and (not runs or runs[0]["seconds"] < _SHORT):
-        name = f"{job.program}-{job.dim}d-{job.load}-{job.depth}-{len(runs)}"
+        name = f"{job.program}-{job.dim}d-{job.load.replace(' ', '-')}-{job.depth}-{len(runs)}"
         run = cached(name, fingerprint(job.program), lambda: execute(job))
         if "failure" in run:
             return _nothing(job, run["failure"])
         runs.append(run)
+    return measured_of(job, runs)
+
+
+def measured_of(job: Job, runs: list[dict]) -> Measured:
+    """Return the results of a job from the output of its processes."""
     seconds = tuple(run["seconds"] for run in runs)
     return Measured(**asdict(job), n_nodes=job.n_nodes, **runs[-1] | {"seconds": seconds})
 
@@ -187,59 +332,59 @@ def cached(name: str, code: str, run: Callable[[], Any]) -> Any:
 def fingerprint(name: str) -> str:
     """Return a digest of the code of a program, the cases and the machine, which the times depend on."""
     program = PROGRAMS[name]
-    peers = [HERE / "peers.txt", *HERE.glob("programs/neo_hooke.py")]
     files = [HERE / "cases.py", HERE / "programs" / "common.py", HERE / "programs" / f"{program.module}.py"]
-    files += peers if program.peer else [HERE / "kernels.py", *sorted((ROOT / "src" / "truespring").rglob("*.py"))]
-    digest = hashlib.sha256(repr((program.arguments, hardware())).encode())
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
+    files += [HERE / "peers.txt", HERE / "programs" / "neo_hooke.py"] if program.peer else []
+    return digest(repr(program.arguments), files, ours=not program.peer)
 
 
-def execute(job: Job) -> dict[str, Any]:
-    """Run a job in a separate process; return its output, or {"failure": why}."""
+def digest(text: str, files: Iterable[Path], ours: bool = True) -> str:
+    """Return a digest of a text, files, the machine and, if `ours`, the source of truespring."""
+    source = sorted((ROOT / "src" / "truespring").rglob("*.py")) if ours else []
+    found = hashlib.sha256(repr((text, hardware())).encode())
+    for file in [*files, *source]:
+        found.update(file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def execute(job: Job, source: Path = ROOT / "src") -> dict[str, Any]:
+    """Run a job in a separate process, with truespring from `source`; return its output, or {"failure": why}."""
     program = PROGRAMS[job.program]
-    return in_process(f"programs.{program.module}", job, program.arguments, python(program.peer))
+    return on_case(f"programs.{program.module}", job, program.arguments, python(program.peer), source)
 
 
-def in_process(module: str, job: Job, arguments: tuple[str, ...], interpreter: str = sys.executable) -> Any:
+def on_case(
+    module: str,
+    job: Job,
+    arguments: tuple[str, ...],
+    interpreter: str = sys.executable,
+    source: Path = ROOT / "src",
+) -> dict[str, Any]:
     """Run a module of benchmarks on the case of a job; return its output, or {"failure": why}."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.npz"
-        bar(job.dim, job.load, job.depth).write(file)
-        command = [interpreter, "-m", f"benchmarks.{module}", str(file), *arguments]
-        with subprocess.Popen(
-            command, cwd=ROOT, env=environment(), stdout=PIPE, stderr=PIPE, text=True, start_new_session=True
-        ) as process:
-            try:
-                printed, complaint = process.communicate(timeout=_PROCESS_LIMIT)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
-            except BaseException:  # KeyboardInterrupt included
-                os.killpg(process.pid, signal.SIGKILL)
-                raise
+        bar(job.dim, job.load, job.own_depth).write(file)
+        return in_process(module, (str(file), *arguments), interpreter, source)
+
+
+def in_process(
+    module: str, arguments: tuple[str, ...] = (), interpreter: str = sys.executable, source: Path = ROOT / "src"
+) -> dict[str, Any]:
+    """Run a module of benchmarks; return the JSON that it prints last, or {"failure": why}."""
+    command = [interpreter, "-m", f"benchmarks.{module}", *arguments]
+    with subprocess.Popen(
+        command, cwd=ROOT, env=environment(source), stdout=PIPE, stderr=PIPE, text=True, start_new_session=True
+    ) as process:
+        try:
+            printed, complaint = process.communicate(timeout=_PROCESS_LIMIT)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return {"failure": f"longer than {_PROCESS_LIMIT:g} s"}
+        except BaseException:  # KeyboardInterrupt included
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
     if process.returncode:
         return {"failure": (complaint.strip().splitlines() or ["no message"])[-1]}
     return json.loads(printed.splitlines()[-1])
-
-
-def bandwidth() -> dict[str, float]:
-    """Return the memory bandwidth [bytes/s], see `limits.bandwidth`; never cached."""
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.kernels"], cwd=ROOT, env=environment(), stdout=PIPE, text=True, check=True
-    )
-    return json.loads(done.stdout)
-
-
-def kernels(dim: int, depth: int) -> dict[str, Any]:
-    """Return the times of the kernels of springs in bending, see `kernels.measured`; no rows after a failure."""
-    rule = SPRINGS[dim]
-    job = Job(rule, dim, "bending", depth)
-    found = cached(
-        f"kernels-{dim}d-{depth}", fingerprint(rule), lambda: in_process("kernels", job, PROGRAMS[rule].arguments)
-    )
-    return {"dim": dim, "n_nodes": job.n_nodes, "rows": [], "shares": {}, **found}
 
 
 def python(peer: bool) -> str:
@@ -247,11 +392,11 @@ def python(peer: bool) -> str:
     return str(ROOT / ".venv-peers" / "bin" / "python") if peer else sys.executable
 
 
-def environment() -> dict[str, str]:
-    """Return the environment variables of processes: all cores, and no settings of BLAS or Python paths."""
-    removed = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "PYTHONPATH")
+def environment(source: Path = ROOT / "src") -> dict[str, str]:
+    """Return the environment variables of processes: all cores, truespring from `source`, no settings of BLAS."""
+    removed = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     kept = {name: value for name, value in os.environ.items() if name not in removed}
-    return kept | {"OMP_NUM_THREADS": str(os.cpu_count())}
+    return kept | {"OMP_NUM_THREADS": str(os.cpu_count()), "PYTHONPATH": str(source)}
 
 
 def empty_process() -> int:
@@ -259,22 +404,3 @@ def empty_process() -> int:
     code = "print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')).split()[1])"
     done = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, check=False)
     return int(done.stdout or 0) * 1024
-
-
-def command_line(repeats: int = REPEATS) -> dict[str, float]:
-    """Return the median wall times of two commands [s], with warm caches."""
-    program = str(Path(sys.executable).parent / "truespring")
-    study = str(ROOT / "examples" / "bending.toml")
-    found = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, command in {
-            "truespring verify examples/bending.toml": [program, "verify", study, "--quiet", "--out", folder],
-            "truespring --help": [program, "--help"],
-        }.items():
-            times = []
-            for _ in range(1 + repeats):
-                started = time.perf_counter()
-                subprocess.run(command, cwd=ROOT, env=environment(), capture_output=True, check=True)
-                times.append(time.perf_counter() - started)
-            found[name] = statistics.median(times[1:])
-    return found

@@ -9,8 +9,8 @@ import numpy as np
 import pypardiso
 from felupe.math import cdya_ik, cdya_il, det, dot, dya, identity, inv, trace, transpose
 
-from benchmarks.cases import Case
-from benchmarks.programs.common import TOLERANCE, Attempt, Run, in_few_increments, main, peak_bytes
+from benchmarks.cases import Case, serendipity
+from benchmarks.programs.common import TOLERANCE, Attempt, Run, in_few_increments, main
 from benchmarks.programs.neo_hooke import settled
 
 
@@ -68,16 +68,34 @@ def material(case: Case, law: str) -> fem.ConstitutiveMaterial:
     return PlaneStressNeoHooke(lam, mu, 2) if case.dim == 2 else fem.NeoHookeCompressible(mu, lam, parallel=True)
 
 
-def solve(case: Case, law: str) -> Run:
-    """Solve in one load increment, or in as few more as it takes."""
+#: FElupe's cell type and region of each of its elements, by dimension and name.
+ELEMENTS = {
+    (2, "linear"): ("quad", fem.RegionQuad),
+    (3, "linear"): ("hexahedron", fem.RegionHexahedron),
+    (3, "three-field"): ("hexahedron", fem.RegionHexahedron),
+    (3, "quadratic"): ("hexahedron20", fem.RegionQuadraticHexahedron),
+}
+
+
+def solve(case: Case, law: str, element: str) -> Run:
+    """Solve in one load increment, or in as few more as it takes.
+
+    Elements "three-field" have a constant pressure and volume ratio each, which do not lock; "quadratic" 20 nodes.
+    """
+    kind, region_of = ELEMENTS[case.dim, element]
+    case = serendipity(case) if element == "quadratic" else case
+    matter = material(case, law)
+    matter = fem.ThreeFieldVariation(matter, parallel=True) if element == "three-field" else matter
 
     def attempt(increments: int) -> Attempt | None:
         started = time.perf_counter()
-        mesh = fem.Mesh(case.nodes, case.elements, {2: "quad", 3: "hexahedron"}[case.dim])
-        region = {2: fem.RegionQuad, 3: fem.RegionHexahedron}[case.dim](mesh)
-        field = fem.FieldContainer([fem.Field(region, dim=case.dim)])
+        region = region_of(fem.Mesh(case.nodes, case.elements, kind))
+        if element == "three-field":
+            field = fem.FieldsMixed(region, n=3)
+        else:
+            field = fem.FieldContainer([fem.Field(region, dim=case.dim)])
         dof0, dof1 = fem.dof.partition(field, {"fixed": fem.Boundary(field[0], fx=0.0)})
-        solid = fem.SolidBody(material(case, law), field)
+        solid = fem.SolidBody(matter, field)
         loaded = np.flatnonzero(case.force.any(axis=1))
         load = fem.PointLoad(field, loaded)
         iterations = 0
@@ -97,12 +115,11 @@ def solve(case: Case, law: str) -> Run:
             except fem.NewtonConvergenceError:
                 return None
             iterations += found.iterations
-        return case.tip(field[0].values), iterations, time.perf_counter() - started
+        return field[0].values, iterations, time.perf_counter() - started
 
     with np.errstate(invalid="ignore"):  # elements that Newton turns inside out on its way
-        tip, iterations, seconds, notes = in_few_increments(attempt)
-    return Run(fem.__version__, seconds, tip, iterations, peak_bytes(), notes=notes)
+        return in_few_increments(case, fem.__version__, attempt)
 
 
 if __name__ == "__main__":
-    main(partial(solve, law=sys.argv[2]))
+    main(partial(solve, law=sys.argv[2], element=sys.argv[3]))

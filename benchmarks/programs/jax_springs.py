@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from benchmarks.cases import Case
-from benchmarks.programs.common import TOLERANCE, Run, main, peak_bytes
+from benchmarks.programs.common import TOLERANCE, Run, main, run_of
 
 jax.config.update("jax_enable_x64", True)
 
@@ -44,8 +44,9 @@ def solve(case: Case) -> Run:
     displacement = np.zeros(case.nodes.size)
     displacement[free] = found.x
     residual = np.linalg.norm(found.jac) / np.linalg.norm(case.force / total)
-    tip = case.tip(displacement.reshape(case.nodes.shape))
-    return Run(version("jax"), seconds, tip, found.nit, peak_bytes(), notes=f"relative residual {residual:.0e}")
+    displacement = displacement.reshape(case.nodes.shape)
+    notes = f"relative residual {residual:.0e}"
+    return run_of(case, version("jax"), displacement, found.nit, seconds, notes=notes)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from torchfem import Planar, Solid
 from torchfem.materials import Hyperelastic3D, HyperelasticPlaneStress
 
 from benchmarks.cases import Case
-from benchmarks.programs.common import TOLERANCE, Run, main, peak_bytes
+from benchmarks.programs.common import TOLERANCE, Run, main, run_of
 
 torch.set_default_dtype(torch.float64)
 
@@ -33,7 +33,7 @@ def solve(case: Case) -> Run:
     atol = TOLERANCE * float(np.linalg.norm(case.force))
     displacement = body.solve(rtol=TOLERANCE, atol=atol, max_iter=20)[0]
     seconds = time.perf_counter() - started
-    return Run(version("torch-fem"), seconds, case.tip(displacement.numpy()), 0, peak_bytes())
+    return run_of(case, version("torch-fem"), displacement.numpy(), 0, seconds)
 
 
 if __name__ == "__main__":

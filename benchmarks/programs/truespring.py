@@ -1,12 +1,13 @@
 """truespring: springs by a rule, or finite elements by a law; `model` is the name of either."""
 
 import sys
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 
 import truespring as ts
 from benchmarks.cases import WARM_UP, Case
-from benchmarks.programs.common import TOLERANCE, Run, main, peak_bytes
+from benchmarks.programs.common import TOLERANCE, Attempt, Run, in_few_increments, main
 
 
 def problem_of(case: Case) -> ts.Problem:
@@ -22,22 +23,26 @@ def problem_of(case: Case) -> ts.Problem:
 
 
 def solve(case: Case, model: str) -> Run:
-    """Solve in one load step."""
+    """Solve in one load step, or in as few more as it takes."""
+    problem = problem_of(case)
     chosen = ts.Fem(model) if model in ts.LAWS else ts.Springs(model)
-    path = ts.solve(problem_of(case), chosen, ts.Newton(load_steps=1, tolerance=TOLERANCE))
-    if path.status is not ts.Status.CONVERGED:
-        raise SystemExit(f"{path.status}: {path.status.advice}")
-    cost = path.cost
-    notes = [cost.newton, cost.linear, *cost.notes] if cost else []
-    return Run(
-        version=version("truespring"),
-        seconds=path.seconds,
-        tip=case.tip(path.states[-1].displacement),
-        iterations=path.newton_iterations,
-        peak_bytes=peak_bytes(),
-        linear_iterations=(cost.cg_iterations or None) if cost else None,
-        lanczos_iterations=(cost.lanczos_iterations or None) if cost else None,
-        notes=", ".join(notes),
+    costs = []
+
+    def attempt(increments: int) -> Attempt | None:
+        path = ts.solve(problem, chosen, ts.Newton(load_steps=increments, tolerance=TOLERANCE))
+        if path.status is not ts.Status.CONVERGED:
+            return None
+        costs.append(path.cost)
+        return path.states[-1].displacement, path.newton_iterations, path.seconds
+
+    run = in_few_increments(case, version("truespring"), attempt)
+    if (cost := costs[-1]) is None:
+        return run
+    return replace(
+        run,
+        linear_iterations=cost.cg_iterations or None,
+        lanczos_iterations=cost.lanczos_iterations or None,
+        notes=", ".join(filter(None, [run.notes, cost.newton, cost.linear, *cost.notes])),
     )
 
 
