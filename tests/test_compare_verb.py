@@ -19,9 +19,14 @@ from truespring.study import read_study
 BENDING = EXAMPLES / "bending.toml"
 
 
-def values(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
-    """Compare, and return what is printed as JSON."""
-    assert main(["compare", *map(str, arguments), "--json"]) == 0
+def values(capsys: pytest.CaptureFixture[str], *arguments: object, drawn: bool = False) -> dict:
+    """Compare, and return what is printed as JSON; figures and page are only written where `drawn`."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not drawn:
+            patch.setattr("truespring.report.figures.save_figures", lambda *_: None)
+            patch.setattr("truespring.report.page.write_page", lambda results, file, command: file.write_text(""))
+            patch.setattr("truespring.report.page.render_page", lambda *_: "")
+        assert main(["compare", *map(str, arguments), "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -129,7 +134,7 @@ def test_what_is_written_can_be_read_and_the_report_stands_alone(
 
 def test_several_are_compared_with_the_first(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, *others = (f"{folder}:{name}" for name in ("nonlinear", "springs", "linear"))
-    found = values(capsys, first, *others, "--out", tmp_path)
+    found = values(capsys, first, *others, "--out", tmp_path, drawn=True)
     assert list(found) == ["bending:springs", "bending:linear"]
     assert found["bending:linear"]["rms_error"] > 5 * found["bending:springs"]["rms_error"]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -207,7 +212,7 @@ def test_stl_in_stl_out(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     mesh = read_study(BENDING).problem.mesh
     triangles = np.concatenate([mesh.elements[:, [0, 1, 2]], mesh.elements[:, [0, 2, 3]]])
     meshio.Mesh(np.pad(mesh.nodes, ((0, 0), (0, 1))), [("triangle", triangles)]).write(rest, binary=True)
-    pair = values(capsys, deformed, BENDING, "--undeformed", f"{deformed.name}={rest}", "--out", tmp_path)
+    pair = values(capsys, deformed, BENDING, "--undeformed", f"{deformed.name}={rest}", "--out", tmp_path, drawn=True)
     assert pair["rms_error"] == pytest.approx(summary["rms_error"], rel=1e-3)
     assert "outlines" in (tmp_path / "report.html").read_text(encoding="utf-8")
     # Two surfaces alone, both in space as far as the program is concerned.
@@ -241,11 +246,11 @@ def test_surfaces_of_solids(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         law = "saint-venant-kirchhoff"
         """
     )
-    assert main(["verify", str(study), "--out", str(tmp_path), "--quiet"]) == 0
+    assert main(["solve", str(study), "--out", str(tmp_path), "--quiet"]) == 0
     capsys.readouterr()
     deformed = tmp_path / "block" / "deformed_finite.stl"
     both = values(capsys, f"{tmp_path / 'block'}:finite", study, "--out", tmp_path / "a")
-    alone = values(capsys, deformed, study, "--out", tmp_path / "b")
+    alone = values(capsys, deformed, study, "--out", tmp_path / "b", drawn=True)
     assert alone["hausdorff"] == pytest.approx(both["hausdorff"], rel=1e-4) and alone["rms_error"] is None
     assert "Hausdorff" in (tmp_path / "b" / "report.html").read_text(encoding="utf-8")
 
@@ -264,7 +269,7 @@ def test_markers_in_the_body(folder: Path, tmp_path: Path, capsys: pytest.Captur
     rows.append("beside,80,60,0,0")
     table = tmp_path / "markers.csv"
     table.write_text("\n".join(["marker,x [mm],y [mm],ux [mm],uy [mm]", *rows]) + "\n")
-    found = values(capsys, table, f"{folder}:nonlinear", "--out", tmp_path)
+    found = values(capsys, table, f"{folder}:nonlinear", "--out", tmp_path, drawn=True)
     assert found["n_nodes"] == 6 and found["n_outside"] == 1 and found["hausdorff"] is None
     assert found["max_distance"] == pytest.approx(1e-3, rel=1e-6)
     assert found["rms_distance"] == pytest.approx(1e-3 / np.sqrt(5), rel=1e-6)

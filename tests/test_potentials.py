@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import truespring as ts
 from tests.closed_forms import difference_errors, material_of, observed_orders
 from tests.meshes import plane_of_two, solid_of_four
+from tests.near import near
 from truespring import assembly
 from truespring.arrays import Floats
 from truespring.conditions import Refined
@@ -447,7 +448,7 @@ def test_derivatives(name: str) -> None:
             assert errors.max() < 1e-11
         else:
             assert errors[0] > 1e-8, "there is nothing to see an order in"
-            assert observed_orders(errors, STEPS) == pytest.approx(2, abs=0.1)
+            assert observed_orders(errors, STEPS) == near(2, abs=0.1)
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -482,13 +483,13 @@ def test_energy_does_not_depend_on_the_frame(name: str) -> None:
         n_nodes, dim = positions.shape
         Q = turn(dim, angle)
         seen = positions @ Q.T + shift
-        assert potential.energy(seen) == pytest.approx(potential.energy(positions), rel=1e-10)
+        assert potential.energy(seen) == near(potential.energy(positions), rel=1e-10)
         assert potential.energy(positions) > 0
         force = potential.gradient(positions)
-        assert potential.gradient(seen) == pytest.approx(force @ Q.T, rel=1e-9, abs=1e-10 * np.abs(force).max())
+        assert potential.gradient(seen) == near(force @ Q.T, rel=1e-9, abs=1e-10 * np.abs(force).max())
         everywhere = np.kron(np.eye(n_nodes), Q)
         turned = everywhere @ potential.hessian(positions).toarray() @ everywhere.T
-        assert potential.hessian(seen).toarray() == pytest.approx(turned, rel=1e-9, abs=1e-10 * np.abs(turned).max())
+        assert potential.hessian(seen).toarray() == near(turned, rel=1e-9, abs=1e-10 * np.abs(turned).max())
         moment = torque(positions, force)
         assert np.abs(moment).max() <= 1e-11 * np.abs(force).max() * np.abs(positions).max() * n_nodes
 
@@ -500,7 +501,7 @@ def test_the_linear_law_takes_a_turn_for_strain(name: str) -> None:
     assert potential.energy(nodes @ turn(nodes.shape[1], 0.5).T) > 0.1
     # Small turns leave no first-order trace: the energy grows with the fourth power of the angle.
     small = [potential.energy(nodes @ turn(nodes.shape[1], angle).T) for angle in (0.02, 0.01)]
-    assert small[0] / small[1] == pytest.approx(16, rel=1e-3)
+    assert small[0] / small[1] == near(16, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -538,7 +539,7 @@ def test_reactions_balance_the_loads(name: str) -> None:
     assert potential is not None
     loading = potential.loading if isinstance(potential, Refined) else case.problem.loading
     total = case.problem.loading.external_force.sum(axis=0)
-    assert loading.external_force.sum(axis=0) == pytest.approx(total, rel=1e-12)
+    assert loading.external_force.sum(axis=0) == near(total, rel=1e-12)
     for state in path.states[1:]:
         inner = potential.gradient(state.all_positions)
         size = state.load_factor * np.abs(loading.external_force).sum()
@@ -548,11 +549,11 @@ def test_reactions_balance_the_loads(name: str) -> None:
         arms = potential.nodes if case.quadratic else state.all_positions
         if not case.infinitesimal:
             assert np.abs(torque(arms, inner)).max() <= 1e-10 * size * np.abs(arms).max()
-        assert state.reaction.sum(axis=0) == pytest.approx(-state.load_factor * total, abs=1e-10 * size)
+        assert state.reaction.sum(axis=0) == near(-state.load_factor * total, abs=1e-10 * size)
         assert not state.reaction[~case.problem.loading.held].any()
         if not isinstance(potential, Refined):
             assert state.all_positions is state.positions or (state.all_positions == state.positions).all()
-            assert state.reaction == pytest.approx(np.where(loading.held, unbalanced, 0.0), abs=1e-10 * size)
+            assert state.reaction == near(np.where(loading.held, unbalanced, 0.0), abs=1e-10 * size)
 
 
 def test_the_moment_needs_the_right_arms() -> None:
@@ -600,7 +601,7 @@ def test_the_projection_leaves_a_semidefinite_hessian_alone(name: str) -> None:
         assert np.linalg.eigvalsh(projected - hessian)[0] >= -1e-12 * np.abs(hessian).max()
         assert np.abs(projected - hessian).max() > 1e-2 * np.abs(hessian).max()
     else:
-        assert projected == pytest.approx(hessian, abs=1e-12 * np.abs(hessian).max())
+        assert projected == near(hessian, abs=1e-12 * np.abs(hessian).max())
 
 
 def test_a_negative_spring_is_projected_too() -> None:
@@ -625,7 +626,7 @@ def test_one_element_or_spring_is_projected_to_the_nearest(seed: int) -> None:
         values, vectors = np.linalg.eigh(potential.hessian(positions).toarray())
         nearest = (vectors * np.maximum(values, 0)) @ vectors.T
         assert isinstance(potential, Projectable)
-        assert potential.projected_hessian(positions).toarray() == pytest.approx(nearest, abs=1e-12 * values[-1])
+        assert potential.projected_hessian(positions).toarray() == near(nearest, abs=1e-12 * values[-1])
 
 
 @pytest.mark.parametrize("name", STRESSED)
@@ -639,10 +640,10 @@ def test_a_given_stress_makes_the_geometric_part(name: str) -> None:
         size = np.abs(hessian).max()
         stress = potential.stress(positions)
         assert np.abs(stress).max() > 0
-        assert potential.hessian(positions, stress).toarray() == pytest.approx(hessian, abs=1e-13 * size)
+        assert potential.hessian(positions, stress).toarray() == near(hessian, abs=1e-13 * size)
         material = potential.hessian(positions, 0 * stress).toarray()
         double = potential.hessian(positions, 2 * stress).toarray()
-        assert double - hessian == pytest.approx(hessian - material, abs=1e-12 * size)
+        assert double - hessian == near(hessian - material, abs=1e-12 * size)
         if CASES[name].geometric:
             assert np.abs(hessian - material).max() > 1e-4 * size
             springs = CASES[name].springs and CASES[name].semidefinite
@@ -659,7 +660,7 @@ def test_the_stress_is_carried_on_by_its_derivative(name: str) -> None:
     assert isinstance(potential, Stressed)
     positions = deformed(potential.nodes, 31)
     stress = potential.stress(positions)
-    assert potential.extrapolated_stress(positions, 0 * positions) == pytest.approx(stress, rel=1e-13)
+    assert potential.extrapolated_stress(positions, 0 * positions) == near(stress, rel=1e-13)
     directions = np.random.default_rng(32).normal(size=(6, *positions.shape))
     directions /= np.linalg.norm(directions, axis=(1, 2), keepdims=True)
 
@@ -676,9 +677,9 @@ def test_the_stress_is_carried_on_by_its_derivative(name: str) -> None:
         assert errors.max() < 1e-9
     else:
         assert errors[0] > 1e-8, "there is nothing to see an order in"
-        assert observed_orders(errors, STEPS) == pytest.approx(2, abs=0.1)
+        assert observed_orders(errors, STEPS) == near(2, abs=0.1)
     if not (isinstance(potential, FemPotential | SummedElements) and potential.law.trace == "logarithmic"):
-        assert extrapolated(2.0) - stress == pytest.approx(2 * slopes, abs=1e-9 * np.abs(extrapolated(2.0)).max())
+        assert extrapolated(2.0) - stress == near(2 * slopes, abs=1e-9 * np.abs(extrapolated(2.0)).max())
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -715,7 +716,7 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
     finally:
         set_threads(None)
     for one, other in zip(one_by_one, at_once, strict=True):
-        assert one == pytest.approx(other, rel=1e-12, abs=1e-13 * np.nanmax(np.abs(other)), nan_ok=True)
+        assert one == near(other, rel=1e-12, abs=1e-13 * np.nanmax(np.abs(other)), nan_ok=True)
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -725,12 +726,12 @@ def test_only_springs_tell_their_stretch(name: str) -> None:
     assert isinstance(potential, Stretched) == CASES[name].springs
     if isinstance(potential, Stretched):
         grown = potential.stretch(potential.nodes * 1.25) / potential.stretch(potential.nodes)
-        assert grown == pytest.approx(np.full(len(grown), 1.25))
+        assert grown == near(np.full(len(grown), 1.25))
     if isinstance(potential, ts.SpringNetwork):
         s, dim = potential.stretch(potential.nodes * 1.25), potential.nodes.shape[1]
         line = s - 1 if potential.law == "straight" else (s - s ** -(dim + 1)) / (dim + 2)
         tension = potential.stiffness * potential.rest_length * line
-        assert potential.stress(potential.nodes * 1.25) == pytest.approx(tension)
+        assert potential.stress(potential.nodes * 1.25) == near(tension)
 
 
 @pytest.mark.parametrize("name", marked(name for name, case in CASES.items() if case.barrier))
@@ -751,7 +752,7 @@ def test_lengths_alone_do_not_see_a_mirror_image(name: str) -> None:
     mirror = np.ones(potential.nodes.shape[1])
     mirror[0] = -1
     rounding = 1e-12 if isinstance(potential, NonlinearTensors) else 1e-20  # large terms of a polynomial cancel
-    assert potential.energy(potential.nodes * mirror) == pytest.approx(0, abs=rounding)
+    assert potential.energy(potential.nodes * mirror) == near(0, abs=rounding)
     assert potential.energy(potential.nodes * (1.1 * mirror)) > 1e-3
 
 
@@ -766,7 +767,7 @@ def test_a_volume_term_sees_a_mirror_image(name: str) -> None:
     mirror[0] = -1
     volume = problem.mesh.measures.sum() * problem.section.thickness
     expected = 2 * potential.term.kappa[0] * volume
-    assert potential.energy(potential.nodes * mirror) == pytest.approx(expected, rel=1e-10)
+    assert potential.energy(potential.nodes * mirror) == near(expected, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", marked(name for name, case in CASES.items() if case.model is not None))
@@ -777,7 +778,7 @@ def test_cells_carry_the_energy(name: str) -> None:
     fields, energy = potential.cell_fields(positions), potential.energy(positions)
     if isinstance(potential, VolumeSprings):
         energy = potential.network.energy(positions)
-    assert np.nansum(fields["strain_energy"]) == pytest.approx(energy, rel=1e-12)
+    assert np.nansum(fields["strain_energy"]) == near(energy, rel=1e-12)
     n_cells = sum(map(len, potential.cells.values()))
     assert all(len(values) == n_cells for values in fields.values())
     assert ("line" in potential.cells) == CASES[name].springs
