@@ -10,6 +10,7 @@ from tests.closed_forms import lame, material_of, nominal_stress
 from tests.law_contract import Body, in_section, settled
 from tests.meshes import plane_of_two, random_mesh, shaken, solid_of_four
 from truespring.arrays import Floats
+from truespring.kernels.threads import set_threads
 from truespring.mesh.kinds import ELEMENT_KINDS
 from truespring.models import LAWS
 from truespring.models.fitness import judge
@@ -230,6 +231,45 @@ def test_springs_of_second_order_are_finite_elements(kind: str, section: str) ->
 
 
 # --- weights ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["quadrilateral", "hexahedron", "wedge"])
+def test_volumes_are_sums_over_simplices(kind: str) -> None:
+    """Closed forms of volume and slopes against the simplices; 37 elements are not a multiple of the lanes."""
+    generator, whole = np.random.default_rng(8), ELEMENT_KINDS[kind]
+    counts = (37, 1, 1)[: whole.dim]
+    grid = ts.rectangle((37.0, 1.0), counts) if whole.dim == 2 else ts.box((37.0, 1.0, 1.0), counts, kind)
+    section = "plane stress" if whole.dim == 2 else ""
+    springs = ts.Springs("gaussian").potential(body(grid, section))
+    positions = grid.nodes + generator.uniform(-0.3, 0.3, grid.nodes.shape)
+    slope, volume = springs._measures.at(positions)
+    corners = positions[grid.elements][:, np.array(whole.simplices)]  # axes: element, simplex, corner, direction
+    edges = corners[:, :, 1:] - corners[:, :, :1]
+    scale = whole.simplex_weight / (6 if whole.dim == 3 else 2 / THICKNESS)
+    assert volume == pytest.approx(scale * np.linalg.det(edges).sum(axis=1), rel=1e-12)
+    adjugates = np.linalg.inv(edges).swapaxes(2, 3) * np.linalg.det(edges)[..., None, None]
+    expected = np.zeros(positions[grid.elements].shape)
+    for simplex, by_edges in zip(whole.simplices, scale * adjugates.swapaxes(0, 1), strict=True):
+        expected[:, list(simplex[1:])] += by_edges
+        expected[:, simplex[0]] -= by_edges.sum(axis=1)
+    assert slope.reshape(expected.shape) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+
+
+def test_threads_do_not_change_forces_and_tangent() -> None:
+    grid = ts.box((12.0, 8.0, 8.0), (12, 8, 8))
+    springs = ts.Springs("gaussian").potential(body(grid))
+    positions = grid.nodes + np.random.default_rng(9).uniform(-0.2, 0.2, grid.nodes.shape)
+
+    def found(count: int) -> tuple[Floats, Floats]:
+        set_threads(count)
+        return springs.gradient(positions), springs.hessian(positions).data.copy()
+
+    try:
+        one, two = found(1), found(2)
+    finally:
+        set_threads(None)
+    assert np.array_equal(one[0], two[0])
+    assert np.array_equal(one[1], two[1])
 
 
 def weights(sides: Sequence[float], poisson: float, hourglass: float | None = None) -> list[float]:

@@ -6,15 +6,23 @@ of a matrix of the element whose rows sum to zero. Elements of one class have th
 
 from typing import Any
 
-import numpy as np
 from numba.extending import overload
 
-from truespring.kernels.small import line, minus, plus, row, scaled, unsigned
+from truespring.kernels.measures import turn
+from truespring.kernels.small import line, minus, plus, put, row, scaled, unsigned
 from truespring.kernels.threads import kernel
-from truespring.kernels.volumes import slopes, turns
 
 # A tuple of three zeros: vectors in space.
 _SPACE = (0.0, 0.0, 0.0)
+ZERO, ONE, TWO = unsigned(0), unsigned(1), unsigned(2)
+
+
+@kernel
+def element(place: Any, k: Any) -> Any:
+    """Return place // k; dividing by a number that is not known when compiled takes several times as long."""
+    if k == 8:
+        return place >> unsigned(3)
+    return place >> TWO if k == 4 else place // k
 
 
 @kernel
@@ -23,16 +31,12 @@ def pulls(first: int, last: int, x: Any, starts: Any, columns: Any, weights: Any
 
     Shapes: x, force (n_nodes, dim), starts (n_nodes + 1,), columns, weights (n_blocks,).
     """
-    dim = len(zero)
-    total = np.empty(dim)
     for i in range(first, last):
-        total[:] = 0.0
+        here, total = row(x, i, zero), zero
         for p in range(starts[i], starts[i + 1]):
-            j = columns[p]
-            for c in range(dim):
-                total[c] += weights[p] * (x[i, c] - x[j, c])
-        for c in range(dim):
-            force[i, c] = total[c]
+            d = minus(here, row(x, columns[unsigned(p)], zero))
+            total = plus(total, scaled(weights[unsigned(p)], d))
+        put(force, i, total)
 
 
 @kernel
@@ -56,78 +60,41 @@ def sums(first: int, last: int, x: Any, elements: Any, matrices: Any, of: Any, Q
 
 
 @kernel
-def forces(
-    first: int,
-    last: int,
-    x: Any,
-    elements: Any,
-    matrices: Any,
-    of: Any,
-    factors: Any,
-    force: Any,
-    zero: Any,
-) -> None:
-    """Add the derivative of the quadratic forms, times a factor each, to the forces of each element.
+def slopes(first: int, last: int, x: Any, elements: Any, matrices: Any, of: Any, slope: Any, zero: Any) -> None:
+    """Write the derivatives of the quadratic forms of each element by its nodes.
 
-    Shapes: x (n_nodes, dim), elements (n_elements, k), matrices (n_forms, n_classes, k, k), of (n_elements,), factors
-    (n_forms, n_elements), force (n_elements, k * dim).
+    Shapes: x (n_nodes, dim), elements (n_elements, k), matrices (n_forms, n_classes, k, k), of (n_elements,), slope
+    (n_elements * (n_forms + 1), k, dim): rows of the forms, then that of the volume, for each element.
     """
-    dim, k = len(zero), elements.shape[1]
+    dim, k, n_forms = len(zero), elements.shape[1], len(matrices)
     for e in range(first, last):
-        for a in range(k):
-            for b in range(a + 1, k):
-                weight = 0.0
-                for f in range(len(matrices)):
-                    weight -= 2 * factors[f, e] * matrices[f, of[e], a, b]
-                d = minus(row(x, elements[e, a], zero), row(x, elements[e, b], zero))
-                for c in range(dim):
-                    force[e, a * dim + c] += weight * d[c]
-                    force[e, b * dim + c] -= weight * d[c]
+        for f in range(n_forms):
+            at = e * (n_forms + 1) + f
+            slope[at] = 0.0
+            for a in range(k):
+                for b in range(a + 1, k):
+                    for c in range(dim):
+                        part = -2 * matrices[f, of[e], a, b] * (x[elements[e, a], c] - x[elements[e, b], c])
+                        slope[at, a, c] += part
+                        slope[at, b, c] -= part
 
 
 @kernel
-def slopes_and_turns(
-    first: int,
-    last: int,
-    x: Any,
-    elements: Any,
-    matrices: Any,
-    of: Any,
-    simplices: Any,
-    weight: float,
-    numbers: Any,
-    slope: Any,
-    turn: Any,
-    zero: Any,
-) -> None:
-    """Write the derivatives of the quadratic forms, then of the volume, and the second derivatives of the volume.
+def add_forces(first: int, last: int, at_starts: Any, at: Any, slope: Any, factors: Any, force: Any, zero: Any) -> None:
+    """Add the forces of the elements, the sum of slopes times a factor each, to the nodes first to last.
 
-    Shapes: x (n_nodes, dim), elements (n_elements, k), matrices (n_forms, n_classes, k, k), of (n_elements,), simplices
-    (n_simplices, dim + 1), numbers (k, k): of each pair; slope (n_elements * (n_forms + 1), k, dim), turn (n_elements,
-    pairs, 3): the vector w of the pair a < b, see `volumes`.
+    Shapes: at_starts (n_nodes + 1,), at (n_elements * k,), slope (n_elements * n, k, dim), factors (n, n_elements),
+    force (n_nodes, dim).
     """
-    dim, k, n_forms = len(zero), elements.shape[1], len(matrices)
-    n = n_forms + 1
-    own, around = np.empty((k, 3)), np.empty((k, k, 3))
-    for e in range(first, last):
-        slopes(x, elements[e], simplices, weight, own, zero)
-        turns(x, elements[e], simplices, weight, around, zero)
-        for a in range(k):
-            for c in range(dim):
-                slope[e * n + n_forms, a, c] = own[a, c]
-            for f in range(n_forms):
-                for c in range(dim):
-                    slope[e * n + f, a, c] = 0.0
-            for b in range(a + 1, k):
-                for c in range(3):
-                    turn[e, numbers[a, b], c] = around[a, b, c]
-        for a in range(k):
-            for b in range(a + 1, k):
-                for f in range(n_forms):
-                    for c in range(dim):
-                        part = -2 * matrices[f, of[e], a, b] * (x[elements[e, a], c] - x[elements[e, b], c])
-                        slope[e * n + f, a, c] += part
-                        slope[e * n + f, b, c] -= part
+    k, n = unsigned(slope.shape[1]), unsigned(len(factors))
+    for i in range(first, last):
+        total = row(force, i, zero)
+        for m in range(n):
+            for q in range(at_starts[i], at_starts[i + 1]):
+                place = unsigned(at[unsigned(q)])
+                e = element(place, k)
+                total = plus(total, scaled(factors[m, e], line(slope, e * n + m, place - e * k, zero)))
+        put(force, i, total)
 
 
 @kernel
@@ -146,50 +113,30 @@ def growths(first: int, last: int, step: Any, elements: Any, slope: Any, growth:
             growth[m, e] = total
 
 
-def add_turn(blocks, p, i, j, factor, w, zero):
-    """Add factor times the matrix that maps v to v x w to block p, from row i and column j on, of len(zero) rows."""
+def add_part(blocks, p, i, j, a, b, w):
+    """Add a b^T and the matrix that maps v to v x w to block p, from row i and column j on."""
 
 
-@overload(add_turn)
-def _add_turn(blocks, p, i, j, factor, w, zero):
-    def two(blocks, p, i, j, factor, w, zero):
-        blocks[p, i, j + 1] += factor * w[2]
-        blocks[p, i + 1, j] -= factor * w[2]
-
-    def three(blocks, p, i, j, factor, w, zero):
-        x, y, z = factor * w[0], factor * w[1], factor * w[2]
-        blocks[p, i, j + 1] += z
-        blocks[p, i + 1, j] -= z
-        blocks[p, i + 1, j + 2] += x
-        blocks[p, i + 2, j + 1] -= x
-        blocks[p, i + 2, j] += y
-        blocks[p, i, j + 2] -= y
-
-    return {2: two, 3: three}[len(zero)]
-
-
-def add_dyad(blocks, p, i, j, a, b):
-    """Add a b^T to block p, from row i and column j on."""
-
-
-@overload(add_dyad)
-def _add_dyad(blocks, p, i, j, a, b):
-    def two(blocks, p, i, j, a, b):
+@overload(add_part)
+def _add_part(blocks, p, i, j, a, b, w):
+    def two(blocks, p, i, j, a, b, w):
+        p, i, j = unsigned(p), unsigned(i), unsigned(j)
         blocks[p, i, j] += a[0] * b[0]
-        blocks[p, i, j + 1] += a[0] * b[1]
-        blocks[p, i + 1, j] += a[1] * b[0]
-        blocks[p, i + 1, j + 1] += a[1] * b[1]
+        blocks[p, i, j + ONE] += a[0] * b[1] + w[2]
+        blocks[p, i + ONE, j] += a[1] * b[0] - w[2]
+        blocks[p, i + ONE, j + ONE] += a[1] * b[1]
 
-    def three(blocks, p, i, j, a, b):
+    def three(blocks, p, i, j, a, b, w):
+        p, i, j = unsigned(p), unsigned(i), unsigned(j)
         blocks[p, i, j] += a[0] * b[0]
-        blocks[p, i, j + 1] += a[0] * b[1]
-        blocks[p, i, j + 2] += a[0] * b[2]
-        blocks[p, i + 1, j] += a[1] * b[0]
-        blocks[p, i + 1, j + 1] += a[1] * b[1]
-        blocks[p, i + 1, j + 2] += a[1] * b[2]
-        blocks[p, i + 2, j] += a[2] * b[0]
-        blocks[p, i + 2, j + 1] += a[2] * b[1]
-        blocks[p, i + 2, j + 2] += a[2] * b[2]
+        blocks[p, i, j + ONE] += a[0] * b[1] + w[2]
+        blocks[p, i, j + TWO] += a[0] * b[2] - w[1]
+        blocks[p, i + ONE, j] += a[1] * b[0] - w[2]
+        blocks[p, i + ONE, j + ONE] += a[1] * b[1]
+        blocks[p, i + ONE, j + TWO] += a[1] * b[2] + w[0]
+        blocks[p, i + TWO, j] += a[2] * b[0] + w[1]
+        blocks[p, i + TWO, j + ONE] += a[2] * b[1] - w[0]
+        blocks[p, i + TWO, j + TWO] += a[2] * b[2]
 
     return {2: two, 3: three}[len(a)]
 
@@ -197,7 +144,7 @@ def _add_dyad(blocks, p, i, j, a, b):
 @kernel
 def _weighed(e: int, a: int, m: int, slope: Any, second: Any, zero: Any) -> Any:
     """Return column m of the product of the slopes at node a and the matrix `second` of an element."""
-    n = second.shape[1]
+    n = unsigned(second.shape[1])
     total = zero
     for other in range(n):
         total = plus(total, scaled(second[e, other, m], line(slope, e * n + other, a, zero)))
@@ -214,67 +161,79 @@ def _stiffness(e: int, a: int, b: int, matrices: Any, of: Any, factors: Any) -> 
 
 
 @kernel
-def add_rows(
+def rows(
     first: int,
     last: int,
     at_starts: Any,
     at: Any,
     slots: Any,
+    row_starts: Any,
+    weights: Any,
+    x: Any,
+    elements: Any,
+    starts: Any,
+    others: Any,
+    coefficients: Any,
     slope: Any,
     second: Any,
+    pressure: Any,
     matrices: Any,
     of: Any,
     factors: Any,
-    turn: Any,
-    pressure: Any,
-    numbers: Any,
     values: Any,
     zero: Any,
 ) -> None:
-    """Add the second derivatives of the elements' energies to the rows of the nodes first to last of a matrix.
+    """Write the second derivatives of the energy in the rows of the nodes first to last of a matrix.
 
-    The energy depends on n_forms quadratic forms and the volume; `second` are the second derivatives by these,
-    `factors` the first derivatives by the forms, `pressure` that by the volume. With n_forms = 0 the forms have no
-    part in the result.
+    The energy of an element depends on quadratic forms and the volume; `second` are the second derivatives by these,
+    `factors` the first derivatives by the forms, `pressure` that by the volume; `starts`, `others`, `coefficients` are
+    the table of `measures.turn`. Forms of constant stiffness have no slopes; their stiffness is in `weights`, or in
+    `matrices` and `factors`.
 
-    Shapes: at_starts (n_nodes + 1,), at (n_elements * k,), slots (n_elements, k, k), slope (n_elements * (n_forms + 1),
-    k, dim), second (n_elements, n_forms + 1, n_forms + 1), matrices (n_forms, n_classes, k, k), of (n_elements,),
-    factors (n_forms, n_elements), turn (n_elements, pairs, 3), pressure (n_elements,), numbers (k, k), values
-    (n_blocks, dim, dim).
+    Shapes: at_starts, row_starts (n_nodes + 1,), at (n_elements * k,), slots (n_elements, k, k), weights (n_blocks,),
+    or none of them, x (n_nodes, dim), elements (n_elements, k), slope (n_elements * n, k, dim), second (n_elements, n,
+    n), pressure (n_elements,), matrices (n_forms, n_classes, k, k), of (n_elements,), factors (n_forms, n_elements),
+    values (n_blocks, dim, dim).
     """
-    k, n = unsigned(slots.shape[1]), second.shape[1]
+    dim, k, n = unsigned(len(zero)), unsigned(slots.shape[1]), unsigned(second.shape[1])
     for i in range(first, last):
+        for p in range(row_starts[i], row_starts[i + 1]):
+            for c in range(dim):
+                for d in range(dim):
+                    values[unsigned(p), c, d] = -weights[unsigned(p)] if c == d and len(weights) > 0 else 0.0
         for q in range(at_starts[i], at_starts[i + 1]):
             place = unsigned(at[unsigned(q)])
-            e = place // k
+            e = element(place, k)
             a = place - e * k
             for m in range(n):
                 by = _weighed(e, a, m, slope, second, zero)
                 for b in range(k):
-                    add_dyad(values, unsigned(slots[e, a, b]), 0, 0, by, line(slope, e * n + m, b, zero))
-            for b in range(k):
-                p = unsigned(slots[e, a, b])
-                if n > 1:
+                    w = _SPACE
+                    if m == n - ONE:
+                        w = scaled(pressure[e], turn(x, elements[e], starts, others, coefficients, a * k + b, zero))
+                    add_part(values, slots[e, a, b], ZERO, ZERO, by, line(slope, e * n + m, b, zero), w)
+            if len(matrices) > 0:
+                for b in range(k):
                     spring = _stiffness(e, a, b, matrices, of, factors)
-                    for c in range(len(zero)):
-                        values[p, c, c] += spring
-                if a != b:
-                    sign = pressure[e] if a < b else -pressure[e]
-                    add_turn(values, p, 0, 0, sign, line(turn, e, numbers[a, b], _SPACE), zero)
+                    for c in range(dim):
+                        values[unsigned(slots[e, a, b]), c, c] += spring
 
 
 @kernel
 def add_matrices(
     first: int,
     last: int,
+    x: Any,
+    elements: Any,
+    starts: Any,
+    others: Any,
+    coefficients: Any,
     slope: Any,
     second: Any,
+    pressure: Any,
     matrices: Any,
     of: Any,
     factors: Any,
-    turn: Any,
-    pressure: Any,
-    numbers: Any,
     blocks: Any,
     zero: Any,
 ) -> None:
@@ -282,18 +241,18 @@ def add_matrices(
 
     Other shapes as in `add_rows`.
     """
-    dim, k, n = len(zero), slope.shape[1], second.shape[1]
-    for e in range(first, last):
+    dim, k, n = unsigned(len(zero)), unsigned(slope.shape[1]), unsigned(second.shape[1])
+    for e in range(unsigned(first), unsigned(last)):
         for a in range(k):
             for m in range(n):
                 by = _weighed(e, a, m, slope, second, zero)
                 for b in range(k):
-                    add_dyad(blocks, e, a * dim, b * dim, by, line(slope, e * n + m, b, zero))
-            for b in range(k):
-                if n > 1:
+                    w = _SPACE
+                    if m == n - ONE:
+                        w = scaled(pressure[e], turn(x, elements[e], starts, others, coefficients, a * k + b, zero))
+                    add_part(blocks, e, a * dim, b * dim, by, line(slope, e * n + m, b, zero), w)
+            if len(matrices) > 0:
+                for b in range(k):
                     spring = _stiffness(e, a, b, matrices, of, factors)
                     for c in range(dim):
                         blocks[e, a * dim + c, b * dim + c] += spring
-                if a != b:
-                    sign = pressure[e] if a < b else -pressure[e]
-                    add_turn(blocks, e, a * dim, b * dim, sign, line(turn, e, numbers[a, b], _SPACE), zero)

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import factorial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from truespring.arrays import Floats, Ints
 from truespring.assembly import Pattern
 from truespring.fibres import Families
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, lengths, stretch
+from truespring.models.element_volumes import ElementVolumes
 from truespring.models.fibres import fibre_energy
 from truespring.models.gaussian_weights import Laplacians
 from truespring.models.invariants import Condensed, condensed
@@ -82,23 +82,12 @@ class GaussianElements:
     @cached_property
     def _volumes(self) -> Floats:
         """Undeformed volume of each element [m^3], area times thickness in 2D, shape (n_elements,)."""
-        return self._volume(self.nodes)
+        return self._measures.at(self.nodes)[1]
 
     @cached_property
-    def _form(self) -> tuple[Ints, float]:
-        """The simplices of an element, and the factor of the sum of their determinants [-] or [m]."""
-        section, kind = self.problem.section, self.problem.mesh.kind
-        assert section is not None  # see require_body
-        return np.array(kind.simplices), section.thickness * kind.simplex_weight / factorial(kind.dim)
-
-    @cached_property
-    def _numbers(self) -> Ints:
-        """Number of the link between each two nodes of an element, shape (k, k)."""
-        kind = self.problem.mesh.kind
-        numbers = np.zeros((kind.n_nodes, kind.n_nodes), dtype=np.int64)
-        for link, (a, b) in enumerate(kind.links):
-            numbers[a, b] = numbers[b, a] = link
-        return numbers
+    def _measures(self) -> ElementVolumes:
+        n_forms = 0 if self.constant else len(self.laplacians.matrices)
+        return ElementVolumes(self.problem, self._pattern.elements, n_forms + 1)
 
     @property
     def _forms(self) -> tuple[Floats, Ints]:
@@ -110,15 +99,6 @@ class GaussianElements:
         from truespring.kernels.threads import run
 
         run(kernel, len(self._pattern.elements), *arguments, self._pattern.zero, smallest=_SMALLEST_PIECE)
-
-    def _volume(self, positions: Floats) -> Floats:
-        """Return the signed volume of each element [m^3], shape (n_elements,)."""
-        from truespring.kernels import volumes
-        from truespring.kernels.threads import writable
-
-        volume = np.empty(len(self._pattern.elements))
-        self._run(volumes.volumes, writable(positions), self._pattern.elements, *self._form, volume)
-        return volume
 
     def _state(self, positions: Floats, energy: bool = True) -> _State:
         """Return the elements in a deformed state; NaN in inverted elements.
@@ -132,7 +112,7 @@ class GaussianElements:
         sums = np.zeros((len(self.laplacians.matrices), len(self._pattern.elements)))
         if energy or not self.constant:
             self._run(gaussian.sums, writable(positions), self._pattern.elements, *self._forms, sums)
-        ratio = self._volume(positions) / self._volumes
+        ratio = self._measures.at(positions)[1] / self._volumes
         ratio = np.where(ratio > 0, ratio, np.nan)
         squares = sums / self._volumes
         law = self._respond(squares[0], np.log(ratio))
@@ -178,13 +158,16 @@ class GaussianElements:
         from truespring.kernels import gaussian
         from truespring.kernels.threads import writable
 
-        state, slope = self._state(positions, energy=False), self._slopes(positions)[0]
-        growth = np.empty((len(self.laplacians.matrices) + 1, len(self._volumes)))
+        state, slope = self._state(positions, energy=False), self._slopes(positions)
+        stress, second = self._stress(state), self._second(state)
+        growth = np.empty((self._measures.rows, len(self._volumes)))
         self._run(gaussian.growths, writable(step), self._pattern.elements, slope, growth)
         growth /= self._volumes
         growth[-1] /= state.ratio
-        second = self._second(state)
-        return np.asarray(self._stress(state) + np.einsum("emn,ne->me", second, growth))
+        if self.constant:
+            stress[-1] += second[:, -1, -1] * growth[-1]
+            return stress
+        return np.asarray(stress + np.einsum("emn,ne->me", second, growth))
 
     @staticmethod
     def _second(state: _State) -> Floats:
@@ -200,20 +183,18 @@ class GaussianElements:
 
     def gradient(self, positions: Floats) -> Floats:
         """Return the internal force [N], shape (n_nodes, dim)."""
-        from truespring.kernels import gaussian, volumes
+        from truespring.kernels import gaussian
         from truespring.kernels.threads import run, writable
 
         x, pattern, state = writable(positions), self._pattern, self._state(positions, energy=False)
-        force = np.empty((len(pattern.elements), pattern.elements.shape[1] * pattern.dim))
-        self._run(volumes.forces, x, pattern.elements, *self._form, state.law.at.by_y / state.ratio, force)
-        if self._weights is None:
-            factors = self._stress(state)[:-1]
-            self._run(gaussian.forces, x, pattern.elements, *self._forms, np.ascontiguousarray(factors), force)
-            return pattern.vector(force)
-        pull = np.empty(self.nodes.shape)
-        known = (x, pattern.starts, pattern.columns, self._weights)
-        run(gaussian.pulls, len(pull), *known, pull, pattern.zero, smallest=_SMALLEST_PIECE)
-        return np.asarray(pull + pattern.vector(force))
+        factors, force = self._stress(state)[-self._measures.rows :], np.zeros(self.nodes.shape)
+        factors[-1] /= state.ratio
+        if self._weights is not None:
+            known = (x, pattern.starts, pattern.columns, self._weights)
+            run(gaussian.pulls, len(force), *known, force, pattern.zero, smallest=_SMALLEST_PIECE)
+        known = (pattern.at_starts, pattern.at, self._slopes(positions), factors)
+        run(gaussian.add_forces, len(force), *known, force, pattern.zero, smallest=_SMALLEST_PIECE)
+        return force
 
     @cached_property
     def _weights(self) -> Floats | None:
@@ -238,35 +219,35 @@ class GaussianElements:
         found = np.bincount(self._pattern.slots.ravel(), values.ravel(), len(self._pattern.columns))
         return found.astype(np.float64, copy=False)
 
-    def _slopes(self, positions: Floats, forms: bool = True) -> tuple[Floats, Floats]:
-        """Return first derivatives of forms and volume, and the second ones of the volume; see the kernel."""
+    def _slopes(self, positions: Floats) -> Floats:
+        """Return the derivatives of forms that are not constant, and of the volume, of each element; see Measured."""
         from truespring.kernels import gaussian
         from truespring.kernels.threads import writable
 
-        matrices, of = self._forms
-        known = matrices if forms else matrices[:0]
-        n, (k, dim) = len(self._pattern.elements), (self._pattern.elements.shape[1], self._pattern.dim)
-        slope = np.empty((n * (len(known) + 1), k, dim))
-        turn = np.empty((n, len(self.problem.mesh.kind.links), 3))
-        rest = (*self._form, self._numbers, slope, turn)
-        self._run(gaussian.slopes_and_turns, writable(positions), self._pattern.elements, known, of, *rest)
-        return slope, turn
+        slope = self._measures.at(positions)[0]
+        if not self.constant:
+            self._run(gaussian.slopes, writable(positions), self._pattern.elements, *self._forms, slope)
+        return slope
 
-    def _curvature(self, positions: Floats, stress: Floats | None, forms: bool = True) -> tuple[Any, ...]:
-        """Return the arguments of the kernels that add second derivatives, without the forms if these are constant."""
+    def _curvature(self, positions: Floats, stress: Floats | None, forms: bool) -> tuple[Any, ...]:
+        """Return the arguments of the kernels that add second derivatives; without the part of the forms if constant.
+
+        `forms`: include the constant stiffness of the forms.
+        """
+        from truespring.kernels.threads import writable
+
         state = self._state(positions, energy=False)
         stress = self._stress(state) if stress is None else stress
-        second = self._second(state)
+        second = self._second(state)[:, -self._measures.rows :, -self._measures.rows :]
         second[:, -1, -1] -= stress[-1]
         second /= self._volumes[:, None, None]
         second[:, -1] /= state.ratio[:, None]  # by the volume instead of ln J
         second[:, :, -1] /= state.ratio[:, None]
         matrices, of = self._forms
-        if not forms:
-            second, matrices = np.ascontiguousarray(second[:, -1:, -1:]), matrices[:0]
-        slope, turn = self._slopes(positions, forms)
-        factors = np.ascontiguousarray(stress[:-1] if forms else stress[:0])
-        return slope, second, matrices, of, factors, turn, stress[-1] / state.ratio, self._numbers
+        n_forms = len(matrices) if forms else 0
+        at = (writable(positions), self._pattern.elements, *self._measures.turns, self._slopes(positions))
+        curved = (np.ascontiguousarray(second), stress[-1] / state.ratio)
+        return *at, *curved, matrices[:n_forms], of, np.ascontiguousarray(stress[:n_forms])
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
@@ -274,13 +255,10 @@ class GaussianElements:
         from truespring.kernels.threads import run
 
         pattern, values = self._pattern, self._pattern.values()
-        values[:] = 0.0
-        if self._weights is not None:
-            for axis in range(pattern.dim):
-                values[:, axis, axis] = -self._weights
-        known = self._curvature(positions, stress, self._weights is None)
-        rows = (pattern.at_starts, pattern.at, pattern.slots)
-        run(gaussian.add_rows, len(self.nodes), *rows, *known, values, pattern.zero, smallest=_SMALLEST_PIECE)
+        weights = np.empty(0) if self._weights is None else self._weights
+        known = self._curvature(positions, stress, forms=not self.constant)
+        rows = (pattern.at_starts, pattern.at, pattern.slots, pattern.starts, weights)
+        run(gaussian.rows, len(self.nodes), *rows, *known, values, pattern.zero, smallest=_SMALLEST_PIECE)
         return pattern.matrix(values)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
@@ -299,7 +277,7 @@ class GaussianElements:
 
         n, n_dof = len(self._pattern.elements), self._pattern.elements.shape[1] * self._pattern.dim
         blocks = np.zeros((n, n_dof, n_dof))
-        self._run(gaussian.add_matrices, *self._curvature(positions, None), blocks)
+        self._run(gaussian.add_matrices, *self._curvature(positions, None, forms=True), blocks)
         return blocks
 
     def element_arrays(self) -> dict[str, Any]:
