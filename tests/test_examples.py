@@ -179,4 +179,4 @@ def test_the_organ_is_solved_as_its_twin() -> None:
     assert result.converged
     for reference, comparison in result.comparisons.items():
         assert twins[reference].rms_errors == pytest.approx(comparison.rms_errors, rel=1e-5)
-    assert all(path.cost and path.cost.linear == "multigrid" for path in result.paths.values())
+    assert all(path.cost and path.cost.linear.endswith("multigrid") for path in result.paths.values())

@@ -1,9 +1,10 @@
 """Boundary conditions of a potential: forces, prescribed motion, and loads that follow the body."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.potential import Potential
@@ -98,6 +99,15 @@ class Refined(Potential, Protocol):
     def loading(self) -> Loading:
         """The problem's loading on all nodes of the potential."""
         ...
+
+
+def from_parents(parents: Ints, n_nodes: int) -> "sparse.csr_array[Any]":
+    """Return the weights of all nodes of a refined potential from the `n_nodes` of the mesh, shape (n_all, n_nodes)."""
+    n_further = len(parents)
+    rows = np.concatenate([np.arange(n_nodes), n_nodes + np.repeat(np.arange(n_further), 2)])
+    shares = np.repeat([1.0, 0.5], [n_nodes, 2 * n_further])
+    at = rows, np.concatenate([np.arange(n_nodes), parents.ravel()])
+    return sparse.csr_array((shares, at), shape=(n_nodes + n_further, n_nodes))
 
 
 def on_the_mesh(force: Floats, parents: Ints) -> Floats:

@@ -1,17 +1,19 @@
 """solve(problem, model, solver) -> Solution: compute the equilibria of a body."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from truespring.arrays import Floats
-from truespring.conditions import Loading, Refined, on_the_mesh
+from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, TruespringError, one_line
-from truespring.mesh import select
+from truespring.mesh import interpolations, select
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
@@ -21,6 +23,9 @@ from truespring.solution import State as State
 from truespring.solution import Status as Status
 from truespring.solvers import Equilibrium, Geometry, Newton, Reporter, Solver, as_solver
 from truespring.soundness import UNBALANCED, path_status, path_warnings
+
+# Largest number of nodes of the coarsest mesh of multigrid.
+_COARSEST = 60
 
 
 @renamed_argument("report", "progress")
@@ -84,6 +89,14 @@ def geometry_of(problem: Problem, finite: bool = True) -> Geometry:
     return Geometry(upright, partial(select, problem.mesh))
 
 
+def _coarser(problem: Problem, potential: Potential) -> "Sequence[sparse.csr_array[Any]]":
+    """Return weights of the nodes of a potential from those of coarser meshes, empty unless the mesh is a lattice."""
+    weights = interpolations(problem.mesh, _COARSEST)
+    if not weights or not isinstance(potential, Refined):
+        return weights
+    return from_parents(potential.parents, problem.mesh.n_nodes), *weights
+
+
 def check_solver(problem: Problem, solver: Solver) -> None:
     """Raise ProblemError if a solver does not fit the problem, as one that controls a held displacement."""
     solver.check(problem.loading, geometry_of(problem))
@@ -97,7 +110,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
-    geometry = geometry_of(problem, model.finite)
+    geometry = replace(geometry_of(problem, model.finite), coarser=partial(_coarser, problem, potential))
     solver.check(problem.loading, geometry)
     if not model.finite:
         loading = loading.at_rest(potential.nodes)

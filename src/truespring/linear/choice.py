@@ -3,8 +3,9 @@
 Held directions are excluded: right sides and solutions, shape (n_nodes, dim), are zero there.
 """
 
+from collections.abc import Callable, Sequence
 from types import MappingProxyType
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError, nearest
@@ -47,16 +48,19 @@ class LinearSolver(Protocol):
     """A method that prepares tangents for solving.
 
     Attributes:
-        name: name for notes and reports.
         factorisations, cg_iterations, lanczos_iterations: costs so far, see Cost.
         memory: largest memory of factors or coarse levels so far [bytes].
     """
 
-    name: str
     factorisations: int
     cg_iterations: int
     lanczos_iterations: int
     memory: int
+
+    @property
+    def name(self) -> str:
+        """Name for notes and reports."""
+        ...
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
         """Prepare the tangent at `positions` [m], shape (n_nodes, dim); raise SingularMatrixError without an inverse.
@@ -78,10 +82,13 @@ def check_linear(name: str) -> None:
         raise ProblemError(f"linear = '{name}' is not installed; try: pip install {FACTORISERS[name].package}")
 
 
-def choose(name: str, nodes: Floats, held: Bools) -> LinearSolver:
+def choose(name: str, nodes: Floats, held: Bools, coarser: Callable[[], Sequence[Any]] = tuple) -> LinearSolver:
     """Return the linear solver `name`, one of LINEAR; "auto" chooses by size and dimension.
 
-    `nodes` [m] and `held` have shape (n_nodes, dim). Raises ProblemError if a factorisation does not fit in memory, by
+    `nodes` [m] and `held` have shape (n_nodes, dim). `coarser` returns the weights of the nodes from those of a coarser
+    mesh, of these from a still coarser one, and so on, for multigrid: sparse, shape (n, n_coarse).
+
+    Raises ProblemError if a factorisation does not fit in memory, by
     estimate.
     """
     check_linear(name)
@@ -89,7 +96,7 @@ def choose(name: str, nodes: Floats, held: Bools) -> LinearSolver:
     if name == "auto":
         name = "direct" if dim not in _DIRECT or n_free <= _DIRECT[dim] else "multigrid"
     if name == "multigrid":
-        return Multigrid(nodes, held)
+        return Multigrid(nodes, held, coarser())
     needed, there = direct_bytes(nodes.shape), available_memory()
     if needed > there:
         raise ProblemError(

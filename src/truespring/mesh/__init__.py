@@ -5,6 +5,7 @@ from truespring.mesh.cells import CELL_SHAPES as CELL_SHAPES
 from truespring.mesh.cells import quadrature as quadrature
 from truespring.mesh.coarser import Coarser as Coarser
 from truespring.mesh.coarser import coarser as coarser
+from truespring.mesh.coarser import interpolations as interpolations
 from truespring.mesh.corner_mesh import corner_mesh as corner_mesh
 from truespring.mesh.distance import Gap as Gap
 from truespring.mesh.distance import gap as gap

@@ -79,6 +79,25 @@ def coarser(mesh: Mesh) -> Coarser | None:
     return Coarser(made, weights, parents.ravel(), np.repeat(np.arange(len(keys)), corners.shape[1]))
 
 
+def interpolations(mesh: Mesh, n_smallest: int) -> "tuple[sparse.csr_array[Any], ...]":
+    """Return the weights of the nodes of a mesh from those of a coarser one, of these from a still coarser one, ...
+
+    Each is as `Coarser.weights`. The last mesh has at most `n_smallest` nodes, or is at most two cells thick: still
+    larger cells would be far too stiff in bending. Empty unless the mesh is a lattice.
+    """
+    found: list[sparse.csr_array[Any]] = []
+    while mesh.n_nodes > n_smallest and _thickness(mesh) > 2 and (step := coarser(mesh)) is not None:
+        found.append(step.weights)
+        mesh = step.mesh
+    return tuple(found)
+
+
+def _thickness(mesh: Mesh) -> int:
+    """Return the smallest number of cells along an axis of a lattice, 0 of other meshes."""
+    lattice = _lattice(mesh)
+    return 0 if lattice is None else int(lattice.places.max(axis=0).min())
+
+
 def _keys(places: Ints, shape: Ints) -> Ints:
     """Return a number for each place, x fastest, of the shape of `places` without its last axis."""
     return np.asarray(places @ np.concatenate([[1], np.cumprod(shape[:-1])]))

@@ -71,8 +71,9 @@ class Newton(Solver):
         `geometry` does not admit (an inverted element) are accepted only if the smallest load step leads to no other.
         If the body is unstable without load, that state is the only one.
         """
-        admissible = (geometry or Geometry()).admissible
-        linear = choose(self.linear, potential.nodes, loading.held)
+        geometry = geometry or Geometry()
+        admissible = geometry.admissible
+        linear = choose(self.linear, potential.nodes, loading.held, geometry.coarser)
         balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
         last = descend(balance, 0.0, potential.nodes)
         yield self._with_cost(last.state, balance)
@@ -180,13 +181,14 @@ class Nearby(Newton):
         geometry: Geometry | None = None,
     ) -> Iterator[Equilibrium]:
         """Yield the state at full load; not converged if no equilibrium was found from the start."""
-        admissible = (geometry or Geometry()).admissible
+        geometry = geometry or Geometry()
+        admissible = geometry.admissible
         balance = Balance(
             potential,
             loading,
             self.tolerance,
             self.max_iterations,
-            choose(self.linear, potential.nodes, loading.held),
+            choose(self.linear, potential.nodes, loading.held, geometry.coarser),
             report,
         )
         positions = potential.nodes.copy() if self.start is None else self.start(potential)

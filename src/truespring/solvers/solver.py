@@ -1,6 +1,6 @@
 """Base class of solvers."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from inspect import isclass, signature
 from typing import Any
@@ -33,10 +33,13 @@ class Geometry:
     Attributes:
         admissible: returns whether positions [m], shape (n_nodes, dim), leave all elements uninverted.
         select: returns the node numbers of a selection, shape (n,); selections are those of supports and loads.
+        coarser: returns weights of the nodes from those of coarser meshes, see `linear.choice.choose`; empty if there
+            are none.
     """
 
     admissible: Callable[[Floats], bool] = _admits_all
     select: Callable[[Any], Ints] = _selects_none
+    coarser: Callable[[], Sequence[Any]] = tuple
 
 
 class Solver:

@@ -1,0 +1,146 @@
+"""Matrices of multigrid levels, in the form that smoothers and products use."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from truespring.arrays import Bools, Floats, ShortInts, Singles
+from truespring.linear.direct import SingularMatrixError
+from truespring.linear.gradients import scalar_product
+
+Real = Floats | Singles
+
+# Smallest number of matrix entries that is worth another thread.
+_SMALLEST_PIECE = 80_000
+# Eigenvalues of the coarsest matrix below this share of the largest are zero.
+_KERNEL = 1e-7
+
+
+class Matrix(NamedTuple):
+    """A symmetric matrix of node blocks in compressed rows, and its held directions.
+
+    Attributes:
+        starts, columns: row starts and ascending columns, shape (n_nodes + 1,) and (n_blocks,).
+        data: blocks, shape (n_blocks, k, k).
+        held: true for directions that are excluded, shape (n_nodes, k).
+    """
+
+    starts: ShortInts
+    columns: ShortInts
+    data: Floats
+    held: Bools
+
+
+@dataclass(eq=False)
+class Level:
+    """A matrix in the form of `kernels.blocks`.
+
+    Attributes:
+        starts, columns: row starts and columns of the blocks left of the diagonal, shape (n + 1,) and (n_lower,).
+        lower: these blocks, shape (n_lower, k, k).
+        rest: sum of the blocks of each row, shape (n, k, k).
+        inverse: inverse of each diagonal block with `added`, shape (n, k, k).
+        added: added to the diagonal for the smoother, shape (n, k).
+        pieces: range of rows of each thread.
+    """
+
+    starts: ShortInts
+    columns: ShortInts
+    lower: Real
+    rest: Floats
+    inverse: Real
+    added: Real
+    pieces: list[tuple[int, int]]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of nodes, and of unknowns per node."""
+        return self.rest.shape[0], self.rest.shape[1]
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of the arrays [bytes]."""
+        return sum(array.nbytes for array in (self.columns, self.lower, self.rest, self.inverse))
+
+    @cached_property
+    def bounds(self) -> ShortInts:
+        """First row of each thread, and the number of rows, shape (n_threads + 1,)."""
+        return np.array([0, *(last for _, last in self.pieces)], dtype=np.int32)
+
+    def product(self, x: Floats, result: Floats) -> float:
+        """Write A x to `result` and return x . A x; `x` and `result` have shape (n, k)."""
+        from truespring.kernels import blocks
+        from truespring.kernels.threads import run_on
+
+        zero, matrix = (0.0,) * self.shape[1], (self.starts, self.columns, self.lower)
+        run_on(self.pieces, blocks.product, *matrix, self.rest, x, result, zero)
+        blocks.product_across(self.bounds, *matrix, x, result, zero)
+        return scalar_product(x, result)
+
+
+def worth(n: int, size: int) -> int:
+    """Return the smallest number of rows that is worth another thread, of n rows with `size` entries together."""
+    return max(1, n * _SMALLEST_PIECE // max(size, 1))
+
+
+def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: type[np.floating[Any]]) -> Level:
+    """Return an uninitialised level for a matrix with the sparsity `starts`, `columns` and blocks of `size` rows.
+
+    Raises SingularMatrixError if a diagonal block is missing.
+    """
+    from truespring.kernels import blocks
+    from truespring.kernels.threads import pieces, run
+
+    n = len(starts) - 1
+    counts = np.empty(n, np.int32)
+    run(blocks.count_lower, n, starts, columns, counts)
+    if (counts < 0).any():
+        raise SingularMatrixError(f"the matrix has no diagonal block for node {int(counts.argmin())}")
+    lower_starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    lower_columns = np.empty(lower_starts[-1], np.int32)
+    run(blocks.take_lower, n, starts, columns, lower_starts, lower_columns)
+    lower = np.empty((len(lower_columns), size, size), precision)
+    rest, inverse = np.empty((n, size, size)), np.empty((n, size, size), precision)
+    added = np.empty((n, size), precision)
+    return Level(lower_starts, lower_columns, lower, rest, inverse, added, pieces(n, worth(n, lower.size)))
+
+
+def condense(level: Level, matrix: Matrix, scale: float) -> bool:
+    """Fill a level with a matrix times `scale`; return whether all diagonal blocks are positive definite."""
+    from truespring.kernels import blocks
+    from truespring.kernels.threads import run
+
+    room = (level.bounds, level.starts, level.lower, level.rest, level.inverse, level.added, (0.0,) * level.shape[1])
+    return not any(run(blocks.condense, len(level.rest), *matrix, scale, *room))
+
+
+def product_pattern(n_rows: int, n_columns: int, *factors: ShortInts) -> tuple[ShortInts, ShortInts]:
+    """Return row starts and ascending columns of the product of two sparse matrices.
+
+    `factors` are row starts and columns of the first one, then of the second one, which has `n_columns` columns.
+    """
+    from truespring.kernels import multigrid
+    from truespring.kernels.threads import run
+
+    counts = np.zeros(n_rows, np.int32)
+    run(multigrid.count_product, n_rows, *factors, n_columns, counts)
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    columns = np.empty(starts[-1], np.int32)
+    run(multigrid.fill_product, n_rows, *factors, n_columns, starts, columns)
+    return starts, columns
+
+
+def inverse_of(matrix: Matrix) -> Floats:
+    """Return the inverse of a small matrix, zero on its kernel and in held directions, shape (n k, n k)."""
+    n, size = matrix.held.shape
+    rows = np.repeat(np.arange(n), np.diff(matrix.starts))
+    whole = np.zeros((n, n, size, size))
+    whole[rows, matrix.columns] = matrix.data
+    dense = whole.transpose(0, 2, 1, 3).reshape(n * size, n * size)
+    held = matrix.held.ravel()
+    dense[held] = dense[:, held] = 0.0
+    values, vectors = np.linalg.eigh((dense + dense.T) / 2)
+    kept = values > _KERNEL * values[-1]
+    return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
