@@ -8,7 +8,7 @@ from dataclasses import asdict
 from benchmarks import commands, machine, older, organ, runs
 from benchmarks.cases import LADDER, OLDER, REFERENCE, SIZES
 from benchmarks.page import build
-from benchmarks.runs import HERE, PROGRAMS, ROOT, SPRINGS, Job, Log
+from benchmarks.runs import CACHE, HERE, PROGRAMS, ROOT, SPRINGS, Job, Session
 
 # Meshes of --small, for development: each is measured once, and the page is written elsewhere.
 _SMALL = {2: SIZES[2][:2], 3: SIZES[3][:2]}
@@ -30,17 +30,20 @@ _LOOPS = (
 
 def measured(small: bool) -> dict:
     """Return all measurements of the page."""
-    log = Log()
+    session = Session(CACHE / "small" if small else CACHE)
     sizes, ladder = (_SMALL, _SMALL_LADDER) if small else (SIZES, LADDER)
     repeats = 1 if small else runs.REPEATS
     bandwidth = runs.in_process("kernels")
-    log("memory bandwidth: " + ", ".join(f"{name} {value / 1e9:.1f} GB/s" for name, value in bandwidth.items()))
-    command_line = commands.command_line(log, repeats)
-    before = older.compared(log, _SMALL_OLDER if small else OLDER, repeats)
-    bodies = [_on_the_organ(poisson, model, log) for poisson in organ.POISSON for model in organ.MODELS]
-    loads = ((3, "soft block"), (3, "bending"), (2, "bending"), (3, "stretching"), (2, "stretching"))
-    found = runs.measure_all(runs.jobs(sizes, ladder, loads), log, repeats)
+    session.log("memory bandwidth: " + ", ".join(f"{name} {value / 1e9:.1f} GB/s" for name, value in bandwidth.items()))
+    code = runs.digest("", [HERE / "commands.py", ROOT / "examples" / "bending.toml"])
+    command_line = session.cached("commands", code, lambda: commands.command_line(session, repeats))
+    before = older.compared(session, _SMALL_OLDER if small else OLDER, repeats)
+    ratios = organ.POISSON[:1] if small else organ.POISSON
+    bodies = [_on_the_organ(poisson, model, session) for poisson in ratios for model in organ.MODELS]
     loops = dict.fromkeys((name, dim, min(depth, sizes[dim][-1])) for name, dim, depth in _LOOPS)
+    profiles = [_loops(*one, session) for one in loops]
+    loads = ((3, "soft block"), (3, "bending"), (2, "bending"), (3, "stretching"), (2, "stretching"))
+    found = runs.measure_all(runs.jobs(sizes, ladder, loads), session, repeats)
     return {
         "date": machine.today(),
         "commit": machine.commit(),
@@ -52,26 +55,26 @@ def measured(small: bool) -> dict:
         "older_commit": older.COMMIT,
         "older": before,
         "organ": bodies,
-        "kernels": [_loops(*one, log) for one in loops],
+        "kernels": profiles,
         "runs": [asdict(one) for one in found],
     }
 
 
-def _on_the_organ(poisson: float, model: str, log: Log) -> dict:
+def _on_the_organ(poisson: float, model: str, session: Session) -> dict:
     """Return the times of a model on the organ, or why there are none."""
     code = runs.digest(model, [HERE / "organ.py", ROOT / "examples" / "organ.toml"])
-    found = runs.cached(f"organ-{model}-{poisson}", code, lambda: runs.in_process("organ", (str(poisson), model)))
-    log(f"organ, {model}, Poisson's ratio {poisson:g}: {found.get('solve', found.get('failure'))}")
+    found = session.cached(f"organ-{model}-{poisson}", code, lambda: runs.in_process("organ", (str(poisson), model)))
+    session.log(f"organ, {model}, Poisson's ratio {poisson:g}: {found.get('solve', found.get('failure'))}")
     return {"key": model, "poisson": poisson, **found}
 
 
-def _loops(name: str, dim: int, depth: int, log: Log) -> dict:
+def _loops(name: str, dim: int, depth: int, session: Session) -> dict:
     """Return the times of the loops of a program in bending, see `kernels.measured`; no rows after a failure."""
     job = Job(name, dim, "bending", depth)
     code = runs.digest(name, [HERE / file for file in ("kernels.py", "limits.py", "parts.py", "phases.py", "cases.py")])
     arguments = PROGRAMS[name].arguments
-    found = runs.cached(f"kernels-{name}-{dim}d-{depth}", code, lambda: runs.on_case("kernels", job, arguments))
-    log(f"loops of {name}, {dim}D, {job.n_nodes:,} nodes: {found.get('failure', 'measured')}")
+    found = session.cached(f"kernels-{name}-{dim}d-{depth}", code, lambda: runs.on_case("kernels", job, arguments))
+    session.log(f"loops of {name}, {dim}D, {job.n_nodes:,} nodes: {found.get('failure', 'measured')}")
     return {
         "program": name,
         "dim": dim,

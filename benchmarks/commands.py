@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.runs import REPEATS, ROOT, Log, environment
+from benchmarks.runs import REPEATS, ROOT, Session, environment
 
 _STUDY = str(ROOT / "examples" / "bending.toml")
 
@@ -30,27 +30,27 @@ COMMANDS = {
 COLD = "truespring verify examples/bending.toml"
 
 
-def command_line(log: Log, repeats: int = REPEATS) -> dict[str, float]:
+def command_line(session: Session, repeats: int = REPEATS) -> dict[str, float]:
     """Return the median wall times of commands [s]."""
     found: dict[str, float] = {}
     for name, arguments in COMMANDS.items():
         _once(arguments, {})
-        _record(found, name, [_once(arguments, {}) for _ in range(repeats)], log)
+        _record(found, name, [_once(arguments, {}) for _ in range(repeats)], session)
     cold = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as empty:
             cold.append(_once(COMMANDS[COLD], {"NUMBA_CACHE_DIR": empty}))
-    _record(found, f"{COLD}, compiling", cold, log)
+    _record(found, f"{COLD}, compiling", cold, session)
     return found
 
 
-def _record(found: dict[str, float], name: str, times: list[tuple[float, float]], log: Log) -> None:
+def _record(found: dict[str, float], name: str, times: list[tuple[float, float]], session: Session) -> None:
     """Add the median time of a command, and that of its solutions if it has some."""
     whole, solving = (statistics.median(values) for values in zip(*times, strict=True))
     found[name] = whole
     if solving:
         found[f"{name}, solving"] = solving
-    log(f"{name}: {whole:.2f} s")
+    session.log(f"{name}: {whole:.2f} s")
 
 
 def _once(arguments: list[str], variables: dict[str, str]) -> tuple[float, float]:

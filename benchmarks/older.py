@@ -6,7 +6,7 @@ import tarfile
 from pathlib import Path
 
 from benchmarks.cases import OLDER
-from benchmarks.runs import CACHE, HERE, PROGRAMS, REPEATS, ROOT, SPRINGS, Job, Log, cached, digest, execute
+from benchmarks.runs import CACHE, HERE, PROGRAMS, REPEATS, ROOT, SPRINGS, Job, Session, digest, execute
 
 #: The commit that figures are compared with, and the springs that it was measured with, by dimension.
 COMMIT, RULES = "8b0afef", {3: "isotropic", 2: "lloyd"}
@@ -24,11 +24,11 @@ def source() -> Path | None:
     return folder / "src"
 
 
-def compared(log: Log, depths: dict[int, int] = OLDER, repeats: int = REPEATS) -> list[dict]:
+def compared(session: Session, depths: dict[int, int] = OLDER, repeats: int = REPEATS) -> list[dict]:
     """Return the times [s] of springs then and now by dimension, also of Gaussian springs now; none without COMMIT."""
     before = source()
     if before is None:
-        log(f"older commit {COMMIT}: not in this clone, not measured")
+        session.log(f"older commit {COMMIT}: not in this clone, not measured")
         return []
     own = [HERE / "older.py", HERE / "cases.py", *sorted((HERE / "programs").glob("*.py"))]
     found = []
@@ -40,9 +40,13 @@ def compared(log: Log, depths: dict[int, int] = OLDER, repeats: int = REPEATS) -
         for turn in range(repeats):
             for side, arguments in sides.items():
                 code = digest(f"{COMMIT} {side}", own, ours=side != "then")
-                one = cached(f"older-{dim}d-{depth}-{side}-{turn}", code, lambda given=arguments: execute(*given))
+                one = session.cached(
+                    f"older-{dim}d-{depth}-{side}-{turn}", code, lambda given=arguments: execute(*given)
+                )
                 row["failure"] = row["failure"] or one.get("failure", "")
                 times[side] += [one["seconds"]] if "seconds" in one else []
-                log(f"older commit: {dim}D {then.n_nodes:,} nodes, {side}: {one.get('seconds', one.get('failure'))}")
+                session.log(
+                    f"older commit: {dim}D {then.n_nodes:,} nodes, {side}: {one.get('seconds', one.get('failure'))}"
+                )
         found.append(row)
     return found

@@ -31,7 +31,10 @@ LIMIT = 120.0
 WHOLE_LIMIT = 90 * 60.0
 
 # Time limit of a process [s], with reading, warm-up and failed attempts.
-_PROCESS_LIMIT = 2.5 * LIMIT
+_PROCESS_LIMIT = 3 * LIMIT
+
+# Beginnings of failures that larger meshes share.
+_TIME = ("longer than", "the next size would exceed")
 
 # Processes whose solution is faster than this [s] are repeated REPEATS times, for the median; those of LADDER once.
 _SHORT, REPEATS = 20.0, 3
@@ -234,13 +237,13 @@ class Measured:
         return statistics.median(self.seconds)
 
 
-class Log:
-    """A running log on standard error, and the time that is left."""
+class Session:
+    """A running log on standard error, the time that is left, and the results so far, from which a run resumes."""
 
-    def __init__(self, limit: float = WHOLE_LIMIT) -> None:
-        self._started, self._limit = time.monotonic(), limit
+    def __init__(self, folder: Path = CACHE, limit: float = WHOLE_LIMIT) -> None:
+        self._folder, self._started, self._limit = folder, time.monotonic(), limit
 
-    def __call__(self, text: str) -> None:
+    def log(self, text: str) -> None:
         """Print a line with the time since the start."""
         minutes, seconds = divmod(round(time.monotonic() - self._started), 60)
         sys.stderr.write(f"[{minutes:3}:{seconds:02}] {text}\n")
@@ -249,6 +252,15 @@ class Log:
     def over(self) -> bool:
         """Whether the time limit is reached."""
         return time.monotonic() - self._started > self._limit
+
+    def cached(self, name: str, code: str, run: Callable[[], Any]) -> Any:
+        """Return the result of `run`, from the folder if it has one for the same digest of the code."""
+        file = self._folder / f"{name}-{code}.json"
+        if not file.is_file():
+            found = run()
+            self._folder.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(found))
+        return json.loads(file.read_text())
 
 
 def jobs(
@@ -264,44 +276,45 @@ def jobs(
             yield from (Job(name, dim, load, depth) for depth in sorted({*rungs, *depths}))
 
 
-def measure_all(planned: Iterable[Job], log: Log, repeats: int = REPEATS) -> list[Measured]:
+def measure_all(planned: Iterable[Job], session: Session, repeats: int = REPEATS) -> list[Measured]:
     """Return the results of jobs, cached ones without running; skip jobs that would exceed a limit."""
     empty, found, before = empty_process(), [], []
     for job in planned:
         if before and (before[-1].program, before[-1].dim, before[-1].load) != (job.program, job.dim, job.load):
             before = []
         reason = too_slow(before, job) if before else ""
-        if log.over:
+        if session.over:
             reason = f"left out: the time limit of {WHOLE_LIMIT / 60:g} minutes for all programs"
         on_ladder = job.depth in LADDER.get((job.dim, job.load), ()) and job.depth not in SIZES[job.dim]
-        last = _nothing(job, reason) if reason else measure(job, 1 if on_ladder else repeats)
+        last = _nothing(job, reason) if reason else measure(job, session, 1 if on_ladder else repeats)
         before.append(last)
         found.append(replace(last, peak_bytes=max(0, last.peak_bytes - empty)))
         result = f"{last.median:.3g} s, tip {last.tip:.7g} m {last.notes}" if last.seconds else last.failure
-        log(f"{job.program:20} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {result}")
+        session.log(f"{job.program:20} {job.dim}D {job.load:10} {job.n_nodes:8,} nodes  {result}")
     return found
 
 
 def too_slow(before: Sequence[Measured], job: Job) -> str:
     """Return why a job would exceed LIMIT, else empty: time is a power of the nodes, by the last two meshes."""
     last = before[-1]
-    if not last.seconds:
-        return last.failure
+    if not last.seconds:  # one that did not converge on a coarse mesh may do so on a finer one
+        return last.failure if last.failure.startswith(_TIME) else ""
     power = 1.0
-    if len(before) > 1 and last.median > 1:
-        coarser = before[-2]
+    solved = [one for one in before if one.seconds]
+    if len(solved) > 1 and last.median > 1:
+        coarser = solved[-2]
         power = max(power, float(np.log(last.median / coarser.median) / np.log(last.n_nodes / coarser.n_nodes)))
     if last.median * (job.n_nodes / last.n_nodes) ** power > LIMIT:
         return f"the next size would exceed {LIMIT:g} s ({last.median:.0f} s at {last.n_nodes:,} nodes)"
     return ""
 
 
-def measure(job: Job, repeats: int) -> Measured:
+def measure(job: Job, session: Session, repeats: int) -> Measured:
     """Return the results of a job, repeated if it is fast."""
     runs: list[dict] = []
     while len(runs) < repeats and (not runs or runs[0]["seconds"] < _SHORT):
         name = f"{job.program}-{job.dim}d-{job.load.replace(' ', '-')}-{job.depth}-{len(runs)}"
-        run = cached(name, fingerprint(job.program), lambda: execute(job))
+        run = session.cached(name, fingerprint(job.program), lambda: execute(job))
         if "failure" in run:
             return _nothing(job, run["failure"])
         runs.append(run)
@@ -317,16 +330,6 @@ def measured_of(job: Job, runs: list[dict]) -> Measured:
 def _nothing(job: Job, failure: str) -> Measured:
     """Return the result of a job that failed."""
     return Measured(**asdict(job), n_nodes=job.n_nodes, failure=failure)
-
-
-def cached(name: str, code: str, run: Callable[[], Any]) -> Any:
-    """Return the result of `run`, from the cache if it has one for the same digest of the code."""
-    file = CACHE / f"{name}-{code}.json"
-    if not file.is_file():
-        found = run()
-        CACHE.mkdir(exist_ok=True)
-        file.write_text(json.dumps(found))
-    return json.loads(file.read_text())
 
 
 def fingerprint(name: str) -> str:
