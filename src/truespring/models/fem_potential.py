@@ -17,6 +17,7 @@ from truespring.models.fibres import stiff_fibres, with_fibres
 from truespring.models.law import Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
+from truespring.models.semidefinite import semidefinite
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import contracted, identity, inverted, swapped, voigt_places
 from truespring.potential import Potential, SparseMatrix
@@ -283,8 +284,7 @@ class FemPotential:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
 
         def positive(first: int, last: int) -> Floats:
-            values, vectors = np.linalg.eigh(self.element_hessians(positions, None, first, last))
-            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
+            return semidefinite(self.element_hessians(positions, None, first, last), self.mesh.dim)
 
         return self._pattern.summed(positive)
 

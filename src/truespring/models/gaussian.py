@@ -16,6 +16,7 @@ from truespring.models.gaussian_weights import Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
 from truespring.models.laws import LAWS
+from truespring.models.semidefinite import semidefinite
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import SummedSprings
 from truespring.potential import SparseMatrix
@@ -264,12 +265,7 @@ class GaussianElements:
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
         matrices = self.element_hessians(positions)
-
-        def positive(first: int, last: int) -> Floats:
-            values, vectors = np.linalg.eigh(matrices[first:last])
-            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
-
-        return self._pattern.summed(positive)
+        return self._pattern.summed(lambda first, last: semidefinite(matrices[first:last], self._pattern.dim))
 
     def element_hessians(self, positions: Floats) -> Floats:
         """Return the tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), node by node."""

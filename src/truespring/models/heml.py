@@ -19,6 +19,7 @@ from truespring.models.laws import LAWS
 from truespring.models.linked import LinkedElements
 from truespring.models.links import link_strains
 from truespring.models.model import Model
+from truespring.models.semidefinite import semidefinite
 from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.symmetric import identity
 from truespring.potential import SparseMatrix
@@ -165,12 +166,7 @@ class HyperelasticLinks(LinkedElements):
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
         matrices = self._matrices(positions)
-
-        def positive(first: int, last: int) -> Floats:
-            values, vectors = np.linalg.eigh(matrices(first, last))
-            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
-
-        return self._pattern.summed(positive)
+        return self._pattern.summed(lambda first, last: semidefinite(matrices(first, last), self._pattern.dim))
 
     def _pulls(self, change: Floats) -> Floats:
         from truespring.kernels import links

@@ -10,6 +10,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints, ShortInts
 from truespring.assembly import Pattern
+from truespring.models.semidefinite import semidefinite
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
@@ -131,8 +132,7 @@ class MetricPotential:
         stress = self.stress(positions)
 
         def positive(first: int, last: int) -> Floats:
-            values, vectors = np.linalg.eigh(self._matrices(positions, stress, first, last))
-            return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
+            return semidefinite(self._matrices(positions, stress, first, last), self._pattern.dim)
 
         return self._pattern.summed(positive)
 

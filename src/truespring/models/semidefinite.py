@@ -1,0 +1,46 @@
+"""Semidefinite parts of stacks of element matrices."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from truespring.arrays import Floats
+
+# Smallest number of matrices that is worth another thread.
+_SMALLEST_PIECE = 64
+
+
+def semidefinite(matrices: Floats, dim: int) -> Floats:
+    """Return symmetric matrices with their negative eigenvalues set to zero, shape (n, n_dof, n_dof).
+
+    The matrices are those of energies that translations do not change, node by node: with `dim` directions, n_dof is
+    nodes times dim. Eigenvectors are computed without the translations, which have the eigenvalue zero.
+    """
+    from truespring.kernels.threads import run
+
+    n, n_dof = len(matrices), matrices.shape[1]
+    moved = np.kron(_differences(n_dof // dim), np.eye(dim))
+    found = np.empty((n, n_dof, n_dof))
+
+    def project(first: int, last: int) -> None:
+        values, vectors = np.linalg.eigh(moved.T @ matrices[first:last] @ moved)
+        vectors = moved @ vectors
+        found[first:last] = (vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2)
+
+    with _libraries().limit(limits=1):  # threads of the BLAS take longer than the work on small matrices
+        run(project, n, smallest=_SMALLEST_PIECE)
+    return found
+
+
+def _differences(k: int) -> Floats:
+    """Return an orthonormal basis of the vectors of k numbers whose sum is zero, shape (k, k - 1)."""
+    return np.linalg.qr(np.eye(k)[:, 1:] - 1 / k)[0]
+
+
+@cache
+def _libraries() -> Any:
+    """Return the controller of the threads of numerical libraries; finding them takes milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
