@@ -3,6 +3,7 @@
 import asyncio
 import csv
 import json
+import math
 import os
 import signal
 import socket
@@ -36,14 +37,18 @@ from tests.sweeps import (
 )
 from truespring.cli import main
 from truespring.errors import TruespringError
+from truespring.kernels.threads import n_threads
 from truespring.report.rows import table_of
 from truespring.study import read_study, read_text, run, value_at
-from truespring.sweeping import Failure, Pool, plan_sweep, run_sweep
+from truespring.sweeping import Failure, Pool, here, plan_sweep, run_sweep
+from truespring.sweeping.here import run_here
 from truespring.sweeping.store import FAILED, Store
 from truespring.sweeping.sweep import _outcome, solve_point
 from truespring.sweeping.table import rows_of
 from truespring.sweeping.values import make_changes, read_points, read_value, read_values, read_vary
 
+# The module, whose name in its package is that of the function.
+sweeping = sys.modules["truespring.sweeping.sweep"]
 FAST = changed(("load_steps = 2", "load_steps = 1"))
 
 
@@ -366,6 +371,72 @@ def test_what_is_missing_is_named(study: Path, monkeypatch: pytest.MonkeyPatch) 
         ts.sweep(study, {"material.young": [1e3]})
 
 
+# --- in this process ------------------------------------------------------------------------------
+
+
+def test_points_are_solved_here_until_workers_are_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = {number: number for number in (0, 1, 4, 5, 6)}
+    monkeypatch.setattr(here, "START", math.inf)
+    assert list(run_here(points, square, workers=2, threads=1)) == [
+        (0, 0),
+        (1, 1),
+        (4, Failure("ValueError: four")),
+        (5, Failure("five")),
+        (6, 36),
+    ]
+    monkeypatch.setattr(here, "START", 0.0)
+    assert dict(run_here(points, square, workers=2, threads=1)) == {0: 0, 1: 1}
+    assert len(list(run_here(points, square, workers=1, threads=1))) == 5, "one worker is never faster"
+    before = n_threads()
+    ((_, (ours, blas, _)),) = run_here({0: 0}, threads, workers=2, threads=1)
+    assert ours == blas == 1 and n_threads() == before
+
+
+def test_a_small_sweep_starts_no_workers(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = plan_sweep(study, {"mesh.elements": [[8, 2], [9, 2]], "material.poisson": [0.1, 0.2]})
+    given: list[str] = []
+
+    class Recorded(Pool):
+        def __init__(self, *_: object, **__: object) -> None:
+            pass
+
+        def close(self) -> None:
+            pass
+
+        def run(self, points: Any, task: Any) -> Any:
+            given.extend(points)
+            return ((name, Failure("not solved here")) for name in points)
+
+    monkeypatch.setattr(sweeping, "Pool", Recorded)
+    small = run_sweep(plan, study.parent / "small")
+    assert not given and [row["status"] for row in small.rows] == ["converged", "converged", "failed", "failed"]
+    for name, more in (("timeout", {"timeout": 60.0}), ("scheduler", {"scheduler": "tcp://127.0.0.1:9"})):
+        run_sweep(plan, study.parent / name, **more)  # type: ignore[arg-type]
+        assert sorted(given) == sorted(plan.points)
+        given.clear()
+    monkeypatch.setattr(sweeping, "_MOST_ELEMENTS", 17)  # [9, 2] has 18
+    run_sweep(plan, study.parent / "large")
+    assert len(given) == 2
+
+
+def test_an_interrupted_sweep_keeps_what_was_solved(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = plan_sweep(study, {"material.poisson": [0.1, 0.2, 0.3]})
+    solved: list[object] = []
+
+    def interrupted(job: Any) -> Any:
+        if len(solved) == 2:
+            raise KeyboardInterrupt
+        solved.append(job)
+        return solve_point(job)
+
+    monkeypatch.setattr(sweeping, "solve_point", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(plan, study.parent / "out", workers=1)
+    assert len(records(study.parent / "out")) == 2
+    monkeypatch.undo()
+    assert run_sweep(plan, study.parent / "out", workers=1).n_before == 2
+
+
 # --- sweeps ---------------------------------------------------------------------------------------
 
 
@@ -450,7 +521,7 @@ def test_the_page_loads_nothing(swept: tuple[Path, dict[str, Any], str]) -> None
     assert "data:image/svg+xml" in page and "--vary &#39;mesh.elements=[8,2],[9,2]&#39;" in page
 
 
-def test_what_is_done_is_not_done_twice(swept: tuple[Path, dict[str, Any], str], cluster: str) -> None:
+def test_what_is_done_is_not_done_twice(swept: tuple[Path, dict[str, Any], str]) -> None:
     folder, told, _ = swept
     plan = plan_sweep(folder / "study.toml", {"material.poisson": "0:0.4:3", "mesh.elements": "[8,2],[9,2]"})
     before = records(folder / "out")
@@ -458,22 +529,20 @@ def test_what_is_done_is_not_done_twice(swept: tuple[Path, dict[str, Any], str],
     assert again.n_before == 6 and again.rows == told["rows"] and records(folder / "out") == before
     # What failed, and that alone, is tried again where that is asked for.
     failed = {name for name, record in again.records.items() if record["status"] == "failed"}
-    retried = run_sweep(plan, folder / "out", scheduler=cluster, retry_failed=True)
+    retried = run_sweep(plan, folder / "out", workers=1, retry_failed=True)
     now = records(folder / "out")
     assert retried.n_before == 3 and {name for name in now if now[name] != before[name]} == failed
     assert retried.rows == told["rows"]
 
 
-def test_a_changed_study_starts_anew_and_says_so(
-    swept: tuple[Path, dict[str, Any], str], cluster: str, tmp_path: Path
-) -> None:
+def test_a_changed_study_starts_anew_and_says_so(swept: tuple[Path, dict[str, Any], str], tmp_path: Path) -> None:
     folder = swept[0]
     before = records(folder / "out")
     plan = plan_sweep(
         written(tmp_path, FAST.replace("-0.01", "-0.02")), {"material.poisson": [0.0], "mesh.elements": [[8, 2]]}
     )
     said: list[str] = []
-    done = run_sweep(plan, folder / "out", scheduler=cluster, note=said.append)
+    done = run_sweep(plan, folder / "out", workers=1, note=said.append)
     assert done.n_before == 0 and done.rows[0]["comparison.linear.rms_error"] is not None
     assert "has changed since 6 results" in said[0]
     now = records(folder / "out")
@@ -510,11 +579,11 @@ def test_any_cluster_will_do(cluster: str, study: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="signals of POSIX")
-def test_a_sweep_that_is_killed_goes_on_where_it_stopped(study: Path, cluster: str) -> None:
+def test_a_sweep_that_is_killed_goes_on_where_it_stopped(study: Path) -> None:
     out, undisturbed = study.parent / "out", study.parent / "undisturbed"
     told = [study, "--vary", "material.poisson=0:0.45:6", "--vary", "mesh.elements=[8,2],[16,4]"]
     told += ["--workers", 1, "--out", out, "--json"]
-    sweep = started(*told)
+    sweep = started(*told, "--timeout", 60)  # with a time limit points are solved by workers
     wait_until(lambda: len(list(out.glob("points/*.json"))) >= 3)
     children = psutil.Process(sweep.pid).children(recursive=True)
     sweep.kill()  # it alone, and without a warning
@@ -529,7 +598,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_stopped(study: Path, cluster: s
     assert all(now[name] == before[name] for name in before), "and is not solved again"
     plan = plan_sweep(study, {"material.poisson": "0:0.45:6", "mesh.elements": [[8, 2], [16, 4]]})
     assert set(now) == set(plan.points)
-    wanted = run_sweep(plan, undisturbed, scheduler=cluster)
+    wanted = run_sweep(plan, undisturbed, workers=1)
     assert unclocked(found["rows"]) == unclocked(wanted.rows), "the results are those of an undisturbed run"
 
 
@@ -615,7 +684,7 @@ def test_two_hundred_points_whose_workers_and_scheduler_are_killed(tmp_path: Pat
     """One of two workers every three seconds, the scheduler once: the results are those of an undisturbed run."""
     study = written(tmp_path, STUDY)
     vary = [study, "--vary", "material.poisson=0:0.45:40", "--vary", "load.1.force.2=-0.002:-0.01:5", "--workers", 2]
-    vary += ["--vary", "mesh.elements=[48,12]"]
+    vary += ["--vary", "mesh.elements=[48,12]", "--timeout", 600]
     wanted = finished(started(*vary, "--out", tmp_path / "undisturbed", "--json"))
     sweep = started(*vary, "--out", tmp_path / "out", "--json")
     killed, schedulers, seen, due = 0, 0, 0, 0.0

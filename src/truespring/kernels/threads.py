@@ -45,6 +45,17 @@ def set_threads(count: int | None) -> None:
     _chosen = count
 
 
+@contextmanager
+def limited(count: int | None) -> Iterator[None]:
+    """Set the number of threads of kernels within the block; None uses all cores."""
+    former = _chosen
+    set_threads(count)
+    try:
+        yield
+    finally:
+        set_threads(former)
+
+
 def pieces(n: int, smallest: int = _SMALLEST_PIECE) -> list[tuple[int, int]]:
     """Return ranges that divide 0..n, at most one per thread, each of at least `smallest` unless it is the only one."""
     count = max(1, min(n_threads(), n // max(smallest, 1)))

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -70,10 +71,7 @@ class Pool:
     ) -> None:
         """Start the workers or connect to the scheduler; raise TruespringError if that fails."""
         require_dask()
-        if workers is not None and scheduler is not None:
-            raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one of them")
-        if workers is not None and workers < 1:
-            raise TruespringError(f"workers = {workers}: it must be at least 1, or None for the number of cores")
+        check_workers(workers, scheduler)
         self.scheduler, self.threads, self.patience, self.timeout = scheduler, threads, patience, timeout
         self.workers = workers
         self._note = note or (lambda _: None)
@@ -156,7 +154,7 @@ class Pool:
         ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         try:
             made = client.map(
-                _Guarded(task, self.threads, self.timeout),
+                Guarded(task, self.threads, self.timeout),
                 [points[key] for key in keys],
                 key=[(group, number) for number in range(len(keys))],
                 pure=False,
@@ -244,13 +242,14 @@ _KEPT = "solved points are kept; the same command continues"
 _KILLED = "every worker that tried it was killed: it may need more memory or time, or a library crashed"
 
 
-class _Guarded:
-    """The task as workers run it, with limits of threads and time, and errors returned as Failure."""
+class Guarded:
+    """The task as it is run, with limits of threads and time, and errors returned as Failure."""
 
     def __init__(self, task: Callable[[Any], Any], threads: int, timeout: float | None) -> None:
         self.task, self.threads, self.timeout = task, threads, timeout
 
     def __call__(self, value: Any) -> Any:
+        """Return the result of the task, or a Failure."""
         if self.timeout is None:
             return self._result(value)
         # Only ending the process stops a library that does not return; the nanny restarts the worker.
@@ -265,10 +264,9 @@ class _Guarded:
     def _result(self, value: Any) -> Any:
         from threadpoolctl import threadpool_limits
 
-        from truespring.kernels.threads import set_threads
+        from truespring.kernels.threads import limited
 
-        set_threads(self.threads)
-        with threadpool_limits(self.threads):
+        with limited(self.threads), threadpool_limits(self.threads):
             try:
                 return self.task(value)
             except TruespringError as error:
@@ -312,14 +310,16 @@ class _Quiet:
         self._former.clear()
 
 
+def check_workers(workers: int | None, scheduler: str | None) -> None:
+    """Raise TruespringError if both are given, or if there are less than one worker."""
+    if workers is not None and scheduler is not None:
+        raise TruespringError("workers and scheduler are given: a cluster has its own workers; give one of them")
+    if workers is not None and workers < 1:
+        raise TruespringError(f"workers = {workers}: it must be at least 1, or None for the number of cores")
+
+
 def require_dask() -> None:
-    """Raise TruespringError if a package that sweeps need is not installed."""
-    try:
-        import cryptography
-        import distributed
-        import polars
-    except ImportError as error:
-        raise TruespringError(
-            f"{error.name} is not installed, sweeps need it: pip install 'truespring[sweep]'"
-        ) from None
-    del cryptography, distributed, polars
+    """Raise TruespringError if a package that sweeps need is not installed; import none of them."""
+    for name in ("cryptography", "distributed", "polars"):
+        if find_spec(name) is None:
+            raise TruespringError(f"{name} is not installed, sweeps need it: pip install 'truespring[sweep]'")

@@ -1,8 +1,9 @@
 """A sweep: one study with many values, each point solved once."""
 
 import math
+import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -13,8 +14,9 @@ from truespring.outputs import Lock
 from truespring.report.summary import summary
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
+from truespring.sweeping.here import run_here
 from truespring.sweeping.plan import Plan, Point, digests, make_plan
-from truespring.sweeping.pool import Failure, Note, Pool, require_dask
+from truespring.sweeping.pool import Failure, Note, Pool, check_workers, require_dask
 from truespring.sweeping.result import Sweep, write_sweep
 from truespring.sweeping.store import CONVERGED, FAILED, Store
 from truespring.sweeping.values import make_changes, read_points
@@ -25,6 +27,9 @@ Progress = Callable[[int, int, int], None]
 
 # A worker is killed after twice the time limit of all models of a point, plus this [s].
 _GRACE = 30.0
+
+# Largest number of elements of a generated mesh whose points may be solved in this process.
+_MOST_ELEMENTS = 2000
 
 
 def sweep(
@@ -53,7 +58,8 @@ def sweep(
         out: folder for results, as of `truespring sweep --out`; points solved there before are not solved again.
         lhs: number of points of a Latin hypercube over the values, instead of all combinations; drawn with `seed`.
         points: instead of `vary`, the values of each point by key, or a CSV file with one row per point.
-        workers: number of processes on this machine, by default the number of cores.
+        workers: number of processes on this machine, by default the number of cores; points of small generated meshes
+            are solved in this process while that is faster than starting them.
         scheduler: address of a Dask cluster to use instead.
         retry_failed: whether to solve failed points again.
         timeout: time limit of each model [s]; None is no limit.
@@ -113,13 +119,21 @@ def run_sweep(
         if note:
             for text in notes:
                 note(text)
-        left = {name: point for name, point in plan.points.items() if name not in records}
+        left = {name: (plan.text, point) for name, point in plan.points.items() if name not in records}
         n_before = len(records)
+        if left:
+            check_workers(workers, scheduler)
+            tally = _Tally(plan, store, records, progress)
+            tally.count()
+            if scheduler is None and timeout is None:  # only ending a worker stops a library that does not return
+                small = {name: job for name, job in left.items() if _is_small(job)}
+                tally.record(run_here(small, solve_point, workers or os.cpu_count() or 1, threads))
+            left = {name: job for name, job in left.items() if name not in records}
         if left:
             models = len(plan.text.document.get("models", ()))
             hard = None if timeout is None else 2 * models * timeout + _GRACE
-            pool = Pool(workers, scheduler, threads=threads, timeout=hard, note=note)
-            _Tally(plan, store, records, progress).solve(left, pool, partial(solve_point, timeout=timeout))
+            with Pool(workers, scheduler, threads=threads, timeout=hard, note=note) as pool:
+                tally.record(pool.run(left, partial(solve_point, timeout=timeout)))
         return Sweep(plan, {name: records[name] for name in plan.points}, n_before, notes)
 
 
@@ -132,16 +146,13 @@ class _Tally:
         self.plan, self.store, self.records, self.progress = plan, store, records, progress
         self.n_failed = sum(record["status"] == FAILED for record in records.values())
 
-    def solve(self, points: Mapping[str, Point], pool: Pool, task: Callable[[Any], Any]) -> None:
-        self.count()
-        with pool:
-            jobs = {name: (self.plan.text, point) for name, point in points.items()}
-            for name, outcome in pool.run(jobs, task):
-                record = {**self._head(points[name]), **_outcome(outcome)}
-                self.store.write(record)
-                self.records[name] = record
-                self.n_failed += record["status"] == FAILED
-                self.count()
+    def record(self, outcomes: Iterable[tuple[str, dict[str, Any] | Failure]]) -> None:
+        for name, outcome in outcomes:
+            record = {**self._head(self.plan.points[name]), **_outcome(outcome)}
+            self.store.write(record)
+            self.records[name] = record
+            self.n_failed += record["status"] == FAILED
+            self.count()
 
     def count(self) -> None:
         if self.progress:
@@ -170,6 +181,13 @@ def solve_point(job: tuple[StudyText, Point], timeout: float | None = None) -> d
         energy = path.states[-1].energy if path.states else math.nan
         found["models"][name]["energy"] = energy if math.isfinite(energy) else None
     return found
+
+
+def _is_small(job: tuple[StudyText, Point]) -> bool:
+    """Return whether a point is likely to take less time than starting workers: its mesh is generated and small."""
+    text, point = job
+    elements = getattr(text.keys(point.changes).mesh, "elements", None)
+    return elements is not None and math.prod(elements) <= _MOST_ELEMENTS
 
 
 def _require_same_files(text: StudyText, point: Point) -> None:
