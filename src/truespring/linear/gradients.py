@@ -13,8 +13,11 @@ Preconditioner = Callable[[Floats], Floats]
 
 # The lowest Ritz value is accepted if its error bound is below this share of it.
 _SETTLED = 0.3
-# Smallest and largest number of iterations: a random start contains little of each eigenvector.
-_FEWEST, _MOST = 10, 60
+# A random start contains little of each eigenvector: the smallest factor by which the iterations must have enlarged the
+# share of a negative one, over the square root of the number of unknowns, or else the number of iterations.
+_ENLARGED, _FEWEST = 10.0, 10
+# Largest number of iterations.
+_MOST = 60
 
 
 class IndefiniteError(ArithmeticError):
@@ -128,7 +131,8 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
         if diagonal:
             beside.append(np.sqrt(share) / length)
             values, vectors = eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]))
-            if iteration > _FEWEST and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
+            long_enough = iteration > _FEWEST or _enlarged(values) > _ENLARGED * np.sqrt(start.size)
+            if long_enough and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
                 return Lowest(float(values[0]), iteration)
         _turn_towards(z, share, p)
         curvature = product(p, q)
@@ -139,3 +143,15 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
         _advance(length, p, q, x, r)
         previous = slope
     return Lowest(None, _MOST)
+
+
+def _enlarged(values: Floats) -> float:
+    """Return how much more than a positive eigenvector the iterations enlarge one whose eigenvalue is not positive.
+
+    `values` are the Ritz values of k iterations, ascending, shape (k,). A polynomial of degree k - 1 that is at most 1
+    between the outermost ones reaches T(x) at zero, with Chebyshev's polynomial T (Golub and Van Loan, 10.1.5).
+    """
+    low, high = float(values[0]), float(values[-1])
+    if not 0 < low < high:
+        return 0.0
+    return float(np.cosh((len(values) - 1) * np.arccosh((high + low) / (high - low))))

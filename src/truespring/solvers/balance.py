@@ -179,12 +179,12 @@ class Balance:
         """Return an equilibrium with its stability, and the tangent if it was factorised."""
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
+        if not isinstance(self.linear, Direct) and self._stable_at_rest(state):
+            return Found(replace(state, negative_eigenvalues=0))
         try:
             tangent = self.ready(self.hessian(state.positions, state.load_factor), state.positions)
         except SingularMatrixError:
             return Found(replace(state, negative_eigenvalues=None))
-        if not tangent.lasting and self._stable_at_rest(state):
-            return Found(replace(state, negative_eigenvalues=0))
         negative = tangent.negative_eigenvalues
         if negative is None and not tangent.lasting and self.go_direct("stability was not determined"):
             return self.judged(state)
