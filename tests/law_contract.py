@@ -39,7 +39,7 @@ class Body:
 
     def elasticity(self, strain: Floats) -> Floats:
         """In Voigt's order, shape (components, components)."""
-        return np.asarray(self.respond(strain).elasticity()[..., 0, 0])
+        return np.asarray(self.respond(strain).elasticity().dense(voigt(strain))[..., 0, 0])
 
     def strain(self, stretch: Floats) -> Floats:
         """The strain that the law takes, of stretches along the axes, shape (dim, dim)."""
@@ -268,6 +268,27 @@ def check_isotropy(law: Law) -> None:
         assert close(body.stress(turned), turn @ body.stress(strain) @ turn.T, size, 1e-12)
 
 
+def check_current(law: Law) -> None:
+    """The response in current axes is that of the reference with F at each direction of stress and elasticity."""
+    if law.current is None:
+        return
+    for body in bodies(law, (0.3,)):
+        F = np.diag([1.3, 0.85, 1.1][: body.dim]) + 0.1 * rotation(body.dim)
+        reference, current = body.respond(F.T @ F), law.current(voigt(F @ F.T), body.constants)
+        size, pairs = abs(body.constants.lam) + body.constants.mu, VOIGT[body.dim]
+        assert close(current.energy, reference.energy, size, 1e-12)
+        assert close(matrix(current.stress), F @ matrix(reference.stress) @ F.T, size, 1e-12)
+        assert close(current.thickness_stretch, reference.thickness_stretch, 1.0, 1e-12)
+        full = np.empty((body.dim,) * 4)
+        for one, (i, j) in enumerate(pairs):
+            for two, (k, m) in enumerate(pairs):
+                component = body.elasticity(F.T @ F)[one, two]
+                full[i, j, k, m] = full[j, i, k, m] = full[i, j, m, k] = full[j, i, m, k] = component
+        pushed = np.einsum("ia,jb,kc,ld,abcd->ijkl", F, F, F, F, full)
+        expected = [[pushed[(*one, *two)] for two in pairs] for one in pairs]
+        assert close(current.elasticity().dense(current.stress)[..., 0, 0], expected, size, 1e-11)
+
+
 def check_section(law: Law) -> None:
     """The plane is the space of the thickness stretch that the law says: energy and stresses are the same."""
     for body in bodies(law):
@@ -339,6 +360,7 @@ CHECKS = (
     check_volume,
     check_derivatives,
     check_isotropy,
+    check_current,
     check_section,
     check_facts,
 )

@@ -158,6 +158,44 @@ def test_second_piola_kirchhoff_stress_of_the_patch(section: str) -> None:
         assert found == pytest.approx(np.broadcast_to(components[:, None, None], found.shape), rel=1e-10)
 
 
+@pytest.mark.parametrize("section", [*SECTIONS, "solid"])
+@pytest.mark.parametrize("law", LAWS)
+def test_forces_and_matrices_are_sums_over_gauss_points(law: str, section: str) -> None:
+    """F S and F D F^T + S of the law in axes of the reference, summed point by point, on distorted elements."""
+    kinds = [("hexahedron", "linear"), ("tetrahedron", "linear"), ("tetrahedron", "quadratic")]
+    if section != "solid":
+        kinds = [("quadrilateral", "linear"), ("triangle", "linear"), ("triangle", "quadratic")]
+    for kind, element in kinds:
+        mesh = distorted(kind)
+        dim, eye = mesh.dim, np.eye(mesh.dim)
+        problem = patch(mesh, 0.1 * eye, in_section(mesh, section, 0.5), 0.3, law)
+        potential = ts.Fem(law, element).potential(problem)
+        assert isinstance(potential, FemPotential)
+        shift = np.random.default_rng(5).uniform(-0.1, 0.1, potential.nodes.shape)
+        positions = potential.nodes @ (eye + GRADIENTS["large"][:dim, :dim]).T + shift
+        gradients, volumes = potential.quadrature()
+        F = np.einsum("eai,eqaj->ijeq", positions[potential.elements], gradients)
+        strain, geometric = np.einsum("kieq,kjeq->ijeq", F, F), eye
+        if not LAWS[law].finite:
+            strain, geometric = (F + F.swapaxes(0, 1)) / 2 - eye[:, :, None, None], 0 * eye
+            F = np.tile(eye[:, :, None, None], F.shape[2:])
+        components = np.array([strain[pair] for pair in VOIGT[dim]])
+        at = np.array([[VOIGT[dim].index((min(i, j), max(i, j))) for j in range(dim)] for i in range(dim)])
+        response = LAWS[law].respond(components, potential.constants)
+        S, D = response.stress[at], response.elasticity().dense(components)[at][:, :, at]
+        blocks = np.einsum("eq,ijeq,jmneq->imneq", volumes, F, D.reshape(dim, dim, -1, *volumes.shape))
+        A = np.einsum("imnoeq,joeq->imjneq", blocks.reshape(dim, dim, dim, dim, *volumes.shape), F)
+        A += np.einsum("eq,mneq,ij->imjneq", volumes, S, geometric)
+        matrices = np.einsum("imjneq,eqam,eqbn->eaibj", A, gradients, gradients, optimize=True)
+        n_dof = dim * potential.elements.shape[1]
+        expected = matrices.reshape(-1, n_dof, n_dof)
+        found = potential.element_hessians(positions)
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+        force = np.zeros(positions.shape)
+        np.add.at(force, potential.elements, np.einsum("eq,ijeq,jmeq,eqam->eai", volumes, F, S, gradients))
+        assert np.abs(potential.gradient(positions) - force).max() <= 1e-12 * np.abs(force).max()
+
+
 def uniaxial(
     section: ts.PlaneStress | ts.PlaneStrain | None,
     stretch: float,

@@ -126,6 +126,7 @@ WRONG: dict[str, Law] = {
     "ten times too stiff in volume": _ten_times(LAWS["neo-hookean"]),
     "and so is its formula": _wrong_formula_too(LAWS["neo-hookean"]),
     "at finite strain only": _at_finite_strain(LAWS["neo-hookean"]),
+    "another law in current axes": replace(LAWS["yeoh"], current=LAWS["neo-hookean"].current),
     "without a formula": replace(LAWS["hencky"], density=None),  # type: ignore[arg-type]
     "another thickness in 3D": _another_thickness(LAWS["hencky"]),
     "said to be quadratic": replace(LAWS["hencky"], quadratic=True),

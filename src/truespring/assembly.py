@@ -1,7 +1,7 @@
 """Assembly of element matrices and vectors into a sparse matrix and a vector of all nodes."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from scipy import sparse
@@ -92,6 +92,31 @@ class Pattern:
 
             run(add, rows, smallest=_SMALLEST_SLAB)
 
+    def summed_pairs(self, slices: Iterable[tuple[int, int]], pairs: Callable[[int, int], Floats]) -> SparseMatrix:
+        """Return the sum of symmetric element matrices, shape (n_dof, n_dof).
+
+        `pairs(first, last)` returns those of a slice of the elements as pairs of nodes, see `dense`; each thread adds
+        to different rows, in the order of the elements.
+        """
+        from truespring.kernels import sparsity
+        from truespring.kernels.threads import run, writable
+
+        values = self.values()
+        values[:] = 0.0
+        for first, last in slices:
+            given = writable(pairs(first, last))
+            low = int(self.elements[first:last].min())
+            rows = int(self.elements[first:last].max()) + 1 - low
+
+            def add(
+                begin: int, end: int, first: int = first, last: int = last, given: Floats = given, low: int = low
+            ) -> None:
+                bounds = (low + begin, low + end)
+                sparsity.add_pairs(first, last, self.elements, self.slots, given, *bounds, values, self.zero)
+
+            run(add, rows, smallest=_SMALLEST_SLAB)
+        return self.matrix(values)
+
     def vector(self, values: Floats) -> Floats:
         """Return element vectors, shape (n_elements, k * dim), summed by node, shape (n_nodes, dim); units stay."""
         from truespring.kernels import sparsity
@@ -101,3 +126,23 @@ class Pattern:
         by_node = np.ascontiguousarray(values).reshape(-1, self.dim)
         run(sparsity.add_rows, self.n_nodes, self.at_starts, self.at, by_node, result)
         return result
+
+
+def pairs_of_nodes(k: int) -> tuple[Ints, Ints]:
+    """Return the pairs of nodes a <= b of an element, in the order of `dense`, shape (k (k + 1) / 2,) each."""
+    b, a = np.tril_indices(k)
+    return a, b
+
+
+def dense(pairs: Floats, k: int, dim: int) -> Floats:
+    """Return symmetric element matrices that are given by pairs of nodes; unit stays, shape (n, k * dim, k * dim).
+
+    `pairs` has shape (k (k + 1) / 2 * dim^2, n): row (b (b + 1) / 2 + a) dim^2 + i * dim + j is the entry i, j of the
+    block of the nodes a <= b.
+    """
+    a, b = np.divmod(np.arange(k * dim), dim)
+    low, high = np.minimum(a[:, None], a), np.maximum(a[:, None], a)
+    below = a[:, None] > a
+    i, j = np.where(below, b, b[:, None]), np.where(below, b[:, None], b)
+    rows = (high * (high + 1) // 2 + low) * dim * dim + i * dim + j
+    return np.ascontiguousarray(np.moveaxis(pairs[rows], -1, 0))

@@ -135,9 +135,9 @@ class Families:
     k1: Floats
     k2: Floats
 
-    def part(self, first: int, last: int) -> "Families":
-        """Return the fibres of the elements `first` to `last` - 1."""
-        return Families(self.directions[:, first:last], self.k1[first:last], self.k2[first:last])
+    def of(self, numbers: Ints) -> "Families":
+        """Return the fibres of elements."""
+        return Families(self.directions[:, numbers], self.k1[numbers], self.k2[numbers])
 
 
 def families(mesh: Mesh, fibres: Sequence[Fibres | None], numbers: Ints) -> Families | None:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from truespring.kernels.small import unsigned
 from truespring.kernels.threads import kernel
 
 
@@ -185,3 +186,35 @@ def unique_pairs(pairs: Any, n_nodes: int) -> Any:
             found[at, 0] = i
             found[at, 1] = second[at]
     return found, place
+
+
+@kernel
+def add_pairs(
+    first: int, last: int, elements: Any, slots: Any, blocks: Any, low: int, high: int, data: Any, zero: Any
+) -> None:
+    """Add symmetric matrices of elements first to last to the rows low to high of a matrix.
+
+    Row (b (b + 1) / 2 + a) dim^2 + i * dim + j of `blocks` is the entry i, j of the pair of nodes a <= b, for each
+    element from `first` on.
+
+    Shapes: elements (n_elements, k), slots (n_elements, k, k), blocks (k (k + 1) / 2 * dim^2, >= last - first), data
+    (n_blocks, dim, dim).
+    """
+    k, dim = elements.shape[1], len(zero)
+    for e in range(first, last):
+        column = unsigned(e - first)
+        for b in range(k):
+            j = elements[e, b]
+            for a in range(b + 1):
+                i = elements[e, a]
+                row = (b * (b + 1) // 2 + a) * dim * dim
+                if low <= i < high:
+                    p = unsigned(slots[e, a, b])
+                    for c in range(dim):
+                        for d in range(dim):
+                            data[p, c, d] += blocks[unsigned(row + c * dim + d), column]
+                if a != b and low <= j < high:
+                    p = unsigned(slots[e, b, a])
+                    for c in range(dim):
+                        for d in range(dim):
+                            data[p, d, c] += blocks[unsigned(row + c * dim + d), column]

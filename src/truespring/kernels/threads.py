@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -169,6 +169,24 @@ class _Stopwatch(event.Listener):
         self._depth -= 1
         if not self._depth:
             self.seconds += time.perf_counter() - self._started
+
+
+@cache
+def _libraries() -> Any:
+    """Return the controller of the threads of numerical libraries; finding them takes milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Limit numerical libraries to one thread within the block.
+
+    Their threads wait for each other in loops, which takes longer than the work on small matrices.
+    """
+    with _libraries().limit(limits=1):
+        yield
 
 
 @contextmanager

@@ -91,6 +91,8 @@ def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tup
     the energy; EI is twice this energy per length. For springs on squares with summed sharing the factor is
     e0 (1 - 1/n^2) + 6 a / n^2, n elements deep: e0 is Young's modulus along x over E, a the stiffness of edges in t E.
     """
+    from truespring.kernels.threads import one_blas_thread
+
     material, section = require_body(problem)
     mesh = problem.mesh
     dim, corners = mesh.dim, CORNERS[: mesh.kind.n_nodes, : mesh.dim]
@@ -114,7 +116,8 @@ def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tup
         stiffness[np.ix_(dofs, dofs)] += gather.T @ matrix @ gather
         force[dofs] += gather.T @ matrix @ bent.ravel()
         energy += float(bent.ravel() @ matrix @ bent.ravel())
-    values, vectors = np.linalg.eigh(stiffness)
+    with one_blas_thread():
+        values, vectors = np.linalg.eigh(stiffness)
     firm = np.abs(values) > 1e-10 * np.abs(values).max()
     energy -= float(((force @ vectors[:, firm]) ** 2 / values[firm]).sum())
     young, _ = section.apparent_moduli(material)

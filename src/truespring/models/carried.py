@@ -6,29 +6,55 @@ deformation that the step leads to. Tangents then have p, too, where the elastic
 p C^-1 with respect to C^-1.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.symmetric import contracted, dimensions, inverted, swapped
+from truespring.models.gauss_points import Points
+from truespring.models.symmetric import contracted, identity
 
 
-def advanced(stress: Floats, change: Floats, C: Floats, growth: Floats, reached: Floats) -> Floats:
-    """Return a stress after a step [Pa]: S' extrapolated linearly, p extrapolated linearly on the deformation reached.
+class Deformed(NamedTuple):
+    """Gauss points with the deformation of the law, which may differ from that of the points.
+
+    Attributes:
+        at: the points.
+        F: deformation gradient [-], axes (i, j, point, element).
+        strain: strain of the frame of the points [-], axes (component, point, element).
+    """
+
+    at: Points
+    F: Floats
+    strain: Floats
+
+    def pressure_of(self, stress: Floats) -> Floats:
+        """Return the Kirchhoff pressure S : C / d [Pa] of a stress in the frame, positive in tension."""
+        return contracted(stress, self.at.metric(self.strain)) / self.at.dim
+
+    def reference(self, stress: Floats) -> Floats:
+        """Return a stress in the frame as second Piola-Kirchhoff stress [Pa], axes (component, point, element)."""
+        return self.at.to_reference(stress, self.F)
+
+    def of_pressure(self, pressure: Floats) -> Floats:
+        """Return the second Piola-Kirchhoff stress p C^-1 [Pa], axes (component, point, element)."""
+        inverse = self.at.inverse(self.strain)
+        return self.reference(pressure * (identity(self.strain) if inverse is None else inverse))
+
+
+def advanced(before: Deformed, after: Deformed, stress: Floats, change: Floats, growth: Floats) -> Floats:
+    """Return a second Piola-Kirchhoff stress after a step [Pa], axes (component, point, element).
+
+    S' is extrapolated linearly; p is extrapolated linearly and acts on the deformation reached.
 
     Args:
-        stress: second Piola-Kirchhoff stress before the step [Pa], axes (component, ...).
+        before, after: the points before and after the step.
+        stress: the stress before the step, in the frame of the points [Pa].
         change: its linear change [Pa].
-        C: right Cauchy-Green tensor before the step [-].
-        growth: the linear change of the Green strain [-].
-        reached: C after the step [-].
+        growth: the linear change of the strain [-].
     """
-    inverse = inverted(C)
-    pressure = pressure_of(stress, C)
-    ahead = pressure + pressure_of(change, C) + 2 / dimensions(C) * contracted(stress, growth)
-    turned = pressure * contracted(swapped(inverse), growth)
-    return np.asarray(stress + change + turned + ahead * (inverted(reached) - inverse))
-
-
-def pressure_of(stress: Floats, C: Floats) -> Floats:
-    """Return the Kirchhoff pressure S : C / d [Pa], positive in tension, axes (...)."""
-    return contracted(stress, C) / dimensions(C)
+    pressure = before.pressure_of(stress)
+    ahead = pressure + before.pressure_of(change) + 2 / before.at.dim * contracted(stress, growth)
+    turned = before.at.of_metric(0.0, pressure, before.strain).times(growth)
+    own = before.reference(stress + change + turned) - before.of_pressure(ahead)
+    return np.asarray(own + after.of_pressure(ahead))

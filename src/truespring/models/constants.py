@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Floats
+from truespring.arrays import Floats, Ints
+from truespring.models.elasticity_parts import Elasticity
 from truespring.units import SI_UNITS, Dimension
 
 
@@ -88,10 +89,14 @@ class Constants:
     @property
     def raveled(self) -> "Constants":
         """The same constants, as arrays of shape (n_elements,) for several materials."""
+        return self.of(slice(None))
+
+    def of(self, numbers: Ints | slice) -> "Constants":
+        """Return the constants of elements, as arrays of shape (n,) for several materials."""
         if np.ndim(self.lam) == 0:
             return self
-        values = {name: np.ravel(value) for name, value in self.values.items()}
-        return Constants(np.ravel(self.lam), np.ravel(self.mu), self.plane_stress, values)
+        values = {name: np.ravel(value)[numbers] for name, value in self.values.items()}
+        return Constants(np.ravel(self.lam)[numbers], np.ravel(self.mu)[numbers], self.plane_stress, values)
 
     @property
     def bulk(self) -> float | Floats:
@@ -112,10 +117,10 @@ class Response:
 
     Attributes:
         energy: energy per undeformed volume [J/m^3], axes (...); infinite outside the domain of the law.
-        stress: second Piola-Kirchhoff stress [Pa], axes (component, ...); the stress, for the linear law.
-        elasticity: returns the derivative of the stress with respect to the Green strain [Pa], axes (component,
-            component, ...). It is a function because it is expensive and not needed for energy and forces. A shear
-            component stands for both e_xy and e_yx.
+        stress: second Piola-Kirchhoff stress S, or F S F^T in current axes, the Kirchhoff stress [Pa], axes (component,
+            ...); the stress, for the linear law.
+        elasticity: returns the derivative D of S with respect to the Green strain, or in current axes D with each of
+            its four directions multiplied by F [Pa]. It is a function because it is not needed for energy and forces.
         thickness_stretch: length of the third direction over its undeformed length, axes (...); 1 in plane strain
             and in 3D.
         across: Kirchhoff stress of the third direction [Pa], axes (...), zero in plane stress; the stress, for the
@@ -124,6 +129,6 @@ class Response:
 
     energy: Floats
     stress: Floats
-    elasticity: Callable[[], Floats]
+    elasticity: Callable[[], Elasticity]
     thickness_stretch: Floats
     across: Floats

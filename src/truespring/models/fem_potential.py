@@ -3,50 +3,32 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.assembly import Pattern
+from truespring.assembly import Pattern, dense
 from truespring.errors import ModelError
 from truespring.fibres import Families
 from truespring.mesh import Mesh
-from truespring.models.carried import advanced, pressure_of
+from truespring.models.carried import Deformed, advanced
+from truespring.models.elasticity_parts import Elasticity
 from truespring.models.fibres import stiff_fibres, with_fibres
-from truespring.models.law import Constants, Law, Response
+from truespring.models.gauss_points import Points, determinant
+from truespring.models.law import FRAMES, Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.reference_element import FEM_KINDS, Reference, reference_element
 from truespring.models.semidefinite import semidefinite
 from truespring.models.strain import voigt_pairs
-from truespring.models.symmetric import contracted, identity, inverted, swapped, voigt_places
+from truespring.models.symmetric import voigt_places
 from truespring.potential import Potential, SparseMatrix
 from truespring.problem import Problem
 
 # Number of Gauss points that are evaluated at a time, so that the response of the law fits in the processor's cache.
-_SLICE_POINTS = 8192
-# Smallest number of elements for which threads share a slice.
-_SMALLEST_PIECE = 32
-
-
-class Points(NamedTuple):
-    """The Gauss points of a slice of the elements in a deformed state.
-
-    Attributes:
-        gradients: gradients of the shape functions [1/m], axes (element, point, node of the element, direction).
-        volumes: undeformed volume of each point [m^3], axes (element, point).
-        F: deformation gradient [-], axes (i, j, element, point).
-        frame: F, or the identity for a linear law: the change of strain is the symmetric part of frame^T dF.
-        constants: constants of the law.
-        fibres: fibres of the elements; None without.
-    """
-
-    gradients: Floats
-    volumes: Floats
-    F: Floats
-    frame: Floats
-    constants: Constants
-    fibres: Families | None
+_SLICE_POINTS = 2048
+# Smallest number of blocks of elements for which threads share a slice.
+_SMALLEST_PIECE = 4
 
 
 @runtime_checkable
@@ -68,10 +50,7 @@ class FiniteElements(Potential, Protocol):
 class FemPotential:
     """Elastic energy of a mesh of finite elements, integrated over the undeformed body.
 
-    With energy density W, stress S and elasticity D of the law at the deformation gradient F, the integrands are:
-    energy W, gradient F S : grad v, Hessian F^T grad u : D : F^T grad v + S : (grad u^T grad v) (Bonet and Wood,
-    Nonlinear Continuum Mechanics). The linear law has F = I in the last two and no geometric part. Elements are
-    evaluated slice by slice; only the sparsity pattern is stored.
+    The integrands are those of `Points`. Elements are evaluated slice by slice; only the sparsity pattern is stored.
 
     Attributes:
         problem: mesh, material and section.
@@ -111,14 +90,14 @@ class FemPotential:
     def _pattern(self) -> Pattern:
         return Pattern(self.elements, *self.nodes.shape)
 
-    @cached_property
-    def _voigt(self) -> Ints:
-        return voigt_places(self.mesh.dim)
-
     def slices(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
         """Divide a range of elements, by default all, into slices; return the first and last element of each."""
+        from truespring.kernels.lanes import LANES
+
         end = len(self.elements) if last is None else last
-        step = max(1, _SLICE_POINTS // len(self._reference.weights))
+        # An odd number of blocks: rows whose length is a power of two compete for the same lines of the cache.
+        blocks = max(1, _SLICE_POINTS // len(self._reference.weights) // LANES) - 1 | 1
+        step = blocks * LANES
         return ((begin, min(begin + step, end)) for begin in range(first, end, step))
 
     def quadrature(self, first: int = 0, last: int | None = None) -> tuple[Floats, Floats]:
@@ -126,18 +105,10 @@ class FemPotential:
 
         Axes (element, point, node of the element, direction) and (element, point).
         """
-        from truespring.kernels import elements
-        from truespring.kernels.threads import run
-
-        section = self.problem.section
-        assert section is not None  # see require_continuum
-        corner_slopes, slopes, weights = self._reference
-        places = self.nodes[self.elements[first:last, : corner_slopes.shape[1]]]
-        gradients = np.empty((len(places), *slopes.shape))
-        volumes = np.empty((len(places), len(weights)))
-        known = (places, corner_slopes, slopes, section.thickness * weights)
-        run(elements.quadrature, len(places), *known, gradients, volumes, self._zero, smallest=_SMALLEST_PIECE)
-        return gradients, volumes
+        end = len(self.elements) if last is None else last
+        at = self._points(self.nodes, first, end)
+        gradients = np.moveaxis(at.own(at.gradients), (2, 3), (1, 0))
+        return np.ascontiguousarray(gradients), np.ascontiguousarray(at.own(at.volumes).T)
 
     @property
     def _zero(self) -> tuple[float, ...]:
@@ -145,59 +116,61 @@ class FemPotential:
 
     def _points(self, positions: Floats, first: int, last: int) -> Points:
         """Return the Gauss points of a slice of the elements."""
-        gradients, volumes = self.quadrature(first, last)
-        F = self._gradient_of(positions, gradients, first, last)
-        frame = F if self.law.finite else np.zeros_like(F)
-        if not self.law.finite:
-            frame[np.diag_indices(len(F))] = 1.0
-        fibres = None if self.fibres is None else self.fibres.part(first, last)
-        return Points(gradients, volumes, F, frame, self.constants.part(first, last), fibres)
-
-    def _gradient_of(self, field: Floats, gradients: Floats, first: int, last: int) -> Floats:
-        """Return the gradient of a vector field with the given nodal values, axes (i, j, element, point)."""
         from truespring.kernels import elements
-        from truespring.kernels.threads import run
+        from truespring.kernels.lanes import LANES
+        from truespring.kernels.threads import run, writable
 
-        values = field[self.elements[first:last]]
-        result = np.empty((self.mesh.dim,) * 2 + gradients.shape[:2])
-        run(elements.gradients, len(values), values, gradients, result, self._zero, smallest=_SMALLEST_PIECE)
-        return result
+        section = self.problem.section
+        assert section is not None  # see require_continuum
+        corner_slopes, slopes, weights = self._reference
+        n_blocks = -(-(last - first) // LANES)
+        numbers = np.minimum(np.arange(first, first + n_blocks * LANES), last - 1)
+        nodes, dim, n_points, n = self.elements[numbers], self.mesh.dim, len(weights), len(numbers)
+        gradients, F = np.empty((slopes.shape[1], dim, n_points, n)), np.empty((dim, dim, n_points, n))
+        volumes, J = np.empty((n_points, n)), np.empty((n_points, n))
+        strain, frame = np.empty((len(voigt_pairs(dim)), n_points, n)), self.law.frame
+        found = (gradients.reshape(-1, n), volumes, F.reshape(-1, n), J, strain.reshape(-1, n))
+        places = (writable(self.nodes), writable(positions), nodes)
+        parent = (corner_slopes, slopes, section.thickness * weights, FRAMES.index(frame), voigt_places(dim))
+        run(elements.deformations, n_blocks, *places, *parent, *found, self._zero, smallest=_SMALLEST_PIECE)
+        fibres = None if self.fibres is None else self.fibres.of(numbers)
+        constants = self.constants.of(numbers)
+        return Points(frame, last - first, nodes, gradients, volumes, F, J, strain, constants, fibres)
 
     def _strain(self, at: Points) -> Floats:
-        """Return C = F^T F, or the small strain for the linear law, axes (component, element, point)."""
-        pairs = voigt_pairs(len(at.F))
-        if self.law.finite:
-            return np.stack([sum(row[i] * row[j] for row in at.F) for i, j in pairs])
-        small = np.stack([(at.F[i, j] + at.F[j, i]) / 2 for i, j in pairs])
-        return small - identity(small)
+        """Return the strain at which the law is evaluated, axes (component, point, element)."""
+        return at.strain
 
     def _respond(self, at: Points) -> Response:
-        """Return the response of the law and of the fibres."""
+        """Return the response of the law and of the fibres, in the frame of the points."""
         response = self._law_response(at)
-        return response if at.fibres is None else with_fibres(response, self._strain(at), at.fibres)
+        return response if at.fibres is None else with_fibres(response, self._law_gradient(at), at)
 
     def _law_response(self, at: Points) -> Response:
-        return self.law.respond(self._strain(at), at.constants)
+        return self.law.in_frame(self._strain(at), at.constants)
 
     def energy(self, positions: Floats) -> float:
         """Return the stored energy [J]; infinite if an element is inverted and the law has a barrier."""
         total = 0.0
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             for first, last in self.slices():
                 at = self._points(positions, first, last)
-                density = self._respond(at).energy
-                if self._inverted(at) or not np.isfinite(density).all():
+                if self._inverted(at):
                     return float("inf")
-                total += float((density * at.volumes).sum())
+                density = self._respond(at).energy
+                if not np.isfinite(density).all():
+                    return float("inf")
+                total += float(at.own(density * at.volumes).sum())
         return total
 
     def _inverted(self, at: Points) -> bool:
         """Return whether an element is inverted and the law has a barrier."""
-        return self.law.barrier and bool((determinant(at.F) <= 0).any())
+        return self.law.barrier and bool((at.J <= 0).any())
 
     def stress(self, positions: Floats) -> Floats:
-        """Return the second Piola-Kirchhoff stress at the Gauss points [Pa], axes (component, element, point)."""
-        return self._everywhere(lambda first, last: self._respond(self._points(positions, first, last)).stress)
+        """Return the second Piola-Kirchhoff stress at the Gauss points [Pa], axes (component, point, element)."""
+
+        return self._everywhere(positions, lambda at, _: self._deformed(at).reference(self._respond(at).stress))
 
     def extrapolated_stress(self, positions: Floats, step: Floats) -> Floats:
         """Return the stress [Pa], shape as `stress`, extrapolated along `step` [m] by the elasticity of the law.
@@ -205,80 +178,69 @@ class FemPotential:
         If the pressure is carried apart, see `carried`, the result is not linear in the step.
         """
 
-        def extrapolated(first: int, last: int) -> Floats:
-            at = self._points(positions, first, last)
-            response = self._respond(at)
-            growth = self._strain_change(at, self._gradient_of(step, at.gradients, first, last))
+        def extrapolated(at: Points, ends: tuple[int, int]) -> Floats:
+            response, growth = self._respond(at), self._strain_change(at, step)
             change = self._stress_change(at, response, growth)
+            before = self._deformed(at)
             if not self._carries_pressure:
-                return response.stress + change
-            reached = self._strain(self._points(positions + step, first, last))
-            return advanced(response.stress, change, self._strain(at), growth, reached)
+                return before.reference(response.stress + change)
+            after = self._deformed(self._points(positions + step, *ends))
+            return advanced(before, after, response.stress, change, growth)
 
-        return self._everywhere(extrapolated)
+        return self._everywhere(positions, extrapolated)
 
     @property
     def _carries_pressure(self) -> bool:
         """Whether the pressure is carried along a step apart from the rest of the stress: if it depends on ln J."""
         return self.law.finite and self.law.trace == "logarithmic"
 
+    def _deformed(self, at: Points) -> Deformed:
+        """Return points with the deformation of the law."""
+        return Deformed(at, self._law_gradient(at), self._strain(at))
+
     def _excess(self, at: Points, response: Response, stress: Floats | None) -> Floats | None:
-        """Return the pressure of the law over that of a given stress [Pa], axes (element, point); None without."""
+        """Return the pressure of the law over that of a given stress [Pa], axes (point, element); None without."""
         if stress is None or not self._carries_pressure:
             return None
-        C = self._strain(at)
-        return pressure_of(response.stress, C) - pressure_of(stress, C)
+        return self._deformed(at).pressure_of(response.stress - stress)
 
-    def _elasticity(self, at: Points, response: Response, stress: Floats | None) -> Floats:
-        """Return the elasticity [Pa] with the pressure of a given stress, two axes of components, (element, point)."""
-        elasticity, excess = response.elasticity(), self._excess(at, response, stress)
-        return elasticity if excess is None else elasticity + excess * swapped(inverted(self._strain(at)))
+    def _elasticity(self, at: Points, response: Response, excess: Floats | None) -> Elasticity:
+        """Return the elasticity [Pa] with the pressure of the law less `excess`, see `_excess`."""
+        elasticity = response.elasticity()
+        return elasticity if excess is None else elasticity.plus(at.of_metric(0.0, excess, self._strain(at)))
 
     def _stress_change(self, at: Points, response: Response, change: Floats) -> Floats:
-        """Return the linear change of the stress for a change of strain [Pa], axes (component, element, point)."""
-        return contracted(response.elasticity(), change)
+        """Return the linear change of the stress for a change of strain [Pa], axes (component, point, element)."""
+        return response.elasticity().times(change)
 
-    def _everywhere(self, stress: Callable[[int, int], Floats]) -> Floats:
-        """Return the results of `stress` for all slices [Pa], axes (component, element, point)."""
+    def _everywhere(self, positions: Floats, stress: Callable[[Points, tuple[int, int]], Floats]) -> Floats:
+        """Return the results of `stress` for all slices [Pa], axes (component, point, element)."""
         n_components, n_points = len(voigt_pairs(self.mesh.dim)), len(self._reference.weights)
-        result = np.empty((n_components, len(self.elements), n_points))
+        result = np.empty((n_components, n_points, len(self.elements)))
         for first, last in self.slices():
-            result[:, first:last] = stress(first, last)
+            at = self._points(positions, first, last)
+            result[..., first:last] = at.own(stress(at, (first, last)))
         return result
 
-    def _strain_change(self, at: Points, change: Floats) -> Floats:
-        """Return the linear change of the strain for a change of F, axes (component, element, point)."""
-        pairs = voigt_pairs(len(change))
-        both = zip(at.frame, change, strict=True)
-        rows = [[one[i] * other[j] + one[j] * other[i] for i, j in pairs] for one, other in both]
-        return np.asarray(np.array(rows).sum(axis=0) / 2)
+    def _strain_change(self, at: Points, step: Floats) -> Floats:
+        """Return the linear change of the strain of the law for a step, axes (component, point, element)."""
+        return at.strain_change(step)
 
     def gradient(self, positions: Floats) -> Floats:
         """Return the internal force [N], shape (n_nodes, dim)."""
         forces = np.empty((len(self.elements), self.elements.shape[1] * self.mesh.dim))
         for first, last in self.slices():
             at = self._points(positions, first, last)
-            forces[first:last] = self._forces(at, self._working_stress(at))
+            forces[first:last] = at.own(at.forces(self._working_stress(at))).T
         return self._pattern.vector(forces)
 
     def _working_stress(self, at: Points) -> Floats:
-        """Return the stress that is work-conjugate to the strain [Pa], axes (component, element, point)."""
+        """Return the stress that is work-conjugate to the strain [Pa], axes (component, point, element)."""
         return self._respond(at).stress
-
-    def _forces(self, at: Points, stress: Floats) -> Floats:
-        """Return the nodal forces of a stress [N], shape (n, k * dim)."""
-        from truespring.kernels import elements
-        from truespring.kernels.threads import run
-
-        n, _, k, dim = at.gradients.shape
-        forces = np.empty((n, k * dim))
-        known = (at.frame, stress, self._voigt, at.gradients, at.volumes)
-        run(elements.forces, n, *known, forces, self._zero, smallest=_SMALLEST_PIECE)
-        return forces
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Return the tangent stiffness [N/m]; `stress` [Pa] gives the geometric part, by default the current one."""
-        return self._pattern.summed(lambda first, last: self.element_hessians(positions, stress, first, last))
+        return self._pattern.summed_pairs(self.slices(), lambda *ends: self._pairs_of(positions, stress, *ends))
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
@@ -292,30 +254,23 @@ class FemPotential:
         self, positions: Floats, stress: Floats | None = None, first: int = 0, last: int | None = None
     ) -> Floats:
         """Return the tangent stiffness of elements, by default all [N/m], shape (n, n_dof, n_dof), node by node."""
-        parts = []
-        for begin, end in self.slices(first, last):
-            geometric = None if stress is None else stress[:, begin:end]
-            parts.append(self._tangent(self._points(positions, begin, end), geometric))
+        k, dim = self.elements.shape[1], self.mesh.dim
+        parts = [dense(self._pairs_of(positions, stress, *ends), k, dim) for ends in self.slices(first, last)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _pairs_of(self, positions: Floats, stress: Floats | None, first: int, last: int) -> Floats:
+        """Return the tangent stiffness of a slice of the elements [N/m], as `Points.matrices` does."""
+        at = self._points(positions, first, last)
+        if stress is None:
+            return at.own(self._tangent(at, None))
+        padded = stress[..., np.minimum(np.arange(first, first + len(at.elements)), last - 1)]
+        return at.own(self._tangent(at, at.from_reference(padded, self._law_gradient(at))))
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m]; `stress` [Pa] gives the geometric part, by default that of the law."""
         response = self._respond(at)
-        elasticity = self._elasticity(at, response, stress)
-        return self._matrices(at, response.stress if stress is None else stress, elasticity)
-
-    def _matrices(self, at: Points, stress: Floats, elasticity: Floats) -> Floats:
-        """Return the element matrices of a stress and an elasticity [N/m], shape (n, k * dim, k * dim)."""
-        from truespring.kernels import elements
-        from truespring.kernels.threads import run, writable
-
-        n, _, k, dim = at.gradients.shape
-        blocks = np.empty((n, k * dim, k * dim))
-        geometric = writable(stress) if self.law.finite else np.zeros(stress.shape)
-        known = (at.frame, geometric, elasticity, self._voigt, at.gradients, at.volumes)
-        zeros = self._zero, self._zero * dim
-        run(elements.stiffnesses, n, *known, blocks, *zeros, smallest=_SMALLEST_PIECE)
-        return blocks
+        elasticity = self._elasticity(at, response, self._excess(at, response, stress))
+        return at.matrices(response.stress if stress is None else stress, elasticity)
 
     @property
     def cells(self) -> dict[str, Ints]:
@@ -327,44 +282,38 @@ class FemPotential:
         energy = np.empty(len(self.elements))
         for first, last in self.slices():
             at = self._points(positions, first, last)
-            energy[first:last] = (self._respond(at).energy * at.volumes).sum(axis=1)
+            energy[first:last] = at.own((self._respond(at).energy * at.volumes).sum(axis=0))
         return {"stress": self.cauchy_stress(positions).reshape(-1, 9), "strain_energy": energy}
 
     def cauchy_stress(self, positions: Floats) -> Floats:
         """Return the true stress, averaged over the Gauss points of each element [Pa], shape (n_elements, 3, 3).
 
-        F S F^T over the volume ratio, which includes the change of thickness; for the linear law, its stress.
+        The Kirchhoff stress over the volume ratio, which includes the change of thickness; for the linear law, its
+        stress.
         """
         stress = np.empty((len(self.elements), 3, 3))
         for first, last in self.slices():
             at = self._points(positions, first, last)
-            by_point = self._true_stress(self._law_gradient(at), self._respond(at))
-            stress[first:last] = np.moveaxis(by_point.mean(axis=-1), -1, 0)
+            by_point = self._true_stress(at, self._respond(at))
+            stress[first:last] = np.moveaxis(at.own(by_point.mean(axis=-2)), -1, 0)
         return stress
 
     def _law_gradient(self, at: Points) -> Floats:
-        """Return the deformation gradient at which the law is evaluated, axes (i, j, element, point)."""
+        """Return the deformation gradient at which the law is evaluated, axes (i, j, point, element)."""
         return at.F
 
-    def _true_stress(self, F: Floats, response: Response) -> Floats:
-        """Return the true stress of a response of the law at F [Pa], axes (i, j, element, point), in 3D."""
-        dim = len(F)
+    def _true_stress(self, at: Points, response: Response) -> Floats:
+        """Return the true stress of a response of the law [Pa], axes (i, j, point, element), in 3D."""
+        dim, F = at.dim, self._law_gradient(at)
         stress = np.zeros((3, 3, *F.shape[2:]))
         stress[2, 2] = response.across
-        stress[:dim, :dim] = response.stress[self._voigt]
-        if self.law.finite:
+        stress[:dim, :dim] = response.stress[voigt_places(dim)]
+        if at.frame == "reference":
             stress[:dim, :dim] = np.einsum("ik...,kl...,jl...->ij...", F, stress[:dim, :dim], F)
+        if at.frame != "small":
             volume = determinant(F) * response.thickness_stretch
             stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
         return stress
-
-
-def determinant(F: Floats) -> Floats:
-    """Return the determinant of tensors of axes (i, j, ...), axes (...), in their unit to the power of dim."""
-    if len(F) == 2:
-        return np.asarray(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
-    minors = [F[1, j] * F[2, k] - F[1, k] * F[2, j] for j, k in ((1, 2), (2, 0), (0, 1))]
-    return np.asarray(F[0, 0] * minors[0] + F[0, 1] * minors[1] + F[0, 2] * minors[2])
 
 
 def require_continuum(problem: Problem) -> None:

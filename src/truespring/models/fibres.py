@@ -6,8 +6,10 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.fibres import Families
+from truespring.models.elasticity_parts import Elasticity
+from truespring.models.gauss_points import Points
 from truespring.models.law import Response
-from truespring.models.symmetric import contracted, dyad, outer
+from truespring.models.symmetric import dyad, outer
 from truespring.problem import Problem
 
 # Fibres with I4 - 1 above this value are in tension for the tangent: those of the undeformed body are, whatever the
@@ -41,29 +43,31 @@ def fibre_energy(I4: Floats, k1: Floats, k2: Floats) -> tuple[Floats, Floats, Fl
     return energy, k1 * x * growth, second
 
 
-def with_fibres(response: Response, C: Floats, fibres: Families) -> Response:
-    """Return the response of a law with the energy of fibres added.
+def with_fibres(response: Response, F: Floats, at: Points) -> Response:
+    """Return the response of a law with the energy of the fibres at Gauss points added.
 
-    With I4 = a . C a: S += 2 W' a (x) a, and its derivative by the Green strain 4 W'' a (x) a (x) a (x) a.
+    With I4 = |F a|^2 and m = a, or m = F a in current axes: stress += 2 W' m (x) m, elasticity += 4 W'' m (x) m (x) m
+    (x) m.
 
     Args:
-        response: the response of the law at C.
-        C: right Cauchy-Green tensor, axes (component, element, point).
-        fibres: fibres of these elements.
+        response: the response of the law.
+        F: deformation gradient of the law, axes (i, j, point, element).
+        at: the points, with fibres.
     """
-    energy, stress = response.energy, response.stress
+    energy, stress, fibres = response.energy, response.stress, at.fibres
+    assert fibres is not None
     curvatures = []
     for along in fibres.directions:
-        square = dyad(along.T, along.T)[..., None] / 2  # axes (component, element, 1)
-        density, first, second = fibre_energy(contracted(C, square), fibres.k1[:, None], fibres.k2[:, None])
+        deformed = (F * along.T[:, None]).sum(axis=1)
+        vector = deformed if at.frame == "current" else along.T[:, None]
+        square = dyad(vector, vector) / 2  # axes (component, point or 1, element)
+        density, first, second = fibre_energy((deformed**2).sum(axis=0), fibres.k1, fibres.k2)
         energy = energy + density
         stress = stress + 2 * first * square
         curvatures.append((square, second))
 
-    def elasticity() -> Floats:
-        found = response.elasticity()
-        for square, second in curvatures:
-            found = found + 4 * second * outer(square, square)
-        return np.asarray(found)
+    def elasticity() -> Elasticity:
+        rest = sum(4 * second * outer(square, square) for square, second in curvatures)
+        return response.elasticity().plus(Elasticity(0.0, 0.0, rest=np.asarray(rest)))
 
     return replace(response, energy=energy, stress=stress, elasticity=elasticity)

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.assembly import pairs_of_nodes
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, stretch
 from truespring.models.fem_potential import FemPotential, of_one_kind
 from truespring.models.fibres import stiff_fibres
 from truespring.models.gaussian_weights import integrated
-from truespring.models.law import Constants, Response
+from truespring.models.law import Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.quadratic import QuadraticPotential
 from truespring.models.quadratic_mean import QuadraticMeanPotential
@@ -20,14 +21,22 @@ from truespring.models.symmetric import identity, trace
 from truespring.problem import Problem
 
 
-def _without_springs(C: Floats, constants: Constants) -> Response:
-    """Return the response of the neo-Hookean law without mu/2 tr C, the part of the springs."""
-    whole = LAWS["neo-hookean"].respond(C, constants)
-    return replace(
-        whole,
-        energy=whole.energy - constants.mu / 2 * trace(C),
-        stress=whole.stress - constants.mu * identity(C),
-    )
+def _without_springs(law: Law) -> Law:
+    """Return the neo-Hookean law without mu/2 tr C, the part of the springs."""
+
+    def respond(C: Floats, constants: Constants) -> Response:
+        return _less(law.respond(C, constants), trace(C), identity(C), constants.mu)
+
+    def current(b: Floats, constants: Constants) -> Response:
+        assert law.current is not None
+        return _less(law.current(b, constants), trace(b), b, constants.mu)
+
+    return replace(law, respond=respond, current=current)
+
+
+def _less(whole: Response, trace_C: Floats, slope: Floats, mu: float | Floats) -> Response:
+    """Return a response less that of mu/2 tr C, the derivative of tr C / 2 given by `slope`."""
+    return replace(whole, energy=whole.energy - mu / 2 * trace_C, stress=whole.stress - mu * slope)
 
 
 class _BetweenAllNodes(QuadraticPotential):
@@ -76,14 +85,13 @@ class _BetweenAllNodes(QuadraticPotential):
         """Return the internal force [N], shape (n_nodes, dim)."""
         return super().gradient(positions) + self._pulls(positions)
 
-    def element_hessians(
-        self, positions: Floats, stress: Floats | None = None, first: int = 0, last: int | None = None
-    ) -> Floats:
-        """Return the tangent stiffness of elements, by default all [N/m], shape (n, n_dof, n_dof), node by node."""
-        blocks, dim = super().element_hessians(positions, stress, first, last), self.mesh.dim
+    def _pairs_of(self, positions: Floats, stress: Floats | None, first: int, last: int) -> Floats:
+        """Return the tangent stiffness of a slice of the elements [N/m], as `Points.matrices` does."""
+        pairs, dim = super()._pairs_of(positions, stress, first, last), self.mesh.dim
+        a, b = pairs_of_nodes(self.elements.shape[1])
         for axis in range(dim):
-            blocks[:, axis::dim, axis::dim] += self._laplacians[first:last]
-        return blocks
+            pairs[axis * (dim + 1) :: dim * dim] += self._laplacians[first:last, a, b].T
+        return pairs
 
     @cached_property
     def _pairs(self) -> tuple[Ints, Floats]:
@@ -163,5 +171,6 @@ def gaussian_quadratic(problem: Problem) -> GaussianQuadratic:
     """Return neo-Hookean Gaussian springs between all nodes of second-order triangles or tetrahedra."""
     section = problem.section
     kind = _AtPoints if section is not None and section.free_thickness else _AtMean
-    law = replace(LAWS["neo-hookean"], respond=_without_springs)
-    return kind(problem, law, law_constants(problem, "neo-hookean"), stiff_fibres(problem))
+    return kind(
+        problem, _without_springs(LAWS["neo-hookean"]), law_constants(problem, "neo-hookean"), stiff_fibres(problem)
+    )

@@ -186,7 +186,8 @@ class HyperelasticLinks(LinkedElements):
 
         works, share = self._work.work[first:last], 1 / (2 * self._volumes[first:last])
         coupling = np.empty((len(works), works.shape[1], works.shape[1]))
-        known = (self._response(change, first, last).elasticity(), works, share)
+        response = self._response(change, first, last)
+        known = (response.elasticity().dense(response.stress), works, share)
         run(links.couplings, len(works), *known, coupling, smallest=_SMALLEST_PIECE)
         return coupling
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models.constants import Constants, Response
-from truespring.models.symmetric import determinant, identity, inverted, outer, swapped, trace
+from truespring.models.elasticity_parts import Elasticity, of_tensor
+from truespring.models.symmetric import determinant, dimensions, identity, inverted, outer, trace
 from truespring.models.thickness import Slope, free_thickness
 
 
@@ -99,36 +100,36 @@ def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Co
     return free_thickness(slope, start, lambda: np.log(trace_C / 2), mu)
 
 
-def by_invariants(law: InvariantLaw) -> Callable[[Floats, Constants], Response]:
+def by_invariants(law: InvariantLaw, current: bool = False) -> Callable[[Floats, Constants], Response]:
     """Return the response of a law as a function of C, axes (component, ...), and constants, for LAWS.
 
-    S = 2 W_I1 I + W_y C^-1, and its derivative by E = (C - I) / 2.
+    S = 2 W_I1 I + W_y C^-1, and its derivative by E = (C - I) / 2. With `current`, the response is in current axes, a
+    function of b: the same with b instead of I and I instead of C^-1.
     """
 
-    def respond(C: Floats, constants: Constants) -> Response:
-        dim = {3: 2, 6: 3}[len(C)]
-        det = determinant(C)
-        valid = det > 0
-        inverse = inverted(np.where(valid, C, identity(C)))
-        found = condensed(law, trace(C), np.log(np.where(valid, det, 1.0)) / 2, dim, constants)
+    def respond(strain: Floats, constants: Constants) -> Response:
+        dim, eye = dimensions(strain), identity(strain)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            y = np.log(determinant(strain)) / 2
+        found = condensed(law, trace(strain), y, dim, constants)
         at = found.at
-        valid &= np.isfinite(at.energy)
-        stress = at.by_y * inverse
-        stress[:dim] += 2 * at.by_trace
+        stress = 2 * at.by_trace * (strain if current else eye)
+        inverse = eye if current else inverted(strain)
+        stress = stress + at.by_y * inverse
 
-        def elasticity() -> Floats:
-            found, turned = outer(inverse, inverse), swapped(inverse)
-            found *= at.by_y_y
-            turned *= at.by_y
-            found -= turned
+        def elasticity() -> Elasticity:
+            if current:
+                if at.linear:
+                    return Elasticity(at.by_y_y, -at.by_y)
+                rest = 4 * at.by_trace_trace * outer(strain, strain)
+                return Elasticity(at.by_y_y, -at.by_y, 2 * at.by_trace_y * strain, rest)
+            found = of_tensor(at.by_y_y, -at.by_y, inverse)
             if at.linear:
                 return found
-            eye = np.broadcast_to(identity(C), C.shape)
-            mixed = outer(eye, inverse)
-            found += 4 * at.by_trace_trace * outer(eye, eye) + 2 * at.by_trace_y * (mixed + mixed.swapaxes(0, 1))
-            return found
+            return found.plus(Elasticity(4 * at.by_trace_trace, 0.0, 2 * at.by_trace_y * inverse))
 
-        return Response(np.where(valid, at.energy, np.inf), stress, elasticity, np.sqrt(found.C_33), found.across)
+        energy = np.where(np.isfinite(at.energy), at.energy, np.inf)
+        return Response(energy, stress, elasticity, np.sqrt(found.C_33), found.across)
 
     return respond
 

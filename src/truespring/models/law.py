@@ -14,6 +14,11 @@ from truespring.models.constants import Constants as Constants
 from truespring.models.constants import Response as Response
 from truespring.models.invariants import InvariantLaw
 
+#: Axes that a stress and a strain refer to. "small": the stress, and the small strain. "reference": the second
+#: Piola-Kirchhoff stress, and C = F^T F. "current": the Kirchhoff stress, and b = F F^T.
+Frame = Literal["small", "reference", "current"]
+FRAMES: tuple[Frame, ...] = ("small", "reference", "current")
+
 
 def _none() -> Mapping[str, Any]:
     return MappingProxyType({})
@@ -26,6 +31,8 @@ class Law:
     Attributes:
         respond: returns the response to a strain in Voigt's order, axes (component, ...), and constants. The strain
             is the right Cauchy-Green tensor C = F^T F if the law is finite, else the small strain (F + F^T) / 2 - I.
+        current: returns the same response in current axes, from b = F F^T and constants, if the law has it: forces and
+            matrices of elements are computed from it in less time.
         density: returns the energy density [J/m^3] of the three principal stretches, shape (3,), real or complex, and
             the constants. Take the formula from the source, not from `respond`: the tests compare the two.
         label: name in tables and legends.
@@ -60,6 +67,7 @@ class Law:
     barrier: bool
     quadratic: bool
     trace: Literal["small", "green", "logarithmic"] | None
+    current: Callable[[Floats, Constants], Response] | None = None
     invariants: InvariantLaw | None = None
     constant_springs: bool = False
     domain: tuple[float, float] = (0.0, np.inf)
@@ -67,3 +75,14 @@ class Law:
     constants: Mapping[str, Constant] = field(default_factory=_none)
     lame: Callable[[Mapping[str, float]], Lame] | None = None
     fault: Callable[[Lame, Mapping[str, float]], str] | None = None
+
+    @property
+    def frame(self) -> Frame:
+        """The axes in which elements evaluate the law."""
+        if not self.finite:
+            return "small"
+        return "reference" if self.current is None else "current"
+
+    def in_frame(self, strain: Floats, constants: Constants) -> Response:
+        """Return the response to the strain of `frame`."""
+        return (self.current or self.respond)(strain, constants)

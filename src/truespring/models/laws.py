@@ -24,6 +24,7 @@ from truespring.models.densities import (
     small_density,
     yeoh_density,
 )
+from truespring.models.elasticity_parts import Elasticity
 from truespring.models.invariants import by_invariants
 from truespring.models.law import Constant, Constants, Law, Response
 from truespring.models.ogden import hencky, mooney_rivlin, mooney_rivlin_fault, ogden, ogden_fault
@@ -57,15 +58,8 @@ def _quadratic(strain: Floats, constants: Constants, thickness: Floats) -> Respo
     stress = 2 * mu * strain
     stress[:dim] += lam * volume_change
 
-    def elasticity() -> Floats:
-        result = np.zeros((len(strain), *strain.shape))
-        result[:dim, :dim] = lam
-        for component in range(len(strain)):
-            result[component, component] += 2 * mu if component < dim else mu
-        return result
-
     across = np.zeros_like(volume_change) if constants.plane_stress else lam * volume_change
-    return Response(contracted(stress, strain) / 2, stress, elasticity, thickness, across)
+    return Response(contracted(stress, strain) / 2, stress, lambda: Elasticity(lam, mu), thickness, across)
 
 
 def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
@@ -101,6 +95,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "neo-hookean": Law(
             by_invariants(neo_hookean),
             neo_hookean_density,
+            current=by_invariants(neo_hookean, current=True),
             label="neo-Hookean",
             source="Simo and Pister 1984; Bonet and Wood, Nonlinear Continuum Mechanics, 5.4.3",
             finite=True,
@@ -113,6 +108,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "hencky": Law(
             by_stretches(hencky),
             hencky_density,
+            current=by_stretches(hencky, current=True),
             label="Hencky",
             source="Hencky 1928: quadratic in ln U",
             finite=True,
@@ -124,6 +120,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "yeoh": Law(
             by_invariants(yeoh),
             yeoh_density,
+            current=by_invariants(yeoh, current=True),
             label="Yeoh",
             source="Yeoh, Rubber Chemistry and Technology 66, 1993",
             finite=True,
@@ -141,6 +138,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "gent": Law(
             by_invariants(gent),
             gent_density,
+            current=by_invariants(gent, current=True),
             label="Gent",
             source="Gent, Rubber Chemistry and Technology 69, 1996",
             finite=True,
@@ -160,6 +158,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "arruda-boyce": Law(
             by_invariants(arruda_boyce),
             arruda_boyce_density,
+            current=by_invariants(arruda_boyce, current=True),
             label="Arruda-Boyce",
             source="Arruda and Boyce, Journal of the Mechanics and Physics of Solids 41, 1993; series of five terms",
             finite=True,
@@ -178,6 +177,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "mooney-rivlin": Law(
             by_stretches(mooney_rivlin),
             mooney_rivlin_density,
+            current=by_stretches(mooney_rivlin, current=True),
             label="Mooney-Rivlin",
             source="Mooney, Journal of Applied Physics 11, 1940; Rivlin 1948",
             finite=True,
@@ -192,6 +192,7 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
         "ogden": Law(
             by_stretches(ogden),
             ogden_density,
+            current=by_stretches(ogden, current=True),
             label="Ogden",
             source="Ogden, Proceedings of the Royal Society A 326, 1972",
             finite=True,

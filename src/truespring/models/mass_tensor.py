@@ -191,7 +191,7 @@ class NonlinearTensors(_Tensors):
             strain = _strain_of(gradients[:, 0, 1:])
             at_rest = np.broadcast_to(identity(np.empty((strain.shape[1], 1, 1))), (strain.shape[1], len(strain), 1))
             response = self.fem.law.respond(at_rest, self.fem.constants.part(first, last))
-            elasticity = np.moveaxis(response.elasticity()[..., 0], -1, 0)
+            elasticity = np.moveaxis(response.elasticity().dense(at_rest)[..., 0], -1, 0)
             twice = np.where(np.arange(strain.shape[1]) < dim, 1.0, 2.0)[:, None] * strain
             found[part] = volumes[:, :, None] * (twice.swapaxes(1, 2) @ elasticity @ twice)
         return found

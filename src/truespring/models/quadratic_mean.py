@@ -2,27 +2,27 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.models.fem_potential import Points, determinant
+from truespring.models.elasticity_parts import Elasticity
+from truespring.models.gauss_points import Points
 from truespring.models.law import Response
 from truespring.models.quadratic import QuadraticPotential
-from truespring.models.symmetric import contracted, identity, inverted, outer, swapped, trace
+from truespring.models.symmetric import contracted, identity, trace
 
 
 class _Volume(NamedTuple):
     """The part of lam in the energy: a function of the mean v of the trace of the strain, or of the volume ratio.
 
     Attributes:
-        mean: v, axes (element, 1).
-        energy: lam/2 v^2, or lam/2 (ln v)^2 of the volume ratio [J/m^3], axes (element, 1).
-        pressure, stiffness: first and second derivative of `energy` with respect to v [Pa], axes (element, 1).
-        slope: derivative of the trace or ratio at a point with respect to the strain, axes (component, element, point).
-        second: returns the derivative of `slope`, axes (component, component, element, point).
+        mean: v, axes (1, element).
+        energy: lam/2 v^2, or lam/2 (ln v)^2 of the volume ratio [J/m^3], axes (1, element).
+        pressure, stiffness: first and second derivative of `energy` with respect to v [Pa], axes (1, element).
+        slope: derivative of the trace or ratio at a point with respect to the strain, axes (component, point, element).
+        second: returns the derivative of `slope`.
         across: derivative of the trace or ratio with respect to the strain of the third direction.
     """
 
@@ -31,7 +31,7 @@ class _Volume(NamedTuple):
     pressure: Floats
     stiffness: Floats
     slope: Floats
-    second: Callable[[], Floats]
+    second: Callable[[], Elasticity]
     across: Floats
 
 
@@ -46,62 +46,63 @@ class QuadraticMeanPotential(QuadraticPotential):
     interpolation = "quadratic-mean-dilatation"
 
     def _volume(self, at: Points) -> _Volume:
-        strain, lam = self._strain(at), at.constants.lam
-        eye = np.broadcast_to(identity(strain), strain.shape)
+        strain, lam = at.strain, at.constants.lam
+        eye, current = identity(strain), at.frame == "current"
         if self.law.trace != "logarithmic":
-            own = trace(strain - eye) / 2 if self.law.finite else trace(strain)
-            mean = _mean(own, at)
-            flat = partial(np.zeros, (len(strain), *strain.shape))
-            return _Volume(mean, lam / 2 * mean**2, lam * mean, lam + 0 * mean, eye, flat, np.ones_like(own))
-        J = determinant(at.F)
-        mean = _mean(J, at)
-        valid = (J > 0) & (mean > 0)
-        inverse = inverted(np.where(valid, strain, eye))
+            own = (at.F**2).sum(axis=(0, 1)) / 2 - at.dim / 2 if self.law.finite else trace(strain)
+            mean = at.mean(own)
+            slope = strain if current else np.broadcast_to(eye, strain.shape)
+            return _Volume(
+                mean,
+                lam / 2 * mean**2,
+                lam * mean,
+                lam + 0 * mean,
+                slope,
+                lambda: Elasticity(0.0, 0.0),
+                np.ones_like(own),
+            )
+        J, mean = at.J, at.mean(at.J)
+        upright = np.where((J > 0) & (mean > 0), strain, eye)
+        inverse = at.inverse(upright)
         log = np.log(np.where(mean > 0, mean, np.nan))
         return _Volume(
             mean,
             lam / 2 * log**2,
             lam * log / mean,
             lam * (1 - log) / mean**2,
-            J * inverse,
-            lambda: J * (outer(inverse, inverse) - swapped(inverse)),
+            J * (eye if inverse is None else inverse),
+            lambda: at.of_metric(J, -J, upright),
             J,
         )
 
     def _law_response(self, at: Points) -> Response:
-        shear = self.law.respond(self._strain(at), replace(at.constants, lam=0 * at.constants.lam))
+        shear = self.law.in_frame(at.strain, replace(at.constants, lam=0 * at.constants.lam))
         volume = self._volume(at)
         return Response(
             shear.energy + volume.energy,
             shear.stress + volume.pressure * volume.slope,
-            lambda: shear.elasticity() + volume.pressure * volume.second(),
+            lambda: shear.elasticity().plus(volume.second().scaled(volume.pressure)),
             shear.thickness_stretch,
             shear.across + volume.pressure * volume.across,
         )
 
     def _stress_change(self, at: Points, response: Response, change: Floats) -> Floats:
         volume = self._volume(at)
-        grown = _mean(contracted(volume.slope, change), at)
+        grown = at.mean(contracted(volume.slope, change))
         return super()._stress_change(at, response, change) + volume.stiffness * grown * volume.slope
 
-    def _elasticity(self, at: Points, response: Response, stress: Floats | None) -> Floats:
-        elasticity, excess = super()._elasticity(at, response, stress), self._excess(at, response, stress)
-        if excess is None:
-            return elasticity
-        inverse = inverted(self._strain(at))  # the pressure acts on v, too: see `_tangent`
-        return elasticity - excess * outer(inverse, inverse)
+    def _elasticity(self, at: Points, response: Response, excess: Floats | None) -> Elasticity:
+        elasticity = super()._elasticity(at, response, excess)
+        # The pressure acts on v, too: see `_tangent`.
+        return elasticity if excess is None else elasticity.plus(at.of_metric(-excess, 0.0, at.strain))
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m]: those of a law plus the coupling by the mean."""
-        volume = self._volume(at)
-        along = self._forces(at, np.ascontiguousarray(volume.slope))  # derivative of the mean times the volume
-        stiffness, excess = volume.stiffness, self._excess(at, self._respond(at), stress)
+        volume, response = self._volume(at), self._respond(at)
+        along = at.forces(volume.slope)  # derivative of the mean times the volume
+        stiffness, excess = volume.stiffness, self._excess(at, response, stress)
         if excess is not None:
-            stiffness = stiffness + _mean(excess, at) / volume.mean**2
-        coupling = (stiffness / at.volumes.sum(axis=1, keepdims=True))[:, :, None]
-        return np.asarray(super()._tangent(at, stress) + coupling * along[:, :, None] * along[:, None])
-
-
-def _mean(values: Floats, at: Points) -> Floats:
-    """Return the mean over each undeformed element, axes (element, 1)."""
-    return np.asarray((values * at.volumes).sum(axis=1, keepdims=True) / at.volumes.sum(axis=1, keepdims=True))
+            stiffness = stiffness + at.mean(excess) / volume.mean**2
+        share = stiffness / at.volumes.sum(axis=0) / 2
+        own = response.stress if stress is None else stress
+        return at.matrices(own, self._elasticity(at, response, excess), along, share * along)

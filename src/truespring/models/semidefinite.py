@@ -1,8 +1,5 @@
 """Semidefinite parts of stacks of element matrices."""
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
 from truespring.arrays import Floats
@@ -17,7 +14,7 @@ def semidefinite(matrices: Floats, dim: int) -> Floats:
     The matrices are those of energies that translations do not change, node by node: with `dim` directions, n_dof is
     nodes times dim. Eigenvectors are computed without the translations, which have the eigenvalue zero.
     """
-    from truespring.kernels.threads import run
+    from truespring.kernels.threads import one_blas_thread, run
 
     n, n_dof = len(matrices), matrices.shape[1]
     moved = np.kron(_differences(n_dof // dim), np.eye(dim))
@@ -28,7 +25,7 @@ def semidefinite(matrices: Floats, dim: int) -> Floats:
         vectors = moved @ vectors
         found[first:last] = (vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2)
 
-    with _libraries().limit(limits=1):  # threads of the BLAS take longer than the work on small matrices
+    with one_blas_thread():
         run(project, n, smallest=_SMALLEST_PIECE)
     return found
 
@@ -36,11 +33,3 @@ def semidefinite(matrices: Floats, dim: int) -> Floats:
 def _differences(k: int) -> Floats:
     """Return an orthonormal basis of the vectors of k numbers whose sum is zero, shape (k, k - 1)."""
     return np.linalg.qr(np.eye(k)[:, 1:] - 1 / k)[0]
-
-
-@cache
-def _libraries() -> Any:
-    """Return the controller of the threads of numerical libraries; finding them takes milliseconds."""
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()

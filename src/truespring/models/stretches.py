@@ -10,6 +10,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models.constants import Constants, Response
+from truespring.models.elasticity_parts import Elasticity
 from truespring.models.strain import voigt_pairs
 from truespring.models.symmetric import dimensions, dyad, outer
 from truespring.models.thickness import Slope, free_thickness
@@ -69,11 +70,12 @@ def _free(law: StretchLaw, plane: Floats, constants: Constants) -> Floats:
     return free_thickness(slope, -2 * lam / (lam + 2 * mu) * growth, smallest_change, mu) / 2
 
 
-def by_stretches(law: StretchLaw) -> Callable[[Floats, Constants], Response]:
+def by_stretches(law: StretchLaw, current: bool = False) -> Callable[[Floats, Constants], Response]:
     """Return the response of a law as a function of C, axes (component, ...), and constants, for LAWS.
 
     With C = sum c_i N_i (x) N_i and the derivatives t_i of W by e_i = ln(c_i) / 2, the stress is sum t_i / c_i N_i (x)
-    N_i. The shear components of its derivative are the divided differences of t_i / c_i by c_i.
+    N_i. The shear components of its derivative are the divided differences of t_i / c_i by c_i. With `current`, the
+    response is in current axes, a function of b: the same with the axes of b, times c_i for each N_i (x) N_i.
     """
 
     def respond(C: Floats, constants: Constants) -> Response:
@@ -84,21 +86,22 @@ def by_stretches(law: StretchLaw) -> Callable[[Floats, Constants], Response]:
         e = np.log(c) / 2
         e_3, at = condensed(law, e, constants)
         valid &= np.isfinite(at.energy)
-        own = [dyad(N[:, i], N[:, i]) / 2 for i in range(dim)]
-        stress = sum(at.first[i] / c[i] * own[i] for i in range(dim))
+        scale = np.ones_like(c) if current else 1 / c
+        own = [scale[i] * dyad(N[:, i], N[:, i]) / 2 for i in range(dim)]
+        stress = sum(at.first[i] * own[i] for i in range(dim))
 
-        def elasticity() -> Floats:
+        def elasticity() -> Elasticity:
             result = np.zeros((len(C), *C.shape))
             for i in range(dim):
                 for j in range(dim):
-                    normal = (at.second[i, j] - 2 * (i == j) * at.first[i]) / (c[i] * c[j])
+                    normal = at.second[i, j] - 2 * (i == j) * at.first[i]
                     result += normal * outer(own[i], own[j])
                 for j in range(i):
                     quotient = _quotient(law, e, at, (i, j), constants)
-                    shear = (quotient * _log_difference(c[i], c[j]) / 2 - at.first[j]) / (c[i] * c[j])
+                    shear = (quotient * _log_difference(c[i], c[j]) / 2 - at.first[j]) * scale[i] * scale[j]
                     mixed = dyad(N[:, i], N[:, j])
                     result += shear * outer(mixed, mixed)
-            return result
+            return Elasticity(0.0, 0.0, rest=result)
 
         flat = dim == 2
         across = at.first[2] if flat and not constants.plane_stress else np.zeros_like(at.energy)
