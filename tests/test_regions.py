@@ -266,7 +266,7 @@ def test_lames_constants_of_a_region_are_its_own() -> None:
     for element, material in ((2, THIRD), (3, FIRST)):
         lam, mu = lame(material.young, material.poisson)
         reduced = 2 * lam * mu / (lam + 2 * mu)
-        assert stress[1, element] == pytest.approx(np.full(4, 0.01 * (reduced + 2 * mu)), rel=1e-12)
+        assert stress[1, :, element] == pytest.approx(np.full(4, 0.01 * (reduced + 2 * mu)), rel=1e-12)
 
 
 def test_a_material_that_no_element_has_does_not_count() -> None:
