@@ -164,6 +164,7 @@ ALLOWED = {
     },
     "exports": {"outputs", "equilibrium", "models", "solvers", "potential", "problem", "loading", "mesh", "conditions"},
     "equilibrium": {
+        "coarsening",
         "program",
         "soundness",
         "solution",

@@ -16,8 +16,8 @@ from scipy import sparse
 import truespring as ts
 from tests.closed_forms import bending_factor, buckled_column_tip
 from truespring.solvers.balance import Balance
+from truespring.solvers.doubts import snapped
 from truespring.solvers.line_search import Step, _candidates, _search
-from truespring.solvers.newton import _snapped
 
 SOFT = ts.Material(young=1.0, poisson=1 / 3)
 THIN = ts.PlaneStress(1.0)
@@ -505,14 +505,14 @@ def test_a_matrix_is_brought_into_blocks_once() -> None:
     assert Balance.in_blocks(balance, other).blocksize == (2, 2)
 
 
-@pytest.mark.parametrize(("far", "snapped"), [(1.0, False), (3.0, False), (200.0, True)])
-def test_a_step_much_longer_than_the_last_is_a_snap(far: float, snapped: bool) -> None:
+@pytest.mark.parametrize(("far", "is_snap"), [(1.0, False), (3.0, False), (200.0, True)])
+def test_a_step_much_longer_than_the_last_is_a_snap(far: float, is_snap: bool) -> None:
     """Per load factor: of a step of a third of the one before a third is expected. Whatever the unit."""
     for unit in (1e-6, 1.0, 1e6):
         states: list[Any] = [
             SimpleNamespace(load_factor=factor, positions=np.array([[unit * place, 0.0]]), branched=False)
             for factor, place in ((0.0, 0.0), (0.3, 3.0), (0.4, 3.0 + far))
         ]
-        assert _snapped(states[2], states[1], states[0]) is snapped
-        assert not _snapped(states[2], states[1], None)
-        assert not _snapped(SimpleNamespace(**{**vars(states[2]), "branched": True}), states[1], states[0])
+        assert snapped(states[2], states[1], states[0]) is is_snap
+        assert not snapped(states[2], states[1], None)
+        assert not snapped(SimpleNamespace(**{**vars(states[2]), "branched": True}), states[1], states[0])

@@ -39,6 +39,7 @@ class CoarseBody:
             (n_elements,).
         filled: share of each element that the body fills, shape (n_elements,).
         loading: supports and loads on the coarse nodes.
+        counts: number of cells along each axis of a coarser mesh, see `mesh.Coarser`.
     """
 
     original: Problem
@@ -47,6 +48,7 @@ class CoarseBody:
     stands_for: Ints
     filled: Floats
     loading: Loading
+    counts: tuple[int, ...] = ()
 
     @classmethod
     def finest(cls, problem: Problem, loading: Loading) -> Self:
@@ -71,6 +73,7 @@ class CoarseBody:
             stands_for[found.cells],
             filled[found.cells],
             restated(self.loading, self.mesh.nodes, found.mesh.nodes, found.weights),
+            found.counts,
         )
 
     @property

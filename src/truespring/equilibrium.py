@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.coarsening import CoarseBody
 from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, TruespringError, one_line
@@ -21,11 +22,13 @@ from truespring.program import Program
 from truespring.solution import Solution as Solution
 from truespring.solution import State as State
 from truespring.solution import Status as Status
-from truespring.solvers import Equilibrium, Geometry, Newton, Reporter, Solver, as_solver
+from truespring.solvers import Coarse, Equilibrium, Geometry, Newton, Reporter, Solver, as_solver
 from truespring.soundness import UNBALANCED, path_status, path_warnings
 
 # Largest number of nodes of the coarsest mesh of multigrid.
 _COARSEST = 60
+# Smallest number of cells along each axis of a coarser mesh: with fewer its states differ too much.
+_FEWEST_CELLS = 3
 
 
 @renamed_argument("report", "progress")
@@ -111,6 +114,8 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         )
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
     geometry = replace(geometry_of(problem, model.finite), coarser=partial(_coarser, problem, potential))
+    if model.finite and model.any_mesh:
+        geometry = replace(geometry, coarse=partial(_coarse, model, CoarseBody.finest(problem, loading)))
     solver.check(problem.loading, geometry)
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
@@ -140,6 +145,22 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         n_unknowns=int((~loading.held).sum()),
         cost=found[-1].cost,
     )
+
+
+def _coarse(model: Model, body: CoarseBody) -> Coarse | None:
+    """Return a body by a model on a mesh of cells twice as large, None if there is none; see `Geometry.coarse`."""
+    coarse = body.coarser() if body.loading.held.shape == body.mesh.nodes.shape else None
+    if coarse is None or min(coarse.counts) < _FEWEST_CELLS:
+        return None
+    potential = model.potential(coarse.problem)
+    if potential.nodes.shape != coarse.mesh.nodes.shape:
+        return None
+    geometry = replace(
+        geometry_of(coarse.problem),
+        coarser=partial(_coarser, coarse.problem, potential),
+        coarse=partial(_coarse, model, coarse),
+    )
+    return Coarse(potential, coarse.loading, geometry, coarse.weights)
 
 
 def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[list[Equilibrium], bool]:

@@ -32,12 +32,14 @@ class Coarser:
             fields are exact; a row has 1, 2, 4 or 8 entries.
         parents: coarse cell of each element of the finer mesh, shape (finer n_elements,).
         cells: coarse cell of each element of the coarser mesh, shape (coarser n_elements,).
+        counts: number of coarse cells along each axis of the lattice, between its ends.
     """
 
     mesh: Mesh
     weights: "sparse.csr_array[Any]"
     parents: Ints
     cells: Ints
+    counts: tuple[int, ...]
 
 
 class _Lattice(NamedTuple):
@@ -75,8 +77,9 @@ def coarser(mesh: Mesh) -> Coarser | None:
     places = np.stack(np.unravel_index(used, tuple(shape), order="F"), axis=1)
     nodes = lattice.origin + 2.0 * places @ lattice.basis
     made = Mesh(nodes, elements.reshape(-1, corners.shape[2]), mesh.element)
+    counts = tuple(int(count) for count in lowest.max(axis=0) + 1)
     weights = _weights(lattice.places, used, shape)
-    return Coarser(made, weights, parents.ravel(), np.repeat(np.arange(len(keys)), corners.shape[1]))
+    return Coarser(made, weights, parents.ravel(), np.repeat(np.arange(len(keys)), corners.shape[1]), counts)
 
 
 def interpolations(mesh: Mesh, n_smallest: int) -> "tuple[sparse.csr_array[Any], ...]":

@@ -228,6 +228,23 @@ class Balance:
         self.linear = directly
         return True
 
+    def cost(self, newton: str, coarse: tuple[Cost, ...] = ()) -> Cost:
+        """Return methods and costs up to now; `newton` names the variant of Newton's method."""
+        from truespring.kernels.threads import n_threads
+
+        return Cost(
+            newton=newton,
+            linear=self.linear.name,
+            newton_iterations=self.spent,
+            cg_iterations=self.linear.cg_iterations,
+            lanczos_iterations=self.linear.lanczos_iterations,
+            factorisations=self.linear.factorisations,
+            memory=self.linear.memory,
+            threads=n_threads(),
+            notes=tuple(self.notes),
+            coarse=coarse,
+        )
+
     def note(self, text: str) -> None:
         """Add a note, unless it is there already."""
         if text not in self.notes:

@@ -17,6 +17,8 @@ class Cost:
         memory: largest memory of factors or coarse levels [bytes].
         threads: number of threads of compiled loops.
         notes: changes of method, and their reasons.
+        coarse: costs on the coarser meshes that the iterations started from, the coarsest first; not included in the
+            other values.
     """
 
     newton: str
@@ -28,3 +30,4 @@ class Cost:
     memory: int = 0
     threads: int = 1
     notes: tuple[str, ...] = ()
+    coarse: "tuple[Cost, ...]" = ()

@@ -14,15 +14,13 @@ from truespring.potential import Potential, Stressed
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
-from truespring.solvers.cost import Cost
+from truespring.solvers.coarse import METHOD, Jump, jump_from_coarser
+from truespring.solvers.doubts import doubt, snapped
 from truespring.solvers.line_search import descend
 from truespring.solvers.solver import Geometry, Solver
 
 #: Allowed values of `method`.
 METHODS = ("auto", "mixed", "line-search")
-
-# A body that moves by more than this multiple of what the previous step suggests may have snapped through.
-_SNAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +44,7 @@ class Newton(Solver):
     max_cutbacks: int = 6
     method: str = "auto"
     linear: str = "auto"
+    coarse_start: bool = True
 
     def __post_init__(self) -> None:
         if self.load_steps < 1 or self.max_iterations < 1 or self.max_cutbacks < 0:
@@ -79,12 +78,13 @@ class Newton(Solver):
         yield self._with_cost(last.state, balance)
         if last.state.negative_eigenvalues:
             return
+        jump = self._jump(balance, geometry, last.state)
         previous: Equilibrium | None = None
         step, spent = 1.0 / self.load_steps, 0
         smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
             level = self._next_level(last.state.load_factor, step)
-            reached = self._find(balance, level, last, previous, admissible)
+            reached = self._find(balance, level, last, previous, admissible, jump)
             spent += reached.state.iterations
             refused = reached.state.converged and strict and not admissible(reached.state.positions)
             ever_refused = ever_refused or refused
@@ -95,40 +95,51 @@ class Newton(Solver):
                 if ever_refused and strict:
                     strict, step = False, 1.0 / self.load_steps
                     continue
-            snapped = _snapped(reached.state, last.state, previous)
-            state = replace(reached.state, iterations=spent, snapped=snapped)
+            moved_far = snapped(reached.state, last.state, previous)
+            state = replace(reached.state, iterations=spent, snapped=moved_far)
             previous, last, spent = last.state, reached._replace(state=state), 0
             step = min(2 * step, 1.0 / self.load_steps)
-            yield self._with_cost(state, balance)
+            yield self._with_cost(state, balance, jump)
 
     def starting_at(self, start: Callable[[Potential], Floats], max_iterations: int) -> "Nearby":
         """Return Newton's method at full load only, from the positions that `start` returns for a potential."""
         return Nearby(1, self.tolerance, max_iterations, method=self.method, linear=self.linear, start=start)
 
-    def _with_cost(self, state: Equilibrium, balance: Balance) -> Equilibrium:
+    def _with_cost(self, state: Equilibrium, balance: Balance, jump: Jump | None = None) -> Equilibrium:
         """Return a state with methods and costs up to now."""
-        from truespring.kernels.threads import n_threads
-
-        return replace(
-            state,
-            cost=Cost(
-                newton="line search" if self._searches(balance) else "mixed integration points",
-                linear=balance.linear.name,
-                newton_iterations=balance.spent,
-                cg_iterations=balance.linear.cg_iterations,
-                lanczos_iterations=balance.linear.lanczos_iterations,
-                factorisations=balance.linear.factorisations,
-                memory=balance.linear.memory,
-                threads=n_threads(),
-                notes=tuple(balance.notes),
-            ),
-        )
+        newton = "line search" if self._searches(balance) else METHOD
+        return replace(state, cost=balance.cost(newton, () if jump is None else jump.costs))
 
     def _searches(self, balance: Balance) -> bool:
         """Return whether line search is the first method."""
         return self.method == "line-search" or not isinstance(balance.potential, Stressed)
 
+    def _jump(self, balance: Balance, geometry: Geometry, rest: Equilibrium) -> Jump | None:
+        """Return starts from coarser meshes; None without any, or if the body deforms without load."""
+        if not self.coarse_start or self._searches(balance):
+            return None
+        if not np.array_equal(rest.positions, balance.potential.nodes):
+            return None
+        return jump_from_coarser(balance, geometry, self.linear, 1.0 / self.load_steps)
+
     def _find(
+        self,
+        balance: Balance,
+        level: float,
+        last: Found,
+        previous: Equilibrium | None,
+        admissible: Callable[[Floats], bool],
+        jump: Jump | None,
+    ) -> Found:
+        """Return the equilibrium at `level`: from a coarser mesh, else from the last state on this one."""
+        jumped, why = (None, "") if jump is None else jump.find(level, last.state, previous)
+        if jumped is not None and not why:
+            return jumped
+        found = self._find_here(balance, level, last, previous, admissible)
+        spent = found.state.iterations + (jumped.state.iterations if jumped else 0)
+        return found._replace(state=replace(found.state, iterations=spent))
+
+    def _find_here(
         self,
         balance: Balance,
         level: float,
@@ -140,10 +151,10 @@ class Newton(Solver):
         found = None
         if not self._searches(balance):
             found = self._find_mixed(balance, level, last.state, previous)
-            doubt = _doubt(found.state, last.state, previous, admissible)
-            if self.method == "mixed" or not doubt:
+            why = doubt(found.state, last.state, previous, admissible)
+            if self.method == "mixed" or not why:
                 return found
-            balance.note(f"line search at load factor {level:.6g}: mixed integration points {doubt}")
+            balance.note(f"line search at load factor {level:.6g}: mixed integration points {why}")
         searched = _find_by_search(balance, level, last, previous)
         spent = searched.state.iterations + (found.state.iterations if found else 0)
         return searched._replace(state=replace(searched.state, iterations=spent))
@@ -201,19 +212,6 @@ class Nearby(Newton):
         yield self._with_cost(found.state, balance)
 
 
-def _doubt(
-    state: Equilibrium, last: Equilibrium, previous: Equilibrium | None, admissible: Callable[[Floats], bool]
-) -> str:
-    """Return why a state found without line search may not be on the path, empty if it is accepted."""
-    if not state.converged:
-        return "did not converge"
-    if state.negative_eigenvalues:
-        return "led to an unstable state"
-    if not admissible(state.positions):
-        return "inverted an element"
-    return "led to a distant state" if _snapped(state, last, previous) else ""
-
-
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
     """Return the equilibrium at `level` by line search, from the prediction of least unbalanced force."""
     guesses = [
@@ -244,12 +242,3 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
         ratio = advance / (state.load_factor - previous.load_factor)
         extrapolated = state.positions + ratio * (state.positions - previous.positions)
         yield np.where(loading.held, state.positions + motion, extrapolated)
-
-
-def _snapped(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None) -> bool:
-    """Return whether a body moved much further in this step than the previous step suggests."""
-    if previous is None or state.branched:
-        return False
-    ratio = (state.load_factor - last.load_factor) / (last.load_factor - previous.load_factor)
-    expected = ratio * norm(last.positions - previous.positions)
-    return norm(state.positions - last.positions) > _SNAP * expected

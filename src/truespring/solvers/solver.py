@@ -3,7 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from inspect import isclass, signature
-from typing import Any
+from typing import Any, NamedTuple
+
+from scipy import sparse
 
 from truespring.arrays import Floats, Ints
 from truespring.completing import completed
@@ -26,6 +28,11 @@ def _selects_none(on: Any) -> Ints:
     raise ProblemError(f"on = {on!r}: a potential without a mesh has no selections")
 
 
+def _no_coarse() -> "Coarse | None":
+    """Return None: there is no coarser mesh."""
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class Geometry:
     """Functions of the mesh that a solver may use.
@@ -35,11 +42,27 @@ class Geometry:
         select: returns the node numbers of a selection, shape (n,); selections are those of supports and loads.
         coarser: returns weights of the nodes from those of coarser meshes, see `linear.choice.choose`; empty if there
             are none.
+        coarse: returns the same body on a mesh of cells twice as large, None if there is none.
     """
 
     admissible: Callable[[Floats], bool] = _admits_all
     select: Callable[[Any], Ints] = _selects_none
     coarser: Callable[[], Sequence[Any]] = tuple
+    coarse: Callable[[], "Coarse | None"] = _no_coarse
+
+
+class Coarse(NamedTuple):
+    """A body on a coarser mesh.
+
+    Attributes:
+        potential, loading, geometry: those of the coarser mesh.
+        weights: displacement of the finer nodes from that of the coarser ones, sparse, shape (n_nodes, n_coarse).
+    """
+
+    potential: Potential
+    loading: Loading
+    geometry: Geometry
+    weights: "sparse.csr_array[Any]"
 
 
 class Solver:

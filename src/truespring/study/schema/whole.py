@@ -55,6 +55,10 @@ class SolverKeys(Keys):
         default="auto",
         description="solver of linear systems: direct or multigrid, by size; or a library that factorises",
     )
+    coarse_start: bool = Field(
+        default=True,
+        description="with control by load: whether large load steps on large regular meshes start from coarser meshes",
+    )
 
     def build(self, places: Places, problem: Problem) -> Solver:
         """Return the solver; raise StudyError if it does not fit the problem."""
@@ -71,7 +75,8 @@ class SolverKeys(Keys):
         with places.at("solver", "linear"):
             if self.control == "arc-length":
                 return ArcLength(self.load_steps, self.max_steps, **past)
-            return Newton(self.load_steps, method=self.method, linear=self.linear, **common)
+            common |= {"method": self.method, "linear": self.linear, "coarse_start": self.coarse_start}
+            return Newton(self.load_steps, **common)
 
     def _check_control(self, places: Places) -> None:
         """Raise StudyError if keys of displacement control are missing, or set for another control."""

@@ -1,0 +1,32 @@
+"""Doubts about a state: reasons why it may not be on the path of the states before it."""
+
+from collections.abc import Callable
+
+from truespring.arrays import Floats
+from truespring.linear.gradients import norm
+from truespring.solvers.balance import Equilibrium
+
+# A body that moves by more than this multiple of what the previous step suggests may have snapped through.
+_SNAP = 5.0
+
+
+def doubt(
+    state: Equilibrium, last: Equilibrium, previous: Equilibrium | None, admissible: Callable[[Floats], bool]
+) -> str:
+    """Return why a state found without line search may not be on the path, empty if it is accepted."""
+    if not state.converged:
+        return "did not converge"
+    if state.negative_eigenvalues:
+        return "led to an unstable state"
+    if not admissible(state.positions):
+        return "inverted an element"
+    return "led to a distant state" if snapped(state, last, previous) else ""
+
+
+def snapped(state: Equilibrium, last: Equilibrium, previous: Equilibrium | None, most: float = _SNAP) -> bool:
+    """Return whether a body moved by more than `most` times what the previous step suggests."""
+    if previous is None or state.branched:
+        return False
+    ratio = (state.load_factor - last.load_factor) / (last.load_factor - previous.load_factor)
+    expected = ratio * norm(last.positions - previous.positions)
+    return norm(state.positions - last.positions) > most * expected
