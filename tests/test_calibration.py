@@ -118,8 +118,8 @@ def _triangles() -> Problem:
     return replace(cantilever((4, 1)), mesh=ts.rectangle((0.16, 0.04), (4, 1), element="triangle"))
 
 
-def _cubes(poisson: float) -> Problem:
-    """Of two materials, in bricks that are not aligned with the axes."""
+def _cubes(poisson: float, other: float | None = None) -> Problem:
+    """Of two materials, in bricks that are not aligned with the axes; `other` is the second Poisson's ratio."""
     box = ts.box((0.08, 0.04, 0.04), (4, 2, 2))
     nodes = box.nodes + 0.002 * np.sin(200 * box.nodes[:, [1, 2, 0]]) * (box.nodes > 0)
     return Problem(
@@ -127,7 +127,11 @@ def _cubes(poisson: float) -> Problem:
         material=ts.Material(10e3, poisson),
         supports=[ts.Fixed(ts.Near((0.0, y, z))) for y in (0.0, 0.02, 0.04) for z in (0.0, 0.02, 0.04)],
         loads=[ts.Force(ts.Near((0.08, 0.04, 0.04)), (0.05, -0.06, 0.03))],
-        regions=[ts.Region(ts.Box((0.04, -1.0, -1.0), (1.0, 1.0, 1.0)), ts.Material(20e3, poisson))],
+        regions=[
+            ts.Region(
+                ts.Box((0.04, -1.0, -1.0), (1.0, 1.0, 1.0)), ts.Material(20e3, poisson if other is None else other)
+            )
+        ],
     )
 
 
@@ -163,6 +167,33 @@ def test_force_and_gradient_of_unknown_parameters(kind: str) -> None:
     assert objective.gradient(at) == pytest.approx(differences, rel=1e-5)
     residuals = objective.residuals(at)
     assert objective.jacobian(at).T @ residuals == pytest.approx(differences, rel=1e-5)
+
+
+def test_the_start_is_the_rule_by_default() -> None:
+    """Of bodies without hourglass modes, or with several defaults of `hourglass`, the moduli are fitted."""
+    given = ts.Springs("gaussian", hourglass=0.9)
+    for problem, springs, kind in (
+        (_cubes(0.3), ts.Springs("gaussian"), "hourglass"),
+        (_cubes(0.3, 0.45), given, "hourglass"),
+        (_cubes(0.3, 0.45), ts.Springs("gaussian"), "material"),
+        (_triangles(), ts.Springs("gaussian"), "material"),
+    ):
+        unknowns = make_unknowns(problem, springs)
+        assert unknowns.kind == kind
+        positions = problem.mesh.nodes + 0.001 * np.random.default_rng(3).normal(size=problem.mesh.nodes.shape)
+        expected = springs.potential(problem).gradient(positions)
+        assert unknowns.potential(unknowns.start).gradient(positions) == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize(("known", "warned"), [(0.51, True), (0.6, False)])
+def test_hourglass_at_the_limit_of_stability_is_a_warning(known: float, warned: bool) -> None:
+    box = ts.box((0.08, 0.04, 0.04), (2, 2, 2))
+    load = ts.Force("right", (0.0, -0.01, 0.0))
+    problem = Problem(box, ts.Material(10e3, 0.3), supports=[ts.Fixed("left")], loads=[load])
+    case = case_of(problem, ts.Springs("gaussian", hourglass=known), 1)
+    found = ts.calibrate(case, ts.Springs("gaussian"), regularisation=0.0)
+    assert found.model.hourglass == pytest.approx(known, abs=1e-3)  # type: ignore[attr-defined]
+    assert any("limit of stability, 0.5" in one for one in found.warnings) == warned
 
 
 def test_springs_each_of_its_own_cannot_be_told_from_one_load_and_that_is_said() -> None:
@@ -474,7 +505,16 @@ def test_what_does_not_fit_is_refused() -> None:
             "allowed.*: hourglass, material$",
         ),
         (lambda: make_unknowns(problem, ts.Springs("lloyd"), "hourglass"), ModelError, "allowed.*: class, region"),
-        (lambda: make_unknowns(_triangles(), ts.Springs("gaussian")), ModelError, "no hourglass modes"),
+        (
+            lambda: make_unknowns(_triangles(), ts.Springs("gaussian"), "hourglass"),
+            ModelError,
+            "no hourglass modes on triangle elements; allowed for these springs: material$",
+        ),
+        (
+            lambda: make_unknowns(_cubes(0.3, 0.45), ts.Springs("gaussian"), "hourglass"),
+            ModelError,
+            r"\(0.8316, 0.9174\): set hourglass; allowed for these springs: material$",
+        ),
         (
             lambda: make_unknowns(_triangles(), ts.Springs("gaussian", element="quadratic")),
             ModelError,

@@ -96,7 +96,7 @@ def elements(own: Mapping[str, Any], values: Mapping[str, Any], x: Floats, force
         np.add.at(force, nodes[:, own["links"][:, 0]], -pull)
         np.add.at(force, nodes[:, own["links"][:, 1]], pull)
     else:
-        density, pressure = volume_function(own, values, log, own["mu"], own["lam"], 0.0)
+        density, pressure = volume_function(own, values, log, own["mu"], own["lam"])
     for weights in own.get("fibre_weights", ()):
         ends = x[nodes[:, own["links"]]]
         across = ends[:, :, 1] - ends[:, :, 0]
@@ -119,7 +119,7 @@ def fibre_energy(I4: Floats, own: Mapping[str, Any]) -> tuple[Floats, Floats]:
     return k1 / (2 * safe) * np.expm1(k2 * strain**2), k1 * strain * np.exp(k2 * strain**2)
 
 
-def volume_function(own: Any, values: Any, log: Floats, mu: Floats, lam: Floats, mean: Any) -> tuple[Floats, Floats]:
+def volume_function(own: Any, values: Any, log: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
     """Return g [J/m^3] and the Kirchhoff pressure [Pa] of the neo-Hookean law."""
     if values["section"] != "plane stress":
         missing = {"plane strain": -1.0, "": -1.5}[str(values["section"])]
@@ -140,7 +140,7 @@ def points(own: Mapping[str, Any], values: Mapping[str, Any], x: Floats, force: 
     J, inverse = np.linalg.det(F), np.linalg.inv(F)
     mu, lam = own["mu"][:, None], own["lam"][:, None]
     if values["section"] == "plane stress":
-        density, pressure = volume_function(own, values, np.log(J), mu, lam, 0.0)
+        density, pressure = volume_function(own, values, np.log(J), mu, lam)
         energy = (density * volume).sum()
     else:
         mean = (J * volume).sum(axis=1, keepdims=True) / volume.sum(axis=1, keepdims=True)

@@ -40,7 +40,7 @@ def body(
     mesh: ts.Mesh, along: object, k1: float = K1, k2: float = K2, loads: object = None, supports: object = None
 ) -> ts.Problem:
     """A body of unit thickness in plane stress, or in 3D; held everywhere unless supports are given."""
-    material = ts.Material(YOUNG, POISSON, fibres=ts.Fibres(along, k1, k2))  # type: ignore[arg-type]
+    material = ts.Material(YOUNG, POISSON, fibres=ts.Fibres(along, k1, k2 if k1 else 0.0))  # type: ignore[arg-type]
     held = supports or [ts.Fixed(np.arange(mesh.n_nodes))]  # type: ignore[arg-type]
     acting = loads or [ts.ActiveTension(1.0)]
     return ts.Problem(mesh, material, ts.PlaneStress(1.0) if mesh.dim == 2 else None, held, acting)  # type: ignore[arg-type]
@@ -98,14 +98,16 @@ def test_a_strip_with_fibres_along_and_across(along: tuple[float, ...], stretch:
 
 
 @pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("steps", [1, 3])
-def test_an_active_strip_shortens_to_its_closed_form(name: str, steps: int) -> None:
-    along, tension = np.array([1.0, 0.0, 0.0]), 0.8
+@pytest.mark.parametrize(("tension", "steps"), [(0.8, 1), (0.8, 3), (-0.4, 1)])
+def test_an_active_strip_has_the_length_of_its_closed_form(name: str, tension: float, steps: int) -> None:
+    """It shortens; under a negative tension it extends, against the stiffness of the fibres."""
+    along = np.array([1.0, 0.0, 0.0])
 
     def left(stretch: float) -> float:
         return uniaxial(stretch, along, tension=tension)[0]
 
-    stretches = uniaxial(brentq(left, 0.4, 1.0, xtol=1e-14), along, tension=tension)[1]
+    ends = (0.4, 1.0) if tension > 0 else (1.0, 1.5)
+    stretches = uniaxial(brentq(left, *ends, xtol=1e-14), along, tension=tension)[1]
     mesh = ts.box((2.0, 1.0, 1.0), (2, 1, 1))
     problem = body(mesh, tuple(along), loads=[ts.ActiveTension(tension)], supports=sliding(mesh))
     path = ts.solve(problem, MODELS[name], ts.Newton(load_steps=steps, tolerance=1e-12))
@@ -369,6 +371,32 @@ def test_impossible_constants_are_errors(constant: str, value: float) -> None:
         ts.Fibres((1.0, 0.0), **{constant: value})
 
 
+def test_an_increase_of_no_stiffness_is_an_error() -> None:
+    with pytest.raises(ProblemError, match="k2 = 3 requires k1 above 0: set k1, or remove k2"):
+        ts.Fibres((1.0, 0.0), k2=3.0)
+    zero = fibre_energy(np.array([0.5, 40.0]), np.zeros(2), np.full(2, 5.0))
+    assert not np.any(zero)
+
+
+def test_an_angle_in_space_is_an_error(tmp_path: Path) -> None:
+    written(tmp_path, ts.box((1.0, 1.0, 1.0), (1, 1, 1)), {})
+    solid = STUDY.replace('[section]\nkind = "plane-stress"\nthickness = "5 mm"\n', "")
+    place = r"study.toml:4: material: fibres: angle is for plane bodies: set along, such as along = \[1, 0, 0\]"
+    with pytest.raises(StudyError, match=place):
+        read_study(study_of(tmp_path, "angle = 0.5", solid))
+    region = solid.replace("fibres = { FIBRES }\n", "").replace("[[support]]", REGION + "[[support]]")
+    with pytest.raises(StudyError, match=place.replace("4: material", "7: region.1")):
+        read_study(study_of(tmp_path, "angle = 0.5", region))
+
+
+REGION = """[[region]]
+on = { box = [[-1, -1, -1], [2, 2, 2]] }
+young = "15 kPa"
+poisson = 0.45
+fibres = { FIBRES }
+"""
+
+
 def test_directions_that_a_mesh_lacks_are_errors() -> None:
     mesh = ts.rectangle((2.0, 1.0), (2, 1))
     arrays = {"fibre": np.array([[1.0, 0.0], [0.0, 0.0]]), "out": np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]])}
@@ -391,6 +419,8 @@ def test_directions_that_a_mesh_lacks_are_errors() -> None:
         ("k1 = 1.0", "study.toml:7: material.fibres.*along"),
         ("along = 3", "study.toml:7: material.fibres.along"),
         ("along = [1, 0], angle = 0.0", "study.toml:7: material.fibres"),
+        ("angle = []", r"study.toml:7: material.fibres: angle = \[\]: give an angle"),
+        ("along = [1, 0], k2 = 3", "study.toml:4: material: fibres: k2 = 3 requires k1 above 0"),
     ],
 )
 def test_errors_of_a_study_name_their_place(tmp_path: Path, fibres: str, place: str) -> None:
@@ -426,10 +456,17 @@ OTHERS: dict[str, Model] = {
 }
 
 
+ON_TRIANGLES = ("rule van-gelder", "heml", "mass-tensor")
+
+
 @pytest.mark.parametrize("name", OTHERS)
 def test_no_model_ignores_fibres(name: str) -> None:
-    """A model includes their stiffness or raises, and takes fibres that only give the direction of a tension."""
-    mesh, model = ts.rectangle((1.0, 1.0), (2, 2)), OTHERS[name]
+    """A model includes their stiffness or raises, and takes fibres that only give the direction of a tension.
+
+    CalculiX has no load that follows the fibres.
+    """
+    mesh = ts.rectangle((1.0, 1.0), (2, 2), "triangle" if name in ON_TRIANGLES else "quadrilateral")
+    model = OTHERS[name]
     problem = body(mesh, (1.0, 0.0), supports=[ts.Fixed("left")])
     assert model.takes_fibres == (name == "rule gaussian")
     if model.takes_fibres:
@@ -437,9 +474,12 @@ def test_no_model_ignores_fibres(name: str) -> None:
         return
     with pytest.raises(ModelError, match="fibres"):
         ts.solve(problem, model)
-    if model.kind in ("springs", "fem") and name != "rule van-gelder":
-        without = body(mesh, (1.0, 0.0), k1=0.0, supports=[ts.Fixed("left")], loads=[ts.ActiveTension(0.01)])
-        assert ts.solve(without, model).states[-1].displacement[:, 0].min() < 0
+    without = body(mesh, (1.0, 0.0), k1=0.0, supports=[ts.Fixed("left")], loads=[ts.ActiveTension(0.01)])
+    if name == "calculix":
+        with pytest.raises(ts.TruespringError, match=r"active tension.* follows the body, and there is no keyword"):
+            ts.solve(without, model)
+        return
+    assert ts.solve(without, model).states[-1].displacement[:, 0].min() < 0
 
 
 def test_an_active_tension_inside_a_block_of_boundary_elements_is_an_error() -> None:

@@ -58,7 +58,7 @@ class Case:
         model, problem: what to solve; None for a plain network.
         quadratic: the energy is quadratic, and not frame invariant.
         infinitesimal: a part of the body takes a turn for strain: not frame invariant, no balance of moments.
-        springs: it tells how far its springs are stretched.
+        springs: it has `stretch`.
         stressed: it takes a stress for its geometric part.
         geometric: a stress given to the Hessian makes its geometric part.
         quadratic_stress: the stress is at most quadratic in the positions.

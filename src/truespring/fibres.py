@@ -27,7 +27,7 @@ class Fibres:
             name of an array of `Mesh.element_vectors`; for several families a list of these. Stored as a tuple of
             families.
         k1: stiffness [Pa], not negative; 0 for fibres without stiffness, which may have an active tension.
-        k2: increase of the stiffness with the stretch [-], not negative.
+        k2: increase of the stiffness with the stretch [-], not negative; requires k1 above 0.
     """
 
     along: str | Sequence[float] | Sequence[str | Sequence[float]]
@@ -39,6 +39,8 @@ class Fibres:
         for name, value, unit in (("k1", self.k1, " Pa"), ("k2", self.k2, "")):
             if not (math.isfinite(value) and value >= 0):
                 raise ProblemError(f"fibres: {name} = {value!r}{unit}: must be finite and not negative")
+        if self.k2 and not self.k1:
+            raise ProblemError(f"fibres: k2 = {self.k2:g} requires k1 above 0: set k1, or remove k2")
 
     @property
     def families(self) -> tuple[Direction, ...]:

@@ -154,6 +154,7 @@ def _warnings(unknowns: Unknowns, values: Floats, results: Sequence[CaseResult])
                 f"{one.case.name}: calibration increased the error from {error_words(one.both[0])} to "
                 f"{error_words(one.both[1])}: the springs do not fit this load better"
             )
+    yield from unknowns.warnings(values)
     gone = [name for name, value in zip(unknowns.names, values, strict=True) if value < 1e-3]
     if gone:
         more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""

@@ -1,11 +1,11 @@
-"""The kinds of unknowns of a calibration, and which springs they are for."""
+"""The kinds of unknowns of a calibration, and for which springs they are available."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
-from truespring.calibration.model_unknowns import hourglass_unknown, material_unknowns
+from truespring.calibration.model_unknowns import hourglass_fault, hourglass_unknown, material_unknowns
 from truespring.calibration.stiffness_unknowns import (
     classes,
     directions_and_rows,
@@ -15,8 +15,17 @@ from truespring.calibration.stiffness_unknowns import (
 )
 from truespring.calibration.unknowns import Unknowns
 from truespring.errors import ModelError, nearest
-from truespring.models import RULES, Springs
+from truespring.models import Springs
 from truespring.problem import Problem
+
+
+def _coupled_fault(problem: Problem, springs: Springs) -> str:
+    """Return why the stiffness of springs cannot be fitted; empty if it can."""
+    return "are coupled and have no individual stiffness to fit" if springs.coupled else ""
+
+
+def _no_fault(problem: Problem, springs: Springs) -> str:
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,20 +35,16 @@ class UnknownKind:
     Attributes:
         make: returns the unknowns of a problem and springs; the last argument is the key in UNKNOWNS.
         about: what each unknown scales, in a few words.
-        coupled: whether the springs may be coupled within an element; the stiffness of such springs is not fitted.
-        parameter: parameter that the rule must have; empty for any rule.
+        fault: returns why springs on the body of a problem have no such unknowns, as a predicate; empty if they have.
     """
 
     make: Callable[[Problem, Springs, str], Unknowns]
     about: str
-    coupled: bool = False
-    parameter: str = ""
+    fault: Callable[[Problem, Springs], str] = _coupled_fault
 
-    def suits(self, springs: Springs) -> bool:
-        """Return whether the unknowns are defined for springs, on meshes that have them."""
-        if springs.element is not None or (springs.coupled and not self.coupled):
-            return False
-        return not self.parameter or (springs.rule is not None and self.parameter in RULES[springs.rule].parameters)
+    def suits(self, problem: Problem, springs: Springs) -> bool:
+        """Return whether the unknowns are available for springs on the body of a problem."""
+        return springs.element is None and not self.fault(problem, springs)
 
 
 #: Kinds of unknowns by name.
@@ -57,17 +62,11 @@ UNKNOWNS: Mapping[str, UnknownKind] = MappingProxyType(
         "hourglass": UnknownKind(
             hourglass_unknown,
             "the stiffness of the hourglass modes, the key hourglass of the rule gaussian",
-            coupled=True,
-            parameter="hourglass",
+            fault=hourglass_fault,
         ),
-        "material": UnknownKind(material_unknowns, "the moduli of one material", coupled=True),
+        "material": UnknownKind(material_unknowns, "the moduli of one material", fault=_no_fault),
     }
 )
-
-
-def first_kind(springs: Springs) -> str:
-    """Return the first kind of unknowns that suits springs; "class" if none does."""
-    return next((name for name, kind in UNKNOWNS.items() if kind.suits(springs)), "class")
 
 
 def make_unknowns(problem: Problem, springs: Springs, kind: str | None = None) -> Unknowns:
@@ -76,7 +75,8 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str | None = None) -
     By default, the first kind that suits the springs. Raises ModelError for a kind that is unknown or does not suit the
     springs, and for springs that do not fit the mesh.
     """
-    kind = first_kind(springs) if kind is None else kind
+    suited = [name for name, one in UNKNOWNS.items() if one.suits(problem, springs)]
+    kind = next(iter(suited), "class") if kind is None else kind
     if kind not in UNKNOWNS:
         raise ModelError(f"unknowns = '{kind}' is unknown{nearest(kind, UNKNOWNS)}; allowed: {', '.join(UNKNOWNS)}")
     if springs.element is not None:
@@ -84,8 +84,7 @@ def make_unknowns(problem: Problem, springs: Springs, kind: str | None = None) -
             f"element = '{springs.element}': springs between all nodes cannot be calibrated: they are finite elements "
             "of second order; remove element"
         )
-    if not UNKNOWNS[kind].suits(springs):
-        allowed = ", ".join(name for name, one in UNKNOWNS.items() if one.suits(springs))
-        why = "are coupled and have no individual stiffness to fit" if springs.coupled else "have no such parameter"
-        raise ModelError(f"unknowns = '{kind}': {springs.label} {why}; allowed for these springs: {allowed}")
+    if kind not in suited:
+        why = UNKNOWNS[kind].fault(problem, springs)
+        raise ModelError(f"unknowns = '{kind}': {springs.label} {why}; allowed for these springs: {', '.join(suited)}")
     return UNKNOWNS[kind].make(problem, springs, kind)

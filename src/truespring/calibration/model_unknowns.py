@@ -10,14 +10,16 @@ from scipy import sparse
 from truespring.arrays import Floats
 from truespring.calibration.unknowns import Columns, Unknowns, material_name
 from truespring.material import Material
-from truespring.models import LAWS, Model, Springs
-from truespring.models.gaussian_weights import check_hourglass, default_hourglass
+from truespring.models import LAWS, RULES, Model, Springs
+from truespring.models.gaussian_weights import HOURGLASS_LIMITS, hourglass_values
 from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.units import to_si
 
 # Step of central differences by an unknown, of size 1.
 _STEP = 1e-4
+# Distance of `hourglass` to the limit of stability below which the limit, and not the data, determines it.
+_AT_LIMIT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +62,8 @@ class HourglassUnknown(ModelUnknowns):
 
     @property
     def _rule(self) -> float:
-        """The value of the springs of the rule; by default that for the material of the body."""
-        given = self.springs.hourglass
-        return given if given is not None else default_hourglass(self.problem, self.problem.materials[0].poisson)
+        """The value of the springs of the rule, the same for all elements."""
+        return float(hourglass_values(self.problem, self.springs.hourglass)[0])
 
     def _value(self, values: Floats) -> float:
         return float(values[0]) * self._rule
@@ -75,15 +76,42 @@ class HourglassUnknown(ModelUnknowns):
         """Return the entry of the springs of the rule with the calibrated `hourglass`."""
         return {**study["models"][name], "hourglass": self._value(values)}
 
+    def warnings(self, values: Floats) -> tuple[str, ...]:
+        """Return a warning if the calibrated `hourglass` is at the limit of stability."""
+        limit = max(_limits(self.problem))
+        if self._value(values) > limit + _AT_LIMIT:
+            return ()
+        return (
+            f"hourglass = {self._value(values):.6g} is at the limit of stability, {limit:g}: the data do not determine "
+            "it; use the default, more elements through the depth, or elements closer to cubes or squares",
+        )
+
     def sentence(self, values: Floats) -> str:
         """Return the calibrated `hourglass` and that of the rule as a sentence."""
         return f"hourglass = {self._value(values):.6g}, by the rule {self._rule:.6g}."
 
 
+def _limits(problem: Problem) -> list[float]:
+    """Return the limits of `hourglass` of the kinds of elements with hourglass modes."""
+    return [HOURGLASS_LIMITS[kind] for kind in problem.mesh.element_kinds if kind in HOURGLASS_LIMITS]
+
+
+def hourglass_fault(problem: Problem, springs: Springs) -> str:
+    """Return why the key `hourglass` of springs cannot be fitted on the body of a problem; empty if it can."""
+    if springs.rule is None or "hourglass" not in RULES[springs.rule].parameters:
+        return "have no such parameter"
+    if not _limits(problem):
+        return f"have no hourglass modes on {problem.mesh.kinds} elements"
+    values = np.unique(hourglass_values(problem, springs.hourglass))
+    if len(values) > 1:
+        several = ", ".join(f"{value:.4g}" for value in values.tolist())
+        return f"have several values of hourglass by default, one for each material ({several}): set hourglass"
+    return ""
+
+
 def hourglass_unknown(problem: Problem, springs: Springs, kind: str) -> HourglassUnknown:
-    """Return the unknown `hourglass`; raise ModelError if the elements have no hourglass modes."""
+    """Return the unknown `hourglass` of springs without `hourglass_fault`."""
     found = HourglassUnknown(kind, ("hourglass",), problem, springs)
-    check_hourglass(problem.mesh, found.model(found.start).hourglass)
     found.potential(found.start)  # raises the usual errors
     return found
 

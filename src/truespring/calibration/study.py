@@ -91,7 +91,8 @@ def springs_of(study: Study, unknowns: str | None = None) -> str:
     by_rule = springs_by_rule(study.entries)
     kinds = list(UNKNOWNS) if unknowns is None else [unknowns]
     suited = [
-        [name for name, entry in by_rule.items() if kind in UNKNOWNS and UNKNOWNS[kind].suits(entry)] for kind in kinds
+        [name for name, entry in by_rule.items() if kind in UNKNOWNS and UNKNOWNS[kind].suits(study.problem, entry)]
+        for kind in kinds
     ]
     springs = next(filter(None, suited), list(by_rule))
     if not springs:

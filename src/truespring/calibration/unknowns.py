@@ -89,6 +89,10 @@ class Unknowns(ABC):
         """Write files that the study needs, named `file` and `volume`; return those written."""
         return ()
 
+    def warnings(self, values: Floats) -> tuple[str, ...]:
+        """Return warnings about the calibrated values (n,)."""
+        return ()
+
     def sentence(self, values: Floats) -> str:
         """Return the parameters of the calibrated model as a sentence; empty if they are in files."""
         return ""

@@ -23,6 +23,8 @@ from truespring.potential import SparseMatrix
 class ActiveTension(FollowingLoad):
     """A `tension` [Pa] along each family of fibres of the material: force per undeformed area across the fibres.
 
+    If it is negative, the fibres push, as of an actuator that extends.
+
     `on` is an element group, a Box that contains the centres of the elements, or element numbers; None for the whole
     body, whose elements without fibres carry none. The potential of an element is tension x volume x stretch, the
     stretch of the fibres that of the mean of I4 over the element.

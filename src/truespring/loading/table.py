@@ -86,7 +86,8 @@ LOADS: Mapping[str, LoadKind] = MappingProxyType(
             Quantity(
                 "tension",
                 "stress",
-                "the active tension along the fibres of the material, a nominal stress; on: elements, a group or a box",
+                "the active tension along the fibres of the material, a nominal stress, negative for fibres that push; "
+                "on: elements, a group or a box",
             ),
         ),
         "gravity": LoadKind(

@@ -35,6 +35,7 @@ def fibre_energy(I4: Floats, k1: Floats, k2: Floats) -> tuple[Floats, Floats, Fl
         k2: increase of the stiffness [-], likewise.
     """
     x = np.maximum(I4 - 1, 0.0)
+    k2 = np.where(k1 > 0, k2, 0.0)  # no stiffness times an exponential that overflows is no number
     square = k2 * x**2
     with np.errstate(over="ignore", invalid="ignore"):
         growth = np.exp(square)

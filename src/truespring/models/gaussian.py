@@ -12,7 +12,7 @@ from truespring.fibres import Families
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, lengths, stretch
 from truespring.models.element_volumes import ElementVolumes
 from truespring.models.fibres import fibre_energy
-from truespring.models.gaussian_weights import Laplacians
+from truespring.models.gaussian_weights import ROUNDING, Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
 from truespring.models.laws import LAWS
@@ -24,8 +24,6 @@ from truespring.problem import Problem
 
 # Smallest number of elements, or of nodes, for which threads share the work.
 _SMALLEST_PIECE = 64
-# Weight below which a link has no spring, over the largest: rounding.
-_ROUNDING = 1e-12
 
 
 class _State(NamedTuple):
@@ -304,7 +302,7 @@ class GaussianElements:
 
         mesh = self.problem.mesh
         weights = np.abs(self._link_weights()).max(axis=0)
-        present = np.flatnonzero(weights.ravel() > _ROUNDING * weights.max())
+        present = np.flatnonzero(weights.ravel() > ROUNDING * weights.max())
         pairs = mesh.elements[:, np.array(mesh.kind.links)].reshape(-1, 2)[present]
         return (*unique_pairs(writable(pairs), mesh.n_nodes), present)
 
@@ -401,21 +399,11 @@ class SummedGaussian(SummedSprings[GaussianElements]):
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Return fields of springs, then of elements, as GaussianElements does; sums over the parts of springs."""
-        springs, of = self._shared
-        split = [len(part.springs) for part in self.parts]
-        by_part = [part.cell_fields(positions) for part in self.parts]
-        found = {}
-        for name in by_part[0]:
-            pairs = list(zip(by_part, split, strict=True))
-            lines = np.concatenate([fields[name][:n] for fields, n in pairs])
-            rest = np.concatenate([fields[name][n:] for fields, n in pairs])
-            whole = np.full((len(springs), *lines.shape[1:]), np.nan)
-            if name == "stretch":
-                whole[of] = lines
-            elif lines.ndim == 1:
-                whole = np.bincount(of, lines, len(springs)).astype(np.float64)
-            found[name] = np.concatenate([whole, rest])
-        return found
+        parts = [(part.cell_fields(positions), len(part.springs)) for part in self.parts]
+        names = parts[0][0]
+        lines = {name: np.concatenate([fields[name][:n] for fields, n in parts]) for name in names}
+        elements = {name: np.concatenate([fields[name][n:] for fields, n in parts]) for name in names}
+        return {name: np.concatenate([own, elements[name]]) for name, own in self._of_springs(lines).items()}
 
 
 def gaussian_data(

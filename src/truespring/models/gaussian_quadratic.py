@@ -11,7 +11,7 @@ from truespring.assembly import pairs_of_nodes
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, stretch
 from truespring.models.fem_potential import FemPotential, of_one_kind
 from truespring.models.fibres import stiff_fibres
-from truespring.models.gaussian_weights import integrated
+from truespring.models.gaussian_weights import ROUNDING, integrated
 from truespring.models.law import Constants, Law, Response
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.quadratic import QuadraticPotential
@@ -98,7 +98,7 @@ class _BetweenAllNodes(QuadraticPotential):
         """Pairs of nodes joined by springs, shape (n, 2), and their stiffness [N/m], shape (n,)."""
         rows = np.repeat(np.arange(len(self.nodes)), np.diff(self._pattern.starts))
         columns = self._pattern.columns
-        chosen = (rows < columns) & (np.abs(self._weights) > 1e-12 * np.abs(self._weights).max())
+        chosen = (rows < columns) & (np.abs(self._weights) > ROUNDING * np.abs(self._weights).max())
         return np.stack([rows, columns], axis=1)[chosen], self._weights[chosen]
 
     @property

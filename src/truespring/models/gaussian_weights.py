@@ -20,6 +20,8 @@ HOURGLASS_LIMITS: Mapping[str, float] = MappingProxyType({"quadrilateral": 0.0, 
 
 #: Default of `hourglass` on lattices of bricks with a stepped surface, such as voxels.
 STEPPED_HOURGLASS = 1.2
+#: Weight below which nodes are joined by no spring, over the largest: rounding.
+ROUNDING = 1e-12
 # Share of the elements of a bounding box below which equal bricks have a stepped surface.
 _FILLED = 0.99
 

@@ -168,6 +168,21 @@ class SummedSprings(Summed[SpringPart]):
         """Node numbers of the springs, each pair once, shape (n_springs, 2)."""
         return self._shared[0]
 
+    def _of_springs(self, lines: dict[str, Floats]) -> dict[str, Floats]:
+        """Return fields of the springs, shape (n_springs, ...), from those of the lines of the parts.
+
+        The stretch is that of each line, other fields are sums over the lines.
+        """
+        springs, of = self._shared
+        found = {}
+        for name, values in lines.items():
+            found[name] = np.zeros((len(springs), *values.shape[1:]))
+            if name == "stretch":
+                found[name][of] = values
+            else:
+                np.add.at(found[name], of, values)
+        return found
+
     def stretch(self, positions: Floats) -> Floats:
         """Return length over undeformed length of each part's springs [-], kind by kind, shape (n,)."""
         return np.concatenate([part.stretch(positions) for part in self.parts])
@@ -192,8 +207,4 @@ class SummedLinks(SummedSprings[Any]):
 
     def cell_fields(self, positions: Floats) -> dict[str, Floats]:
         """Return tension [N], stretch [-], undeformed stiffness [N/m] and strain energy [J], shape (n_springs,)."""
-        springs, of = self._shared
-        fields = self._by_part(lambda part: part.cell_fields(positions))
-        found = {name: np.bincount(of, values, len(springs)).astype(np.float64) for name, values in fields.items()}
-        found["stretch"][of] = fields["stretch"]
-        return found
+        return self._of_springs(self._by_part(lambda part: part.cell_fields(positions)))

@@ -169,7 +169,7 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
     with places.at("material"):
         if keys.material is None and network is None:
             raise StudyError("is required and missing")
-        material = None if keys.material is None else keys.material.build()
+        material = None if keys.material is None else keys.material.build(mesh.dim)
     section = None if network else _section(keys, places, mesh)
     regions = []
     for number, region in enumerate(keys.region):

@@ -45,7 +45,9 @@ class FibreKeys(Keys):
         "families a list of these",
     )
     angle: Angle | list[Angle] | None = Field(
-        default=None, description="direction in a plane body, instead of along: angle from x, or a list of angles"
+        default=None,
+        description="direction in a plane body, instead of along: angle from x, or a list of angles for several "
+        "families",
     )
     k1: Stress = Field(default=0.0, description="stiffness; default: 0, fibres for an active tension only")
     k2: Number = Field(default=0.0, description="increase of the stiffness with the stretch")
@@ -54,10 +56,14 @@ class FibreKeys(Keys):
     def _one_direction(self) -> Self:
         if (self.along is None) == (self.angle is None):
             raise ValueError("a direction is required: set along, or angle in a plane body")
+        if self.angle == []:
+            raise ValueError("angle = []: give an angle, or a list with the angle of each family")
         return self
 
-    def build(self) -> Fibres:
-        """Return the fibres."""
+    def build(self, dim: int) -> Fibres:
+        """Return the fibres of a body of a dimension; raise StudyError for an angle in 3D."""
+        if self.angle is not None and dim == 3:
+            raise StudyError("fibres: angle is for plane bodies: set along, such as along = [1, 0, 0]")
         if self.angle is None:
             assert self.along is not None  # see _one_direction
             return Fibres(self.along, self.k1, self.k2)
@@ -93,11 +99,11 @@ class PlainMaterialKeys(Keys):
             raise ValueError(f"{found}: {_PAIR_WORDS}")
         return self
 
-    def build(self) -> Material:
-        """Return the material."""
+    def build(self, dim: int) -> Material:
+        """Return the material of a body of a dimension."""
         constants = {name: getattr(self, name, None) for name in material_constants()}
         stated = {name: value for name, value in constants.items() if value is not None}
-        fibres = None if self.fibres is None else self.fibres.build()
+        fibres = None if self.fibres is None else self.fibres.build(dim)
         if self.mu is not None and self.bulk is not None:
             return Material.from_moduli(self.mu, self.bulk, self.density, stated, fibres)
         assert self.young is not None and self.poisson is not None  # see _one_pair
@@ -130,7 +136,7 @@ class RegionKeys(MaterialKeys):
     def region(self, mesh: Mesh) -> Region:
         """Return the region; raise MeshError if it selects no element."""
         select_elements(mesh, self.on)
-        return Region(self.on, self.build())
+        return Region(self.on, self.build(mesh.dim))
 
 
 class SectionKeys(Keys):
