@@ -131,7 +131,7 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
         if diagonal:
             beside.append(np.sqrt(share) / length)
             values, vectors = eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]))
-            long_enough = iteration > _FEWEST or _enlarged(values) > _ENLARGED * np.sqrt(start.size)
+            long_enough = iteration > _FEWEST or _enlarged(values.astype(np.float64)) > _ENLARGED * np.sqrt(start.size)
             if long_enough and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
                 return Lowest(float(values[0]), iteration)
         _turn_towards(z, share, p)
