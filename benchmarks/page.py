@@ -145,7 +145,7 @@ def _times(runs: list[Measured], dim: int, load: str, longest: float) -> Iterato
     ]
     yield from table(("nodes", *(f"{count:,}" for count in nodes)), rows)
     if left_out:
-        yield f"Sizes left out, since the time of a solve is limited to {longest:g} s:\n"
+        yield f"Sizes left out (the time of a solve is limited to {longest:g} s):\n"
         yield from (f"* {label}: {why}" for label, why in left_out.items())
         yield ""
 
@@ -213,14 +213,15 @@ def _older(results: dict) -> Iterator[str]:
     for row in results["older"]:
         where = f"{row['dim']}D, {row['n_nodes']:,} nodes"
         then = row["seconds"]["then"]
-        for side, label in (("now", row["rule"]), (SPRINGS, PROGRAMS[SPRINGS].label)):
+        rule = row["rule"].removeprefix("truespring, ")
+        for side, label in (("now", rule), (SPRINGS, f"Gaussian springs now, {rule} then")):
             now = row["seconds"][side]
             if then and now:
                 taken = statistics.median(then), statistics.median(now)
                 cells = (*map(_seconds, taken), f"{taken[0] / taken[1]:.2f}")
             else:
                 cells = ("-", "-", row["failure"])
-            rows.append((f"{where}: {label} now, {row['rule']} then", *cells))
+            rows.append((f"{where}: {label}", *cells))
     yield from table(("", "then", "now", "times faster"), rows)
 
 
@@ -375,55 +376,6 @@ def _fractions(kernels: list[dict], key: str) -> Iterator[str]:
         small = (f"{1 - sum(one.get(name, 0) for name in large):.0%}" for one in parts)
         rows.append((f"{rest} smaller shares", *small))
     yield from table(("", *map(_where, profiled)), rows)
-
-
-def _parts(kernels: list[dict]) -> Iterator[str]:
-    """Yield the bytes of what a solve keeps."""
-    counted = [one for one in kernels if one["parts"]]
-    if not counted:
-        return
-    yield (
-        "Bytes a node of the arrays that are kept at the end of a solve; temporary ones and libraries are not "
-        "counted. The tangent is the assembled matrix, the linear solver what it makes of it.\n"
-    )
-    rows = []
-    for one in counted:
-        parts = {name: size / one["n_nodes"] for name, size in one["parts"].items()}
-        rows.append((_where(one), *(f"{size:.0f}" for size in parts.values()), f"{sum(parts.values()):.0f}"))
-    yield from table(("", *counted[0]["parts"], "sum"), rows)
-
-
-def _limit(results: dict) -> Iterator[str]:
-    limit = max(results["bandwidth"].values())
-    reading = max(value for name, value in results["bandwidth"].items() if name.startswith("read"))
-    yield "## Memory bandwidth\n"
-    listed = "; ".join(f"{name}: {value / 1e9:.1f} GB/s" for name, value in results["bandwidth"].items())
-    yield f"Memory bandwidth of this machine in the same run, arrays of 512 MiB: {listed}.\n"
-    yield (
-        "The last column of the table is the time of a loop over its limit, the time to move its data once at the "
-        "largest of these bandwidths: of a force, positions, elements and forces; of a tangent, positions, elements "
-        "and the matrix in double precision; of a matrix product, half of the symmetric matrix in single precision and "
-        "two vectors; of a V-cycle, each level twice; of a solve, the tangents, products and V-cycles of its "
-        "iterations. It can be below 1 if the data fit into a cache, or if a loop needs less than that. Relative to "
-        f"the bandwidth of reading alone, {reading / 1e9:.1f} GB/s, it would be {reading / limit:.2f} times as "
-        "large.\n"
-    )
-    rows = []
-    for one in results["kernels"]:
-        for row in one["rows"]:
-            moved = Moved(row["name"], row["seconds"], row["bytes_moved"])
-            least = 1e3 * moved.bytes_moved / limit
-            numbers = f"{moved.bytes_moved / 1e6:.1f}", f"{1e3 * moved.seconds:.3g}", f"{least:.3g}"
-            rows.append((f"{_where(one)}: {moved.name}", *numbers, f"{moved.over(limit):.1f}"))
-    yield from table(("", "MB", "ms", "limit, ms", "time over limit"), rows)
-    yield "Fractions of the time of a whole solve, including the distribution of work to threads:\n"
-    profiled = [one for one in results["kernels"] if one["shares"]]
-    shares = [{name: value / sum(one["shares"].values()) for name, value in one["shares"].items()} for one in profiled]
-    names = sorted({name for one in shares for name in one}, key=lambda name: -sum(one.get(name, 0) for one in shares))
-    large = [name for name in names if max(one.get(name, 0) for one in shares) >= _LEAST_SHARE]
-    rows = [(name, *(f"{one.get(name, 0):.0%}" for one in shares)) for name in large]
-    rest = (f"{1 - sum(one.get(name, 0) for name in large):.0%}" for one in shares)
-    yield from table(("", *map(_where, profiled)), [*rows, (f"{len(names) - len(large)} smaller shares", *rest)])
 
 
 def _where(one: dict) -> str:

@@ -17,7 +17,7 @@ _POTENTIAL = {
     "stress": "stress",
     "extrapolated_stress": "stress",
     "hessian": "tangents",
-    "projected_hessian": "tangents",
+    "projected_hessian": "projected tangents",
 }
 _FUNCTIONS = {"conjugate_gradients": "conjugate gradients", "lowest_eigenvalue": "stability (Lanczos)"}
 
