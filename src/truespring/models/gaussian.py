@@ -262,16 +262,24 @@ class GaussianElements:
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
-        matrices = self.element_hessians(positions)
-        return self._pattern.summed(lambda first, last: semidefinite(matrices[first:last], self._pattern.dim))
+        known, dim = self._curvature(positions, None, forms=True), self._pattern.dim
+        return self._pattern.summed(lambda first, last: semidefinite(self._matrices(known, first, last), dim))
 
     def element_hessians(self, positions: Floats) -> Floats:
         """Return the tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), node by node."""
-        from truespring.kernels import gaussian
+        return self._matrices(self._curvature(positions, None, forms=True), 0, len(self._volumes))
 
-        n, n_dof = len(self._pattern.elements), self._pattern.elements.shape[1] * self._pattern.dim
-        blocks = np.zeros((n, n_dof, n_dof))
-        self._run(gaussian.add_matrices, *self._curvature(positions, None, forms=True), blocks)
+    def _matrices(self, known: tuple[Any, ...], first: int, last: int) -> Floats:
+        """Return the tangent stiffness of elements first to last [N/m]; `known` is from `_curvature`, with forms."""
+        from truespring.kernels import gaussian
+        from truespring.kernels.threads import run
+
+        x, elements, *turns, slope, second, pressure, matrices, of, factors = known
+        rows, n_dof = self._measures.rows, elements.shape[1] * self._pattern.dim
+        here, blocks = slice(first, last), np.zeros((last - first, n_dof, n_dof))
+        own = (x, elements[here], *turns, slope[first * rows : last * rows], second[here], pressure[here])
+        form = (matrices, of[here], np.ascontiguousarray(factors[:, here]))
+        run(gaussian.add_matrices, len(blocks), *own, *form, blocks, self._pattern.zero, smallest=_SMALLEST_PIECE)
         return blocks
 
     def element_arrays(self) -> dict[str, Any]:
