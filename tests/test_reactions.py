@@ -407,7 +407,7 @@ def test_nothing_was_made_worse_where_the_force_improved() -> None:
         assert bool(said) == worse
     for gone, more in ((1, ""), (3, ""), (5, "and 2 more")):
         values = np.where(np.arange(8) < gone, 0.0, 1.0)
-        names: Any = SimpleNamespace(names=[f"s{k}" for k in range(8)])
+        names: Any = SimpleNamespace(names=[f"s{k}" for k in range(8)], warnings=lambda values: ())
         (said,) = _warnings(names, values, [])
         assert said.count("s0") == 1 and (more in said if more else "more:" not in said and "and" not in said)
     mixed = CaseResult(case, True, off(0.3, 0.01), off(0.01, 0.1))
