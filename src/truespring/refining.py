@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from truespring.arrays import Floats
 from truespring.comparison import Comparison, compare
@@ -260,6 +259,8 @@ def coarser_problem(problem: Problem) -> Problem:
     size = mesh.upper - mesh.lower
     made = (rectangle if mesh.dim == 2 else box)(tuple(size.tolist()), half)
     nodes = made.nodes + mesh.lower
+    from scipy.spatial import KDTree
+
     at = np.asarray(KDTree(nodes).query(mesh.nodes, distance_upper_bound=1e-6 * mesh.diameter)[1])
     groups = {name: at[of][at[of] < len(nodes)] for name, of in mesh.node_groups.items()}
     return replace(problem, mesh=Mesh(nodes, made.elements, made.element, groups))

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from truespring.arrays import Bools, Floats
 from truespring.potential import SparseMatrix
@@ -44,6 +43,8 @@ class Factors(NamedTuple):
 
 def _superlu(matrix: FreeMatrix) -> Factors:
     """Factorise by SciPy's SuperLU."""
+    from scipy.sparse.linalg import splu
+
     # Without row pivoting, the diagonal of SuperLU's U is D of L D L^T.
     lu = splu(
         sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -203,6 +204,8 @@ class Factorisation:
             values, vectors = np.linalg.eigh(self.matrix.toarray())
             vector = vectors[:, chosen(values)]
         else:
+            from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
             inverse = LinearOperator((n, n), matvec=self.factors.solve, dtype=np.float64)
             start = np.random.default_rng(9).normal(size=n)
             try:

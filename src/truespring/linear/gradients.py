@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh_tridiagonal
 
 from truespring.arrays import Floats
 
@@ -117,6 +116,8 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     The coefficients of conjugate gradients form the tridiagonal matrix of Lanczos (Golub and Van Loan, 10.3 and 11.5).
     A direction of negative curvature ends the iteration: its Rayleigh quotient is returned.
     """
+    from scipy.linalg import eigh_tridiagonal
+
     r, x = start.copy(), np.zeros(start.shape)
     p, q = np.zeros(start.shape), np.empty(start.shape)
     previous, length = np.inf, 1.0

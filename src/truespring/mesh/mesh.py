@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import MeshError, nearest
@@ -428,6 +427,8 @@ class Mesh:
         corners = self.elements.astype(np.int32)
         ends = np.repeat(corners[:, 0], corners.shape[1] - 1), corners[:, 1:].ravel()
         graph = sparse.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(self.n_nodes, self.n_nodes))
+        from scipy.sparse.csgraph import connected_components
+
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 

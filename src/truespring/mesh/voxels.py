@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.deprecation import renamed_argument
@@ -46,6 +45,8 @@ def read_voxels(file: str | Path, label: int | str, edge: float | None = None, u
 
 def _mesh(labels: Labels, label: int | str, edge: float | None, scale: float) -> Mesh:
     inside = labels.inside(label)
+    from scipy import ndimage
+
     (box,) = ndimage.find_objects(inside.astype(np.uint8))
     low = np.array([part.start for part in box])
     inside, spacing = inside[box], scale * labels.spacing
@@ -88,6 +89,8 @@ def _resampled(inside: Bools, spacing: Floats, edge: float) -> Bools:
 
 def _largest_part(filled: Bools, label: int | str) -> tuple[Bools, list[str]]:
     """Return the largest part whose cubes share faces, and a note on the parts left out."""
+    from scipy import ndimage
+
     parts, n_parts = ndimage.label(filled)
     if n_parts == 1:
         return filled, []

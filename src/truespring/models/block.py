@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError
@@ -122,8 +121,8 @@ def _symmetric(stiffness: Floats, rigid: Floats) -> Floats:
     projected = projector @ stiffness @ projector
     projected = (projected + projected.T) / 2
     try:
-        linalg.cholesky(projected + np.trace(projected) / len(projected) * (basis @ basis.T))
-    except linalg.LinAlgError:
+        np.linalg.cholesky(projected + np.trace(projected) / len(projected) * (basis @ basis.T))
+    except np.linalg.LinAlgError:
         raise ModelError(
             "the boundary elements of the block are unstable: its facets are too coarse or too unequal; use finer "
             "elements, or elements closer to squares, cubes or regular simplices"

@@ -1,10 +1,8 @@
 """Finite elements of second order: triangles and tetrahedra with nodes at the midpoints of edges."""
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import skfem
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.conditions import Loading, Turn
@@ -15,9 +13,9 @@ from truespring.models.reference_element import Reference, reference_element
 
 # Element of second order of scikit-fem, with nodes in the order of VTK, and order of quadrature: 3 points in triangles,
 # 4 in tetrahedra.
-_QUADRATIC: dict[str, tuple[Any, int]] = {
-    "triangle": (skfem.ElementTriP2, 2),
-    "tetrahedron": (skfem.ElementTetP2, 2),
+_QUADRATIC: dict[str, tuple[str, int]] = {
+    "triangle": ("ElementTriP2", 2),
+    "tetrahedron": ("ElementTetP2", 2),
 }
 
 
@@ -53,7 +51,7 @@ class QuadraticPotential(FemPotential):
     @cached_property
     def _reference(self) -> Reference:
         element, order = _QUADRATIC[self.mesh.element]
-        reference = reference_element(self.mesh.element, element(), order)
+        reference = reference_element(self.mesh.element, element, order)
         curved = self.mesh.middles is not None  # isoparametric
         return reference._replace(corner_slopes=reference.slopes) if curved else reference
 

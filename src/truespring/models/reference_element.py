@@ -3,19 +3,17 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import skfem
-from skfem.quadrature import get_quadrature
 
 from truespring.arrays import Floats
 from truespring.mesh import CELL_SHAPES, ELEMENT_KINDS
 
 # Element of scikit-fem and its quadrature by kind: the order, or for the constant strain of simplices one point and its
 # weight. 2 Gauss points per direction are exact for polynomials of third order.
-_SKFEM: dict[str, tuple[Any, Any]] = {
-    "triangle": (skfem.ElementTriP1, (np.full((2, 1), 1 / 3), np.array([0.5]))),
-    "quadrilateral": (skfem.ElementQuad1, 3),
-    "tetrahedron": (skfem.ElementTetP1, 1),
-    "hexahedron": (skfem.ElementHex1, 3),
+_SKFEM: dict[str, tuple[str, Any]] = {
+    "triangle": ("ElementTriP1", (np.full((2, 1), 1 / 3), np.array([0.5]))),
+    "quadrilateral": ("ElementQuad1", 3),
+    "tetrahedron": ("ElementTetP1", 1),
+    "hexahedron": ("ElementHex1", 3),
 }
 
 # Points and weights of kinds without element or quadrature in scikit-fem, in the coordinates of CELL_SHAPES. Wedges:
@@ -53,7 +51,7 @@ class Reference(NamedTuple):
     weights: Floats
 
 
-def reference_element(kind: str, element: Any = None, order: int | None = None) -> Reference:
+def reference_element(kind: str, element: str | None = None, order: int | None = None) -> Reference:
     """Return the reference element of a kind: of first order, or scikit-fem's `element` with quadrature of `order`.
 
     Pyramids are those of Bedrosian (IEEE Transactions on Magnetics 28, 1992), with rational shape functions:
@@ -63,7 +61,11 @@ def reference_element(kind: str, element: Any = None, order: int | None = None) 
         at, of_points = _QUADRATURE[kind]
         by_point = np.ascontiguousarray(CELL_SHAPES[ELEMENT_KINDS[kind].vtk].slopes(at))
         return Reference(by_point, by_point, of_points)
-    corners, own = _SKFEM[kind]
+    import skfem
+    from skfem.quadrature import get_quadrature
+
+    first, own = _SKFEM[kind]
+    corners = getattr(skfem, first)
     rule = own if order is None else order
     points, weights = rule if isinstance(rule, tuple) else get_quadrature(corners.refdom, rule)
 
@@ -71,4 +73,4 @@ def reference_element(kind: str, element: Any = None, order: int | None = None) 
         by_node = [functions.lbasis(points, node)[1] for node in range(len(functions.doflocs))]
         return np.ascontiguousarray(np.stack(by_node)[_ORDER.get(kind, slice(None))].transpose(2, 0, 1))
 
-    return Reference(slopes(corners()), slopes(corners() if element is None else element), weights)
+    return Reference(slopes(corners()), slopes(corners() if element is None else getattr(skfem, element)()), weights)

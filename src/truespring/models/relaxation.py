@@ -1,7 +1,7 @@
 """Linear equilibrium of springs, for effective moduli and findings."""
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 
 from truespring.arrays import Bools, Floats
 from truespring.linear.choice import choose
@@ -112,6 +112,8 @@ def pinned(nodes: Floats) -> Bools:
 
     The constraints are statically determinate: they do not restrain strain.
     """
+    from scipy import linalg
+
     upper, order = linalg.qr(rigid_body_modes(nodes).T, mode="r", pivoting=True)
     sizes = np.abs(np.diag(upper))
     held = np.zeros(nodes.size, dtype=bool)

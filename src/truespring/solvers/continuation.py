@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from truespring.arrays import Floats
 from truespring.conditions import Loading
@@ -302,6 +301,8 @@ def _bordered(
     tangent = sparse.csr_array(matrix)[free][:, free]
     along, weights = push.ravel()[free], constraint.weights.ravel()[free]
     size = float(np.abs(tangent.data).max(initial=0.0))
+    from scipy.sparse.linalg import splu
+
     if not along.any() or not np.isfinite(size):  # nothing changes with the load factor
         return np.full_like(push, np.nan), np.nan
     unit = size / max(norm(along), np.finfo(float).tiny)  # scale of the load factor, for a well-conditioned matrix

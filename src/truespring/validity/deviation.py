@@ -2,15 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from truespring.arrays import Floats
 from truespring.comparison import compare
 from truespring.support_errors import Decisive, SupportError, largest
 from truespring.validity.reference import Reference
 from truespring.validity.solving import Solved, conjugate_force
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 # Levels closer than this share of the largest are equal.
 _SAME = 1e-9
@@ -140,7 +143,9 @@ def _apart(levels: Sequence[tuple[SupportError, ...]]) -> list[Floats]:
     return found
 
 
-def _spline(size: Floats, rows: Floats) -> CubicSpline:
+def _spline(size: Floats, rows: Floats) -> "CubicSpline":
+    from scipy.interpolate import CubicSpline
+
     if len(size) == 1:
         size, rows = np.array([0.0, size[0]]), np.vstack([rows, rows])
     return CubicSpline(size, rows, axis=0)
@@ -155,7 +160,4 @@ def _left_out(size: Floats, fields: Floats) -> float:
         return 0.0
     kept = np.unique([*range(0, len(size), 2), len(size) - 1])
     left = np.setdiff1d(np.arange(len(size)), kept)
-    return (
-        float(np.linalg.norm(CubicSpline(size[kept], fields[kept], axis=0)(size[left]) - fields[left], axis=1).max())
-        / 8
-    )
+    return float(np.linalg.norm(_spline(size[kept], fields[kept])(size[left]) - fields[left], axis=1).max()) / 8
