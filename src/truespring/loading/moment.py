@@ -6,7 +6,6 @@ from typing import Any, Self
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
@@ -147,11 +146,13 @@ class _Route:
 
 def _route_to(mesh: Mesh, face: Ints, held: Bools) -> _Route:
     """Return the shortest route along edges of the mesh to the centre of the face from the nearest held node."""
+    from scipy.sparse.csgraph import dijkstra
+
     edges = mesh.edges
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(mesh.n_nodes,) * 2)
     goal = int(face[np.linalg.norm(mesh.nodes[face] - mesh.nodes[face].mean(axis=0), axis=1).argmin()])
     options: Any = {"directed": False, "indices": goal, "unweighted": True, "return_predecessors": True}
-    distance, before = csgraph.dijkstra(sparse.csr_array(graph), **options)
+    distance, before = dijkstra(sparse.csr_array(graph), **options)
     known = np.flatnonzero(held.all(axis=1) if held.all(axis=1).any() else held.any(axis=1))
     node = int(known[distance[known].argmin()])
     route = [node]
