@@ -137,12 +137,12 @@ def pairs_of_nodes(k: int) -> tuple[Ints, Ints]:
 def dense(pairs: Floats, k: int, dim: int) -> Floats:
     """Return symmetric element matrices that are given by pairs of nodes; unit stays, shape (n, k * dim, k * dim).
 
-    `pairs` has shape (k (k + 1) / 2 * dim^2, n): row (b (b + 1) / 2 + a) dim^2 + i * dim + j is the entry i, j of the
-    block of the nodes a <= b.
+    `pairs` has shape (n / lanes, k (k + 1) / 2 * dim^2, lanes): row (b (b + 1) / 2 + a) dim^2 + i * dim + j is the
+    entry i, j of the block of the nodes a <= b.
     """
     a, b = np.divmod(np.arange(k * dim), dim)
     low, high = np.minimum(a[:, None], a), np.maximum(a[:, None], a)
     below = a[:, None] > a
     i, j = np.where(below, b, b[:, None]), np.where(below, b[:, None], b)
     rows = (high * (high + 1) // 2 + low) * dim * dim + i * dim + j
-    return np.ascontiguousarray(np.moveaxis(pairs[rows], -1, 0))
+    return np.moveaxis(pairs[:, rows], -1, 1).reshape(-1, k * dim, k * dim)

@@ -137,7 +137,7 @@ class Families:
     k1: Floats
     k2: Floats
 
-    def of(self, numbers: Ints) -> "Families":
+    def of(self, numbers: Ints | slice) -> "Families":
         """Return the fibres of elements."""
         return Families(self.directions[:, numbers], self.k1[numbers], self.k2[numbers])
 

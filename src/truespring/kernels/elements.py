@@ -1,10 +1,10 @@
 """Loops over finite elements, LANES at a time: shape functions, strains, forces and stiffness matrices.
 
-Arrays have two axes, (row, element), with the rows of tensors, nodes and Gauss points one after the other: row (i * dim
-+ j) * n_points + q of F is F_ij at point q, row (a * dim + i) * n_points + q of `gradients` the derivative in direction
-i of the shape function of node a. Symmetric tensors have n_strains = dim (dim + 1) / 2 components in Voigt order;
-`voigt`, shape (dim, dim), is the component of each pair of directions. The number of elements is a multiple of LANES;
-`first` and `last` count blocks of LANES elements.
+Arrays have two axes, (row, element), or three, (block, row, lane), those that only kernels read; the rows of tensors,
+nodes and Gauss points follow each other. Row (i * dim + j) * n_points + q of F is F_ij at point q, row (a * dim + i) *
+n_points + q of `gradients` the derivative in direction i of the shape function of node a. Symmetric tensors have
+n_strains = dim (dim + 1) / 2 components in Voigt order; `voigt`, shape (dim, dim), is the component of each pair of
+directions. The number of elements is a multiple of LANES; `first` and `last` count blocks of LANES elements.
 """
 
 from typing import Any
@@ -117,8 +117,8 @@ def deformations(
     coordinates, not by the undeformed ones.
 
     Shapes: nodes, x (n_nodes, dim), elements (n, k), corner_slopes (points, corners, dim), slopes (points, k, dim),
-    weights (points,), voigt (dim, dim), gradients (k * dim * points, n), volumes, ratios (points, n), F (dim^2 *
-    points, n), strain (n_strains * points, n).
+    weights (points,), voigt (dim, dim), gradients (n / LANES, k * dim * points, LANES), volumes, ratios (points, n), F
+    (dim^2 * points, n), strain (n_strains * points, n).
     """
     dim, n_points, k, corners = len(zero), len(weights), slopes.shape[1], corner_slopes.shape[1]
     at_rest, moved = room(corners * dim), room(k * dim)
@@ -156,7 +156,7 @@ def deformations(
                     total = load(by, i, 0) * slopes[q, a, 0]
                     for j in range(1, dim):
                         total = total + load(by, j * dim + i, 0) * slopes[q, a, j]
-                    store(gradients, (a * dim + i) * n_points + q, e, total)
+                    store(gradients[block], (a * dim + i) * n_points + q, 0, total)
 
 
 @kernel
@@ -174,21 +174,22 @@ def strain_changes(
 ) -> None:
     """Write the symmetric part of F^T grad u for the nodal values u of a step; F is the identity unless `turned`.
 
-    Shapes: step (n_nodes, dim), elements (n, k), gradients (k * dim * points, n), F (dim^2 * points, n), voigt (dim,
-    dim), change (n_strains * points, n).
+    Shapes: step (n_nodes, dim), elements (n, k), gradients (n / LANES, k * dim * points, LANES), F (dim^2 * points, n),
+    voigt (dim, dim), change (n_strains * points, n).
     """
     dim, k = len(zero), elements.shape[1]
-    n_points = gradients.shape[0] // (k * dim)
+    n_points = gradients.shape[1] // (k * dim)
     values, grad, product = room(k * dim), room(dim * dim), room(dim * dim)
     for block in range(first, last):
         e = block * LANES
+        slopes = gradients[block]
         _gather(step, elements, e, k, values)
         for q in range(n_points):
             for i in range(dim):
                 for j in range(dim):
-                    total = load(values, i, 0) * load(gradients, j * n_points + q, e)
+                    total = load(values, i, 0) * load(slopes, j * n_points + q, 0)
                     for a in range(1, k):
-                        total = total + load(values, a * dim + i, 0) * load(gradients, (a * dim + j) * n_points + q, e)
+                        total = total + load(values, a * dim + i, 0) * load(slopes, (a * dim + j) * n_points + q, 0)
                     store(grad, i * dim + j, 0, total)
             if turned:
                 for i in range(dim):
@@ -250,14 +251,14 @@ def forces(
 ) -> None:
     """Write the element forces, the sum over the points of F S : grad v; F is the identity unless `turned`.
 
-    Shapes: F (dim^2 * points, n), S (n_strains * points, n), voigt (dim, dim), gradients (k * dim * points, n), volumes
-    (points, n), force (k * dim, n).
+    Shapes: F (dim^2 * points, n), S (n_strains * points, n), voigt (dim, dim), gradients (n / LANES, k * dim * points,
+    LANES), volumes (points, n), force (k * dim, n).
     """
     dim, n_points = len(zero), volumes.shape[0]
-    k = gradients.shape[0] // (dim * n_points)
+    k = gradients.shape[1] // (dim * n_points)
     P = room(dim * dim)
     for block in range(first, last):
-        e = block * LANES
+        e, slopes = block * LANES, gradients[block]
         for q in range(n_points):
             volume = load(volumes, q, e)
             for i in range(dim):
@@ -273,7 +274,7 @@ def forces(
             for a in range(k):
                 total = zeros(zero)
                 for m in range(dim):
-                    total = add_times(total, load(gradients, (a * dim + m) * n_points + q, e), P, m * dim, 0)
+                    total = add_times(total, load(slopes, (a * dim + m) * n_points + q, 0), P, m * dim, 0)
                 if q > 0:
                     total = add_times(total, 1.0, force, a * dim, e)
                 fill(force, a * dim, e, total)
@@ -364,20 +365,20 @@ def stiffnesses(
     dim^2 + i * dim + j is the entry i, j of a pair.
 
     Shapes: F (dim^2 * points, n), S (n_strains * points, n), alike, shear (points, n), coupled (n_strains * points or
-    0, n), rest (n_strains^2 * points or 0, n), voigt (dim, dim), gradients (k * dim * points, n), volumes (points, n),
-    along, across (k * dim or 0, n), blocks (k (k + 1) / 2 * dim^2, n);
-    `square` is a tuple of dim^2 zeros.
+    0, n), rest (n_strains^2 * points or 0, n), voigt (dim, dim), gradients (n / LANES, k * dim * points, LANES),
+    volumes (points, n), along, across (k * dim or 0, n), blocks (n / LANES, k (k + 1) / 2 * dim^2, LANES); `square` is
+    a tuple of dim^2 zeros.
     """
     dim, n_points = len(zero), volumes.shape[0]
-    squares, k = dim * dim, gradients.shape[0] // (dim * n_points)
+    squares, k = dim * dim, gradients.shape[1] // (dim * n_points)
     n_strains = dim * (dim + 1) // 2
     D, A, slopes = room(n_strains * n_strains), room(squares * squares), room(k * dim * n_points)
     width = n_points * dim * squares
     by_node = room(k * width)
     for block in range(first, last):
-        e = block * LANES
+        e, found = block * LANES, blocks[block]
         for row in range(k * dim * n_points):
-            store(slopes, row, 0, load(gradients, row, e))
+            store(slopes, row, 0, load(gradients[block], row, 0))
         for q in range(n_points):
             _elasticity(e, q, n_points, alike, shear, coupled, rest, D, zero)
             _moduli(e, q, n_points, F, turned, S, D, voigt, load(volumes, q, e), A, zero)
@@ -400,14 +401,14 @@ def stiffnesses(
                     one = add_times(one, load(slopes, a * dim * n_points + row, 0), by_node, at, 0)
                     two = add_times(two, load(slopes, other * dim * n_points + row, 0), by_node, at, 0)
                 pair = b * (b + 1) // 2
-                fill(blocks, (pair + a) * squares, e, one)
-                fill(blocks, (pair + other) * squares, e, two)
+                fill(found, (pair + a) * squares, 0, one)
+                fill(found, (pair + other) * squares, 0, two)
         for b in range(k if len(along) else 0):
             for a in range(b + 1):
                 for i in range(dim):
                     for j in range(dim):
                         row = (b * (b + 1) // 2 + a) * squares + i * dim + j
-                        value = load(blocks, row, e)
+                        value = load(found, row, 0)
                         value = value + load(along, a * dim + i, e) * load(across, b * dim + j, e)
                         value = value + load(across, a * dim + i, e) * load(along, b * dim + j, e)
-                        store(blocks, row, e, value)
+                        store(found, row, 0, value)

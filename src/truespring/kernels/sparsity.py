@@ -197,12 +197,12 @@ def add_pairs(
     Row (b (b + 1) / 2 + a) dim^2 + i * dim + j of `blocks` is the entry i, j of the pair of nodes a <= b, for each
     element from `first` on.
 
-    Shapes: elements (n_elements, k), slots (n_elements, k, k), blocks (k (k + 1) / 2 * dim^2, >= last - first), data
-    (n_blocks, dim, dim).
+    Shapes: elements (n_elements, k), slots (n_elements, k, k), blocks (at least (last - first) / lanes, k (k + 1) / 2 *
+    dim^2, lanes), data (n_blocks, dim, dim).
     """
     k, dim = elements.shape[1], len(zero)
     for e in range(first, last):
-        column = unsigned(e - first)
+        pairs, lane = blocks[(e - first) // blocks.shape[2]], unsigned((e - first) % blocks.shape[2])
         for b in range(k):
             j = elements[e, b]
             for a in range(b + 1):
@@ -212,9 +212,9 @@ def add_pairs(
                     p = unsigned(slots[e, a, b])
                     for c in range(dim):
                         for d in range(dim):
-                            data[p, c, d] += blocks[unsigned(row + c * dim + d), column]
+                            data[p, c, d] += pairs[unsigned(row + c * dim + d), lane]
                 if a != b and low <= j < high:
                     p = unsigned(slots[e, b, a])
                     for c in range(dim):
                         for d in range(dim):
-                            data[p, d, c] += blocks[unsigned(row + c * dim + d), column]
+                            data[p, d, c] += pairs[unsigned(row + c * dim + d), lane]

@@ -30,7 +30,7 @@ class Deformed(NamedTuple):
 
     def pressure_of(self, stress: Floats) -> Floats:
         """Return the Kirchhoff pressure S : C / d [Pa] of a stress in the frame, positive in tension."""
-        return contracted(stress, self.at.metric(self.strain)) / self.at.dim
+        return self.at.pressure_of(stress, self.strain)
 
     def reference(self, stress: Floats) -> Floats:
         """Return a stress in the frame as second Piola-Kirchhoff stress [Pa], axes (component, point, element)."""

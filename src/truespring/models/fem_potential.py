@@ -26,7 +26,7 @@ from truespring.potential import Potential, SparseMatrix
 from truespring.problem import Problem
 
 # Number of Gauss points that are evaluated at a time, so that the response of the law fits in the processor's cache.
-_SLICE_POINTS = 2048
+_SLICE_POINTS = 4096
 # Smallest number of blocks of elements for which threads share a slice.
 _SMALLEST_PIECE = 4
 
@@ -107,7 +107,8 @@ class FemPotential:
         """
         end = len(self.elements) if last is None else last
         at = self._points(self.nodes, first, end)
-        gradients = np.moveaxis(at.own(at.gradients), (2, 3), (1, 0))
+        rows = np.moveaxis(at.gradients, -1, 1).reshape(-1, self.elements.shape[1], at.dim, len(at.volumes))
+        gradients = np.moveaxis(rows[: at.count], -1, 1)
         return np.ascontiguousarray(gradients), np.ascontiguousarray(at.own(at.volumes).T)
 
     @property
@@ -123,18 +124,19 @@ class FemPotential:
         section = self.problem.section
         assert section is not None  # see require_continuum
         corner_slopes, slopes, weights = self._reference
-        n_blocks = -(-(last - first) // LANES)
-        numbers = np.minimum(np.arange(first, first + n_blocks * LANES), last - 1)
-        nodes, dim, n_points, n = self.elements[numbers], self.mesh.dim, len(weights), len(numbers)
-        gradients, F = np.empty((slopes.shape[1], dim, n_points, n)), np.empty((dim, dim, n_points, n))
+        chosen = _filled_up(first, last)
+        nodes, dim, n_points = self.elements[chosen], self.mesh.dim, len(weights)
+        n = len(nodes)
+        gradients = np.empty((n // LANES, slopes.shape[1] * dim * n_points, LANES))
+        F = np.empty((dim, dim, n_points, n))
         volumes, J = np.empty((n_points, n)), np.empty((n_points, n))
         strain, frame = np.empty((len(voigt_pairs(dim)), n_points, n)), self.law.frame
-        found = (gradients.reshape(-1, n), volumes, F.reshape(-1, n), J, strain.reshape(-1, n))
+        found = (gradients, volumes, F.reshape(-1, n), J, strain.reshape(-1, n))
         places = (writable(self.nodes), writable(positions), nodes)
         parent = (corner_slopes, slopes, section.thickness * weights, FRAMES.index(frame), voigt_places(dim))
-        run(elements.deformations, n_blocks, *places, *parent, *found, self._zero, smallest=_SMALLEST_PIECE)
-        fibres = None if self.fibres is None else self.fibres.of(numbers)
-        constants = self.constants.of(numbers)
+        run(elements.deformations, n // LANES, *places, *parent, *found, self._zero, smallest=_SMALLEST_PIECE)
+        fibres = None if self.fibres is None else self.fibres.of(chosen)
+        constants = self.constants.of(chosen)
         return Points(frame, last - first, nodes, gradients, volumes, F, J, strain, constants, fibres)
 
     def _strain(self, at: Points) -> Floats:
@@ -202,7 +204,7 @@ class FemPotential:
         """Return the pressure of the law over that of a given stress [Pa], axes (point, element); None without."""
         if stress is None or not self._carries_pressure:
             return None
-        return self._deformed(at).pressure_of(response.stress - stress)
+        return at.pressure_of(response.stress - stress, self._strain(at))
 
     def _elasticity(self, at: Points, response: Response, excess: Floats | None) -> Elasticity:
         """Return the elasticity [Pa] with the pressure of the law less `excess`, see `_excess`."""
@@ -255,16 +257,19 @@ class FemPotential:
     ) -> Floats:
         """Return the tangent stiffness of elements, by default all [N/m], shape (n, n_dof, n_dof), node by node."""
         k, dim = self.elements.shape[1], self.mesh.dim
-        parts = [dense(self._pairs_of(positions, stress, *ends), k, dim) for ends in self.slices(first, last)]
+        parts = [
+            dense(self._pairs_of(positions, stress, begin, end), k, dim)[: end - begin]
+            for begin, end in self.slices(first, last)
+        ]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _pairs_of(self, positions: Floats, stress: Floats | None, first: int, last: int) -> Floats:
         """Return the tangent stiffness of a slice of the elements [N/m], as `Points.matrices` does."""
         at = self._points(positions, first, last)
         if stress is None:
-            return at.own(self._tangent(at, None))
-        padded = stress[..., np.minimum(np.arange(first, first + len(at.elements)), last - 1)]
-        return at.own(self._tangent(at, at.from_reference(padded, self._law_gradient(at))))
+            return self._tangent(at, None)
+        given = np.ascontiguousarray(stress[..., _filled_up(first, last)])
+        return self._tangent(at, at.from_reference(given, self._law_gradient(at)))
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m]; `stress` [Pa] gives the geometric part, by default that of the law."""
@@ -314,6 +319,14 @@ class FemPotential:
             volume = determinant(F) * response.thickness_stretch
             stress = np.divide(stress, volume, out=np.full_like(stress, np.nan), where=volume != 0)
         return stress
+
+
+def _filled_up(first: int, last: int) -> Ints | slice:
+    """Return the indices of a slice of the elements, filled up with its last one to a multiple of LANES."""
+    from truespring.kernels.lanes import LANES
+
+    missing = (first - last) % LANES
+    return np.minimum(np.arange(first, last + missing), last - 1) if missing else slice(first, last)
 
 
 def require_continuum(problem: Problem) -> None:

@@ -11,13 +11,13 @@ from truespring.fibres import Families
 from truespring.models.elasticity_parts import Elasticity, of_tensor
 from truespring.models.law import Constants, Frame
 from truespring.models.strain import voigt_pairs
-from truespring.models.symmetric import identity, inverted, voigt_places
+from truespring.models.symmetric import contracted, inverted, trace, voigt_places
 
 # Smallest number of blocks of elements for which threads share a slice.
 _SMALLEST_PIECE = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points:
     """The Gauss points of a slice of the elements in a deformed state.
 
@@ -31,7 +31,7 @@ class Points:
         frame: the axes of stresses, strains and elasticities.
         count: number of elements of the slice, not those that fill it up.
         elements: nodes of each element, shape (n, k).
-        gradients: gradients of the shape functions [1/m], axes (node of the element, direction, point, element).
+        gradients: gradients of the shape functions [1/m], axes (block, row, lane), see `kernels.elements`.
         volumes: undeformed volume of each point [m^3], axes (point, element).
         F: deformation gradient [-], axes (i, j, point, element).
         J: its determinant [-], axes (point, element).
@@ -88,7 +88,7 @@ class Points:
         from truespring.kernels.threads import writable
 
         change = np.empty((len(voigt_pairs(self.dim)), *self.volumes.shape))
-        known = (writable(step), self.elements, self._rows(self.gradients), self._rows(self.F), self._turned)
+        known = (writable(step), self.elements, self.gradients, self._rows(self.F), self._turned)
         self._run(elements.strain_changes, *known, self._voigt, self._rows(change), self._zero)
         return change
 
@@ -97,7 +97,7 @@ class Points:
         from truespring.kernels import elements
 
         force = np.empty((self.elements.shape[1] * self.dim, len(self.elements)))
-        known = (self._rows(self.F), self._turned, self._rows(stress), self._voigt, self._rows(self.gradients))
+        known = (self._rows(self.F), self._turned, self._rows(stress), self._voigt, self.gradients)
         self._run(elements.forces, *known, self.volumes, force, self._zero)
         return force
 
@@ -109,18 +109,19 @@ class Points:
         Adds a b^T + b a^T, a and b the columns of `along` and `across`, shape (k * dim, n).
         """
         from truespring.kernels import elements
+        from truespring.kernels.lanes import LANES
         from truespring.kernels.threads import writable
 
         k, dim, n = self.elements.shape[1], self.dim, len(self.elements)
         none = np.empty((0, n))
-        pairs = np.empty((k * (k + 1) // 2 * dim * dim, n))
+        pairs = np.empty((n // LANES, k * (k + 1) // 2 * dim * dim, LANES))
         geometric = np.zeros(stress.shape) if self.frame == "small" else stress
         shape = self.volumes.shape
         plain = [writable(np.broadcast_to(one, shape)) for one in (elasticity.alike, elasticity.shear)]
         parts = [none if one is None else self._rows(one) for one in (elasticity.coupled, elasticity.rest)]
         known = (self._rows(self.F), self._turned, self._rows(geometric), *plain, *parts, self._voigt)
         spread = (none, none) if along is None or across is None else (self._rows(along), self._rows(across))
-        integrals = (self._rows(self.gradients), self.volumes, *spread)
+        integrals = (self.gradients, self.volumes, *spread)
         self._run(elements.stiffnesses, *known, *integrals, pairs, self._zero, self._zero * dim)
         return pairs
 
@@ -150,19 +151,20 @@ class Points:
         """Return values, the last axis the elements, without those of the elements that fill up the slice."""
         return values[..., : self.count]
 
-    def metric(self, strain: Floats) -> Floats:
-        """Return the tensor that is C in axes of the reference and the identity in others, given the strain.
-
-        Axes (component, point, element), or (component, 1, 1) of the identity.
-        """
-        return strain if self.frame == "reference" else identity(strain)
-
     def inverse(self, strain: Floats) -> Floats | None:
-        """Return the inverse of `metric`, axes (component, point, element); None if it is the identity."""
+        """Return C^-1 in axes of the frame, axes (component, point, element); None if it is the identity.
+
+        `strain` is C, in the frame "reference".
+        """
         return inverted(strain) if self.frame == "reference" else None
 
+    def pressure_of(self, stress: Floats, strain: Floats) -> Floats:
+        """Return the Kirchhoff pressure of a stress [Pa], positive in tension, axes (point, element)."""
+        whole = contracted(stress, strain) if self.frame == "reference" else trace(stress)
+        return whole / self.dim
+
     def of_metric(self, alike: Floats | float, shear: Floats | float, strain: Floats) -> Elasticity:
-        """Return alike M (x) M + shear (M_ik M_jl + M_il M_jk) [Pa], M the inverse of `metric`."""
+        """Return alike M (x) M + shear (M_ik M_jl + M_il M_jk) [Pa], M given by `inverse`."""
         inverse = self.inverse(strain)
         return Elasticity(alike, shear) if inverse is None else of_tensor(alike, shear, inverse)
 

@@ -122,7 +122,7 @@ class GaussianElements:
         invariants = self.law.invariants
         assert invariants is not None  # see Springs
         with np.errstate(over="ignore", invalid="ignore"):
-            return condensed(invariants, trace, y, self.nodes.shape[1], self._by_element)
+            return condensed(invariants, trace, y, self.nodes.shape[1], self._by_element).filled
 
     @cached_property
     def _by_element(self) -> Constants:

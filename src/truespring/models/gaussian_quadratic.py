@@ -89,8 +89,10 @@ class _BetweenAllNodes(QuadraticPotential):
         """Return the tangent stiffness of a slice of the elements [N/m], as `Points.matrices` does."""
         pairs, dim = super()._pairs_of(positions, stress, first, last), self.mesh.dim
         a, b = pairs_of_nodes(self.elements.shape[1])
+        springs = np.zeros((pairs.shape[0] * pairs.shape[2], len(a)))
+        springs[: last - first] = self._laplacians[first:last, a, b]
         for axis in range(dim):
-            pairs[axis * (dim + 1) :: dim * dim] += self._laplacians[first:last, a, b].T
+            pairs[:, axis * (dim + 1) :: dim * dim] += springs.reshape(len(pairs), -1, len(a)).swapaxes(1, 2)
         return pairs
 
     @cached_property

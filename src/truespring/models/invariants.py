@@ -56,6 +56,11 @@ class Condensed:
     C_33: Floats
     across: Floats
 
+    @property
+    def filled(self) -> "Condensed":
+        """The same with all derivatives of the shape of the energy, some of them read-only."""
+        return Condensed(self.at.filled, self.C_33, self.across)
+
 
 def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants: Constants) -> Condensed:
     """Return a law at the trace of C and ln J of a body of dimension `dim`, in 2D of the plane.
@@ -64,7 +69,7 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
     C_33 W_I1 + W_y / 2 = 0; the second derivatives are those of the minimum.
     """
     if not constants.plane_stress:
-        found = law(trace_C if dim == 3 else trace_C + 1, y, constants).filled
+        found = law(trace_C if dim == 3 else trace_C + 1, y, constants)
         return Condensed(found, np.ones_like(y), 2 * found.by_trace + found.by_y)
     z = _free_thickness(law, trace_C, y, constants)
     C_33 = np.exp(z)
@@ -80,7 +85,7 @@ def condensed(law: InvariantLaw, trace_C: Floats, y: Floats, dim: int, constants
         found.by_trace_y - by_z_trace * by_z_y / by_z_z,
         found.by_y_y - by_z_y**2 / by_z_z,
     )
-    return Condensed(minimum.filled, C_33, 2 * C_33 * found.by_trace + found.by_y)
+    return Condensed(minimum, C_33, 2 * C_33 * found.by_trace + found.by_y)
 
 
 def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Constants) -> Floats:

@@ -1,5 +1,6 @@
 """Elements of mean dilatation, which do not lock for nearly incompressible materials."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,25 +44,9 @@ class MeanDilatationPotential(FemPotential):
 
     interpolation = "mean-dilatation"
 
-    def _exchange(self, at: Points) -> _Exchange:
-        strain = at.strain
-        eye = identity(strain)
-        if not self.law.finite:
-            own = trace(strain)
-            ones = np.ones_like(own)
-            return _Exchange(ones, at.mean(own) - own, ones, ones, eye, eye)
-        valid = (at.J > 0).all(axis=0, keepdims=True)
-        J = np.where(valid, at.J, 1.0)
-        theta = np.log(at.mean(J) / J)
-        scale = np.where(valid, np.exp(2 * theta / at.dim), np.nan)
-        if at.frame == "current":
-            return _Exchange(J, theta, scale, np.ones_like(J), eye, eye)
-        metric = np.where(valid, strain, eye)
-        return _Exchange(J, theta, scale, scale, metric, inverted(metric))
-
     def _strain(self, at: Points) -> Floats:
         """Return the strain with the mean volume ratio, undeformed in an inverted element."""
-        exchange = self._exchange(at)
+        exchange = _exchange(at)
         if not self.law.finite:
             return at.strain + exchange.theta / at.dim * exchange.metric
         valid = np.isfinite(exchange.scale)
@@ -73,11 +58,11 @@ class MeanDilatationPotential(FemPotential):
 
     def _law_gradient(self, at: Points) -> Floats:
         """Return the deformation gradient with the mean volume ratio, axes (i, j, point, element)."""
-        return np.sqrt(self._exchange(at).scale) * at.F
+        return np.sqrt(_exchange(at).scale) * at.F
 
     def _strain_change(self, at: Points, step: Floats) -> Floats:
         """Return the linear change of the strain of the law for a step, axes (component, point, element)."""
-        own, exchange = at.strain_change(step), self._exchange(at)
+        own, exchange = at.strain_change(step), _exchange(at)
         grown = contracted(exchange.inverse, own)  # of ln J
         theta = at.mean(exchange.J * grown) / at.mean(exchange.J) - grown
         return exchange.reference * (own + theta / at.dim * exchange.metric)
@@ -88,9 +73,9 @@ class MeanDilatationPotential(FemPotential):
         S' is the stress at constant theta, p the derivative of the energy with respect to theta, g its part that acts
         on ln J through ln Jm.
         """
-        exchange = self._exchange(at)
+        exchange = _exchange(at)
         stress = exchange.reference * self._respond(at).stress
-        pressure = contracted(stress, exchange.metric) / at.dim
+        pressure = at.pressure_of(stress, exchange.metric)
         return stress + (_share(pressure, exchange, at) - pressure) * exchange.inverse
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
@@ -100,13 +85,13 @@ class MeanDilatationPotential(FemPotential):
         derivative of S' : C / d with respect to the strain at constant theta. Terms of the strain at one point have
         the form of the tangent of a law; the mean adds y m^T + m y^T + b m m^T.
         """
-        exchange, response, dim = self._exchange(at), self._respond(at), at.dim
+        exchange, response, dim = _exchange(at), self._respond(at), at.dim
         metric, inverse, reference = exchange.metric, exchange.inverse, exchange.reference
         own = reference * (response.stress if stress is None else stress)
         elasticity = self._elasticity(at, response, self._excess(at, response, stress)).scaled(reference**2)
-        pressure = contracted(own, metric) / dim
+        pressure = at.pressure_of(own, metric)
         mixed = elasticity.times(np.broadcast_to(metric, own.shape)) / dim
-        second = contracted(mixed, metric) / dim
+        second = at.pressure_of(mixed, metric)
         if self.law.finite:
             mixed += 2 / dim * own
             second += 2 / dim * pressure
@@ -120,6 +105,25 @@ class MeanDilatationPotential(FemPotential):
         b = ((second - bending) * at.volumes).sum(axis=0)
         y = at.forces(mixed - second * inverse) + b / 2 * m
         return at.matrices(own + (share - pressure) * inverse, elasticity, y, m)
+
+
+@lru_cache(maxsize=2)
+def _exchange(at: Points) -> _Exchange:
+    """Return the replacement of the volume ratio; remembered for the last points, before and after a step."""
+    strain = at.strain
+    eye = identity(strain)
+    if at.frame == "small":
+        own = trace(strain)
+        ones = np.ones_like(own)
+        return _Exchange(ones, at.mean(own) - own, ones, ones, eye, eye)
+    valid = (at.J > 0).all(axis=0, keepdims=True)
+    J = np.where(valid, at.J, 1.0)
+    theta = np.log(at.mean(J) / J)
+    scale = np.where(valid, np.exp(2 * theta / at.dim), np.nan)
+    if at.frame == "current":
+        return _Exchange(J, theta, scale, np.ones_like(J), eye, eye)
+    metric = np.where(valid, strain, eye)
+    return _Exchange(J, theta, scale, scale, metric, inverted(metric))
 
 
 def _coupled(tensor: Floats, exchange: _Exchange, at: Points) -> Elasticity:
