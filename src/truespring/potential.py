@@ -4,12 +4,12 @@ A model makes a `Potential` from a problem. A solver uses potentials and a `Load
 elements or meshes.
 """
 
-from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from scipy import sparse
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, ShortInts
 
 #: Blocks of shape (dim, dim), one for each pair of nodes that share an element.
 SparseMatrix = sparse.bsr_array[Any]
@@ -86,6 +86,38 @@ class Unstressed(Potential, Protocol):
     def semidefinite_at_rest(self) -> bool:
         """Whether the Hessian at `nodes` is known to have no negative eigenvalue, but for rounding errors."""
         ...
+
+
+class VolumeStiffness(NamedTuple):
+    """The stiffness of cells of one kind against changes of their volume.
+
+    The tangent contains stiffness s s^T of each cell, s its slope.
+
+    Attributes:
+        elements: nodes of each cell, shape (n_cells, k).
+        slope: derivative of the volume by the nodes [m^2], shape (n_cells, k, dim).
+        stiffness: second derivative of the energy by the volume [N/m^5], shape (n_cells,).
+        shear: shear modulus in the same form, that is times the undeformed over the squared volume [N/m^5].
+    """
+
+    elements: ShortInts
+    slope: Floats
+    stiffness: Floats
+    shear: Floats
+
+
+@runtime_checkable
+class Volumetric(Potential, Protocol):
+    """A potential that knows how much of its tangent is a stiffness against changes of volume."""
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the stiffness of the cells by kind; empty if the law has none of this form."""
+        ...
+
+
+def volumes_of(potential: Potential) -> Callable[[Floats], tuple[VolumeStiffness, ...]] | None:
+    """Return the function that gives the stiffness against changes of volume; None if a potential has none."""
+    return potential.volume_stiffness if isinstance(potential, Volumetric) else None
 
 
 @runtime_checkable

@@ -11,8 +11,9 @@ from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError, nearest
 from truespring.linear.direct import FACTORISERS, Direct, direct_bytes, present
 from truespring.linear.iterative import Multigrid
+from truespring.linear.pressure import PressureMultigrid
 from truespring.memory import available_memory
-from truespring.potential import SparseMatrix
+from truespring.potential import SparseMatrix, VolumeStiffness
 
 # Largest number of free directions for which "auto" factorises, in the plane and in space: as fast as multigrid there.
 _DIRECT = MappingProxyType({2: 8_000, 3: 3_000})
@@ -82,21 +83,27 @@ def check_linear(name: str) -> None:
         raise ProblemError(f"linear = '{name}' is not installed; try: pip install {FACTORISERS[name].package}")
 
 
-def choose(name: str, nodes: Floats, held: Bools, coarser: Callable[[], Sequence[Any]] = tuple) -> LinearSolver:
+def choose(
+    name: str,
+    nodes: Floats,
+    held: Bools,
+    coarser: Callable[[], Sequence[Any]] = tuple,
+    volumes: Callable[[Floats], Sequence[VolumeStiffness]] | None = None,
+) -> LinearSolver:
     """Return the linear solver `name`, one of LINEAR; "auto" chooses by size and dimension.
 
     `nodes` [m] and `held` have shape (n_nodes, dim). `coarser` returns the weights of the nodes from those of a coarser
-    mesh, of these from a still coarser one, and so on, for multigrid: sparse, shape (n, n_coarse).
+    mesh, of these from a still coarser one, and so on, for multigrid: sparse, shape (n, n_coarse). `volumes` returns
+    the stiffness against changes of volume at positions [m], see Volumetric.
 
-    Raises ProblemError if a factorisation does not fit in memory, by
-    estimate.
+    Raises ProblemError if a factorisation does not fit in memory, by estimate.
     """
     check_linear(name)
     n_free, dim = int((~held).sum()), nodes.shape[1]
     if name == "auto":
         name = "direct" if dim not in _DIRECT or n_free <= _DIRECT[dim] else "multigrid"
     if name == "multigrid":
-        return Multigrid(nodes, held, coarser())
+        return PressureMultigrid(nodes, held, coarser(), volumes) if volumes else Multigrid(nodes, held, coarser())
     needed, there = direct_bytes(nodes.shape), available_memory()
     if needed > there:
         raise ProblemError(

@@ -94,7 +94,7 @@ class Preconditioned:
 
     lasting: ClassVar[bool] = False
 
-    def _precondition(self, r: Floats) -> Floats:
+    def precondition(self, r: Floats) -> Floats:
         """Return an approximate solution for a residual, shape (n_nodes, dim)."""
         assert self.coarse is not None
         return self.coarse.cycle(self.level, r)
@@ -111,7 +111,7 @@ class Preconditioned:
             return np.zeros(right.shape)
         system = (self.scale * right, accuracy, _MAX_ITERATIONS)
         try:
-            found = conjugate_gradients(self.level.product, self._precondition, *system)
+            found = conjugate_gradients(self.level.product, self.precondition, *system)
         except SlowError:
             self.solver.spent(_MAX_ITERATIONS, 0.0)
             raise
@@ -124,7 +124,7 @@ class Preconditioned:
         if self.coarse is None:
             return 1
         start = np.random.default_rng(5).normal(size=self.level.shape)
-        found = lowest_eigenvalue(self.level.product, self._precondition, np.where(self.solver._held, 0.0, start))
+        found = lowest_eigenvalue(self.level.product, self.precondition, np.where(self.solver._held, 0.0, start))
         self.solver.lanczos_iterations += found.iterations
         return None if found.eigenvalue is None else int(found.eigenvalue < 0)
 

@@ -19,7 +19,7 @@ from truespring.models.laws import LAWS
 from truespring.models.semidefinite import semidefinite
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import SummedSprings
-from truespring.potential import SparseMatrix
+from truespring.potential import SparseMatrix, VolumeStiffness
 from truespring.problem import Problem
 
 # Smallest number of elements, or of nodes, for which threads share the work.
@@ -259,6 +259,17 @@ class GaussianElements:
         rows = (pattern.at_starts, pattern.at, pattern.slots, pattern.starts, weights)
         run(gaussian.rows, len(self.nodes), *rows, *known, values, pattern.zero, smallest=_SMALLEST_PIECE)
         return pattern.matrix(values)
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return d2W / d(ln J)^2 and twice dW/dI1, the shear modulus, as stiffness of the volume of each element."""
+        at, rows = self._state(positions, energy=False).law.at, self._measures.rows
+        slope, volume = self._measures.at(positions)
+        share = self._volumes / volume**2
+        return (
+            VolumeStiffness(
+                self._pattern.elements, slope[rows - 1 :: rows], at.by_y_y * share, 2 * at.by_trace * share
+            ),
+        )
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""

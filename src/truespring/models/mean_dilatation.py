@@ -1,15 +1,17 @@
 """Elements of mean dilatation, which do not lock for nearly incompressible materials."""
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models.elasticity_parts import Elasticity
+from truespring.models.element_volumes import ElementVolumes
 from truespring.models.fem_potential import FemPotential
 from truespring.models.gauss_points import Points
 from truespring.models.symmetric import contracted, identity, inverted, outer, trace
+from truespring.potential import VolumeStiffness
 
 
 class _Exchange(NamedTuple):
@@ -77,6 +79,18 @@ class MeanDilatationPotential(FemPotential):
         stress = exchange.reference * self._respond(at).stress
         pressure = at.pressure_of(stress, exchange.metric)
         return stress + (_share(pressure, exchange, at) - pressure) * exchange.inverse
+
+    @cached_property
+    def _measures(self) -> ElementVolumes:
+        return ElementVolumes(self.problem, self._pattern.elements, 1)
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the parts of lam and mu in the energy, lam/2 (ln Jm)^2, as stiffness of the volume of each element."""
+        if not self._carries_pressure or self.constants.plane_stress:
+            return ()
+        slope, volume = self._measures.at(positions)
+        constants, share = self.constants.raveled, self._measures.at(self.nodes)[1] / volume**2
+        return (VolumeStiffness(self._pattern.elements, slope, constants.lam * share, constants.mu * share),)
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
         """Return element matrices [N/m] with the geometric part of `stress`, by default that of the law.

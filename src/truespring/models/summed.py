@@ -14,7 +14,7 @@ from truespring.models.fem_potential import FemPotential
 from truespring.models.law import Law
 from truespring.models.linked import LinkedElements
 from truespring.models.spring_data import COUPLING, SpringData
-from truespring.potential import Projectable, SparseMatrix, Stressed, Stretched
+from truespring.potential import Projectable, SparseMatrix, Stressed, Stretched, VolumeStiffness, volumes_of
 from truespring.problem import Problem
 
 
@@ -91,6 +91,11 @@ class Summed(Generic[Part]):
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the sum of the projected Hessians of the parts, positive semidefinite [N/m]."""
         return self._sum([part.projected_hessian(positions) for part in self.parts])
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the stiffness against changes of volume of those parts that know it."""
+        functions = map(volumes_of, self.parts)
+        return tuple(cells for found in functions if found is not None for cells in found(positions))
 
     @cached_property
     def _stress_shapes(self) -> tuple[tuple[int, ...], ...]:

@@ -18,7 +18,7 @@ from scipy import sparse
 from truespring.arrays import Floats
 from truespring.linear.choice import choose
 from truespring.linear.gradients import norm
-from truespring.potential import Stressed
+from truespring.potential import Stressed, volumes_of
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, stepped
 from truespring.solvers.cost import Cost
@@ -229,7 +229,8 @@ def _jump(balance: Balance, geometry: Geometry, linear: str) -> Jump | None:
     if coarse is None:
         return None
     tolerance = max(balance.tolerance, _TOLERANCE)
-    chosen = choose(linear, coarse.potential.nodes, coarse.loading.held, coarse.geometry.coarser)
+    nodes, held, volumes = coarse.potential.nodes, coarse.loading.held, volumes_of(coarse.potential)
+    chosen = choose(linear, nodes, held, coarse.geometry.coarser, volumes)
     below = Balance(coarse.potential, coarse.loading, tolerance, balance.max_iterations, chosen, balance.report)
     path = CoarsePath(below, coarse.geometry.admissible, _jump(below, coarse.geometry, linear))
     return Jump(balance, geometry.admissible, path, coarse.weights)

@@ -10,7 +10,7 @@ from truespring.conditions import Loading
 from truespring.errors import ProblemError, nearest
 from truespring.linear.choice import check_linear, choose
 from truespring.linear.gradients import norm
-from truespring.potential import Potential, Stressed
+from truespring.potential import Potential, Stressed, volumes_of
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
@@ -72,7 +72,7 @@ class Newton(Solver):
         """
         geometry = geometry or Geometry()
         admissible = geometry.admissible
-        linear = choose(self.linear, potential.nodes, loading.held, geometry.coarser)
+        linear = choose(self.linear, potential.nodes, loading.held, geometry.coarser, volumes_of(potential))
         balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
         last = descend(balance, 0.0, potential.nodes)
         yield self._with_cost(last.state, balance)
@@ -199,7 +199,7 @@ class Nearby(Newton):
             loading,
             self.tolerance,
             self.max_iterations,
-            choose(self.linear, potential.nodes, loading.held, geometry.coarser),
+            choose(self.linear, potential.nodes, loading.held, geometry.coarser, volumes_of(potential)),
             report,
         )
         positions = potential.nodes.copy() if self.start is None else self.start(potential)

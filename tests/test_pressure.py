@@ -1,0 +1,132 @@
+"""Multigrid beside exact changes of volume of nearly incompressible bodies, against factorisations."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import truespring as ts
+from tests.test_linear import cantilever
+from truespring.linear import choice, scalar
+from truespring.linear.direct import Direct
+from truespring.linear.gradients import IndefiniteError
+from truespring.linear.pressure import PressureMultigrid, Separated
+from truespring.linear.scalar import Scalar
+from truespring.mesh import interpolations
+from truespring.potential import Stressed, Volumetric
+from truespring.problem import Problem
+
+MODELS = {"gaussian": ts.Springs("gaussian"), "fem": ts.Fem("neo-hookean")}
+
+
+def block(poisson: float, element: str = "hexahedron") -> Problem:
+    """A block bent by an eighth of its length."""
+    return cantilever(
+        ts.box((4, 1, 1), (20, 5, 5) if element == "hexahedron" else (8, 2, 2), element=element),
+        25.0,
+        ts.Material(1e4, poisson),
+    )
+
+
+def bent(nodes: np.ndarray) -> np.ndarray:
+    """Return nodes of a body that is bent, and not quite at constant volume."""
+    x, y, z = nodes.T
+    return nodes + np.stack([0.1 * x * (0.5 - y), 0.05 * x**2, 0.002 * x * z], axis=1)
+
+
+def prepared(problem: Problem, model: str, positions: np.ndarray) -> tuple[PressureMultigrid, object, object]:
+    potential = MODELS[model].potential(problem)
+    assert isinstance(potential, Volumetric) and isinstance(potential, Stressed)
+    held, mesh = problem.loading.held, problem.mesh
+    coarser = (lambda: interpolations(mesh, 60)) if mesh.element == "hexahedron" else tuple
+    solver = choice.choose("multigrid", potential.nodes, held, coarser, potential.volume_stiffness)
+    assert isinstance(solver, PressureMultigrid)
+    # The stress of the undeformed body: that of these positions is far from a balance.
+    matrix = potential.hessian(positions, potential.stress(potential.nodes))
+    return solver, matrix, Direct(held, "scipy")
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_volume_is_a_part_of_the_tangent(model: str) -> None:
+    """The difference of two tangents, of another bulk modulus and of the same stress, is the stiffness of the cells."""
+    soft, stiff = (MODELS[model].potential(block(poisson)) for poisson in (0.45, 0.49))
+    positions = bent(soft.nodes)
+    assert isinstance(soft, Volumetric) and isinstance(stiff, Volumetric)
+    (cells,) = stiff.volume_stiffness(positions)
+    ((less,), lam) = soft.volume_stiffness(positions), [one.problem.material.lame for one in (soft, stiff)]
+    assert cells.stiffness / cells.shear == pytest.approx(lam[1].lam / lam[1].mu)
+    assert less.stiffness / less.shear == pytest.approx(lam[0].lam / lam[0].mu)
+    moved = positions + 1e-6 * (bent(bent(soft.nodes)) - positions)
+    growth = (cells.slope * (moved - positions)[cells.elements]).sum(axis=(1, 2))
+    volumes = [(stiff.volume_stiffness(at)[0].shear / lam[1].mu) ** -0.5 for at in (positions, moved)]
+    reference = np.sqrt(1 / len(cells.elements) * 4)  # of the undeformed volume, all the same
+    assert growth == pytest.approx((volumes[1] - volumes[0]) * reference, abs=1e-4 * np.abs(growth).max())
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("poisson", [0.49, 0.4999])
+def test_the_solution_is_that_of_a_factorisation(model: str, poisson: float) -> None:
+    problem = block(poisson)
+    for positions in (problem.mesh.nodes, bent(problem.mesh.nodes)):
+        solver, matrix, direct = prepared(problem, model, positions)
+        tangent, factors = solver.ready(matrix, positions), direct.ready(matrix, positions)
+        assert isinstance(tangent, Separated)
+        assert tangent.negative_eigenvalues == factors.negative_eigenvalues == 0
+        assert solver.lanczos_iterations <= 15
+        right = np.where(problem.loading.held, 0.0, problem.loading.external_force)
+        wanted, found = factors.solve(right), tangent.solve(right, 1e-9)
+        # Blocks of the finest level are in single precision.
+        assert np.abs(found - wanted).max() <= 5e-5 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_iterations_do_not_depend_on_poissons_ratio(model: str) -> None:
+    """Conjugate gradients of usual multigrid take 60 to more than 150."""
+    counts = []
+    for poisson in (0.496, 0.499, 0.4999, 0.49999):
+        problem = block(poisson)
+        solver, matrix, _ = prepared(problem, model, problem.mesh.nodes)
+        solver.ready(matrix, problem.mesh.nodes).solve(problem.loading.external_force, 2e-3)
+        counts.append(solver.cg_iterations)
+    assert max(counts) <= 15, counts
+
+
+def test_large_scalar_matrices_are_solved_by_conjugate_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against the factorisation, which smaller ones have; twice the same to the last bit."""
+    line = sparse.diags_array([-np.ones(19), 2 * np.ones(20), -np.ones(19)], offsets=[-1, 0, 1])
+    eye = sparse.eye_array(20)
+    square = sparse.csr_array(sparse.kron(line, eye) + sparse.kron(eye, line) + 1e-3 * sparse.eye_array(400)) * 1e-12
+    right = np.random.default_rng(3).normal(size=400)
+    wanted = Scalar(square).solve(right)
+    assert square @ wanted == pytest.approx(right, abs=1e-9)
+    monkeypatch.setattr(scalar, "_DIRECT", 0)
+    found = Scalar(square).solve(right)
+    assert 0 < np.linalg.norm(found - wanted) <= 1e-3 * np.linalg.norm(wanted)
+    assert (Scalar(square).solve(right) == found).all()
+
+
+@pytest.mark.parametrize("element", ["hexahedron", "tetrahedron"])
+def test_a_body_of_almost_constant_volume_is_solved_without_factorisation(element: str) -> None:
+    problem = block(0.4999, element)
+    path, direct = (
+        ts.solve(problem, MODELS["gaussian"], ts.Newton(load_steps=2, tolerance=1e-11, linear=linear))
+        for linear in ("multigrid", "scipy")
+    )
+    assert path.status is ts.Status.CONVERGED
+    assert path.cost is not None and path.cost.linear.endswith("with pressures") and not path.cost.notes
+    tip = direct.states[-1].displacement
+    assert np.abs(path.states[-1].displacement - tip).max() <= 1e-8 * np.abs(tip).max()
+
+
+def test_an_unstable_state_is_seen_as_without_pressures() -> None:
+    """A block pressed to two thirds of its length by its own stress, kept in place."""
+    problem = block(0.499)
+    potential = MODELS["gaussian"].potential(problem)
+    positions = problem.mesh.nodes * [0.6, 1.29, 1.29]
+    matrix = potential.hessian(positions)
+    solver = choice.choose("multigrid", potential.nodes, problem.loading.held, volumes=potential.volume_stiffness)
+    tangent = solver.ready(matrix, positions)
+    assert Direct(problem.loading.held, "scipy").ready(matrix, positions).negative_eigenvalues
+    assert tangent.negative_eigenvalues == 1
+    start = np.where(problem.loading.held, 0.0, np.random.default_rng(1).normal(size=positions.shape))
+    with pytest.raises(IndefiniteError):
+        tangent.solve(start, 1e-8)
