@@ -1,5 +1,6 @@
 """Linear solvers: multigrid against factorisations, what they tell of stability, and what they fall back on."""
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -109,7 +110,7 @@ def test_multigrid_converges_or_falls_back_and_says_so(name: str) -> None:
     assert np.abs(found - exact).max() <= 1e-8 * np.abs(exact).max()
     assert path.states[-1].negative_eigenvalues == 0
     assert path.cost.cg_iterations > 0
-    assert path.cost.linear in MULTIGRID or any("multigrid" in note for note in path.cost.notes)
+    assert path.cost.linear in MULTIGRID or any(re.search("instead of .*multigrid", note) for note in path.cost.notes)
 
 
 @pytest.mark.parametrize("build", [strip, block])
@@ -173,7 +174,7 @@ def test_a_column_buckles_under_multigrid_too() -> None:
         assert path.states[-1].branched or path.states[1].branched
         assert np.abs(path.states[-1].displacement[:, 1]).max() > 1
     assert path.cost is not None
-    assert any("unstable" in note and "multigrid" in note for note in path.cost.notes)
+    assert any(re.search("instead of .*multigrid", note) and "unstable" in note for note in path.cost.notes)
 
 
 def test_what_runs_again_is_the_same_to_the_last_bit() -> None:

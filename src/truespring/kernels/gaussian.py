@@ -239,7 +239,7 @@ def add_matrices(
 ) -> None:
     """Add the second derivatives of the elements' energies to element matrices, shape (n_elements, k * dim, k * dim).
 
-    Other shapes as in `add_rows`.
+    Other shapes as in `rows`.
     """
     dim, k, n = unsigned(len(zero)), unsigned(slope.shape[1]), unsigned(second.shape[1])
     for e in range(unsigned(first), unsigned(last)):

@@ -168,39 +168,6 @@ def add_times(typing, total, factor, array, row, column):
     return total(total, factor, array, row, column), code
 
 
-@intrinsic
-def square_root(typing, value):
-    """Return the square root of a vector."""
-
-    def code(context, builder, sig, args):
-        function = builder.module.declare_intrinsic("llvm.sqrt", [_VECTOR])
-        return builder.call(function, args)
-
-    return _lanes(value), code
-
-
-@intrinsic
-def chosen(typing, condition, yes, no):
-    """Return the entries of `yes` where those of `condition` are positive, else those of `no`."""
-
-    def code(context, builder, sig, args):
-        where = builder.fcmp_ordered(">", args[0], ir.Constant(_VECTOR, [0.0] * LANES))
-        return builder.select(where, args[1], args[2])
-
-    return _lanes(condition, yes, no), code
-
-
-@intrinsic
-def part(typing, value, lane):
-    """Return one number of a vector."""
-
-    def code(context, builder, sig, args):
-        (at,) = _indices(context, builder, sig.args[1:], args[1:])
-        return builder.extract_element(args[0], at)
-
-    return types.float64(value, lane), code
-
-
 @kernel
 def room(rows):
     """Return an uninitialised array, shape (rows, LANES), whose rows do not cross lines of the cache."""

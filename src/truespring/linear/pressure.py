@@ -240,7 +240,7 @@ class Separated:
         """
         if not right.any():
             return np.zeros(right.shape)
-        if self._parts is None or not self.apart:
+        if not self.apart or self._parts is None:  # parts are built when they are asked for
             try:
                 return self.whole.solve(right, accuracy)
             finally:

@@ -102,8 +102,9 @@ class ElementVolumes:
         last: Measured | None = self.__dict__.pop("_last", None)
         if last is None or not np.array_equal(last.positions, positions):
             last = Measured(positions.copy(), *self._fill(positions, last))
+        found = last.slope, last.volume  # before another thread can take `last` for its positions
         self.__dict__["_last"] = last
-        return last.slope, last.volume
+        return found
 
     def _fill(self, positions: Floats, last: Measured | None) -> tuple[Floats, Floats]:
         """Return slopes and volumes, in the arrays of the last positions unless something else refers to them."""

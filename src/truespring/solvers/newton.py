@@ -36,6 +36,7 @@ class Newton(Solver):
             these find no stable state nearby; "mixed" and "line-search" use one of them only.
         linear: "auto" chooses by size and dimension; "multigrid"; "direct" for the first installed library of
             factorisations, or one of them: "scipy", "rslab", "pardiso".
+        coarse_start: whether large load steps on large lattices start from the solution on coarser meshes.
     """
 
     load_steps: int = 10
