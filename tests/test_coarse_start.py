@@ -177,6 +177,21 @@ def test_a_failure_on_a_coarse_mesh_is_none_of_the_fine_one(failure: BaseExcepti
     problem = plate(ts.Material(30.0, 0.3))
     started, _ = both(problem, OnItsOwnMesh(problem.mesh, failure))
     assert bool(started.cost.coarse) == (failure is None)
+    (note,) = started.cost.notes
+    assert note.startswith("started" if failure is None else f"a coarser mesh failed: {type(failure).__name__}")
+
+
+def test_one_exception_of_the_reporter_ends_the_solution() -> None:
+    calls: list[int] = []
+
+    def cancelled(load_factor: float, iteration: int, residual: float) -> None:
+        calls.append(iteration)
+        if len(calls) == 1:
+            raise KeyError("cancelled")
+
+    problem = plate(ts.Material(30.0, 0.3), counts=(24, 24))
+    with pytest.raises(KeyError, match="cancelled"):
+        ts.solve(problem, ts.Springs("gaussian"), ts.Newton(load_steps=1), progress=cancelled)
 
 
 def test_where_it_is_not_used() -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.errors import one_line
 from truespring.linear.choice import choose
 from truespring.linear.gradients import norm
 from truespring.potential import Stressed, volumes_of
@@ -189,7 +190,7 @@ class Jump:
         potential, loading = self._balance.potential, self._balance.loading
         path = self._path
         assert path is not None and isinstance(potential, Stressed)  # `find` and `_jump` checked it
-        moved = _unless_it_fails(lambda: path.displacement(level))
+        moved = _unless_it_fails(lambda: path.displacement(level), self._balance)
         if moved is None:
             return None
         self._carried[level] = self._weights @ moved
@@ -216,7 +217,7 @@ def jump_from_coarser(balance: Balance, geometry: Geometry, linear: str, load_st
     nodes = balance.potential.nodes
     if len(nodes) < _WORTH.get(nodes.shape[1], np.inf) or load_step < _LARGE_STEP:
         return None
-    jump = _unless_it_fails(lambda: _jump(balance, geometry, linear))
+    jump = _unless_it_fails(lambda: _jump(balance, geometry, linear), balance)
     return jump if jump is not None and _MUCH_COARSER * jump.coarsest <= len(nodes) else None
 
 
@@ -231,14 +232,16 @@ def _jump(balance: Balance, geometry: Geometry, linear: str) -> Jump | None:
     tolerance = max(balance.tolerance, _TOLERANCE)
     nodes, held, volumes = coarse.potential.nodes, coarse.loading.held, volumes_of(coarse.potential)
     chosen = choose(linear, nodes, held, coarse.geometry.coarser, volumes)
-    below = Balance(coarse.potential, coarse.loading, tolerance, balance.max_iterations, chosen, balance.report)
+    # Without a reporter, whose exceptions are not to be taken for failures of the coarse mesh.
+    below = Balance(coarse.potential, coarse.loading, tolerance, balance.max_iterations, chosen)
     path = CoarsePath(below, coarse.geometry.admissible, _jump(below, coarse.geometry, linear))
     return Jump(balance, geometry.admissible, path, coarse.weights)
 
 
-def _unless_it_fails(compute: Callable[[], _Found]) -> _Found | None:
-    """Return what a function of coarse meshes returns; None if it raises: the fine mesh needs no coarse one."""
+def _unless_it_fails(compute: Callable[[], _Found], balance: Balance) -> _Found | None:
+    """Return what a function of coarse meshes returns; None with a note if it raises: the fine mesh needs no such."""
     try:
         return compute()
-    except Exception:  # a model may raise anything on a mesh that is not that of the user
+    except Exception as error:  # a model may raise anything on a mesh that is not that of the user
+        balance.note(f"a coarser mesh failed: {type(error).__name__}: {one_line(str(error))}")
         return None
