@@ -84,12 +84,17 @@ class MeanDilatationPotential(FemPotential):
     def _measures(self) -> ElementVolumes:
         return ElementVolumes(self.problem, self._pattern.elements, 1)
 
+    @cached_property
+    def _volumes(self) -> Floats:
+        """Undeformed volume of each element [m^3], shape (n_elements,)."""
+        return self._measures.at(self.nodes)[1]
+
     def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
         """Return the parts of lam and mu in the energy, lam/2 (ln Jm)^2, as stiffness of the volume of each element."""
         if not self._carries_pressure or self.constants.plane_stress:
             return ()
         slope, volume = self._measures.at(positions)
-        constants, share = self.constants.raveled, self._measures.at(self.nodes)[1] / volume**2
+        constants, share = self.constants.raveled, self._volumes / volume**2
         return (VolumeStiffness(self._pattern.elements, slope, constants.lam * share, constants.mu * share),)
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
