@@ -35,6 +35,16 @@ def cantilever(
     return ts.Problem(mesh, material, section, [ts.Fixed("left")], [ts.Force("right", total)], regions or [])
 
 
+def check_cycle(ready: choice.Tangent, problem: ts.Problem) -> None:
+    """The V-cycle is symmetric and positive."""
+    assert isinstance(ready, Preconditioned) and ready.coarse is not None
+    free = ~problem.loading.held
+    a, b = (np.where(free, np.random.default_rng(seed).normal(size=free.shape), 0.0) for seed in (3, 4))
+    image = [ready.coarse.cycle(ready.level, one).copy() for one in (a, b)]
+    assert (image[0] * a).sum() > 0 and (image[1] * b).sum() > 0
+    assert (image[0] * b).sum() == pytest.approx((image[1] * a).sum(), rel=1e-4)
+
+
 def chosen(name: str, problem: ts.Problem) -> choice.LinearSolver:
     """Return a linear solver by name; "geometric multigrid" is multigrid with coarser meshes."""
     nodes, held = problem.mesh.nodes, problem.loading.held
@@ -250,13 +260,7 @@ def test_the_preconditioner_is_positive_however_rows_are_shared(n_threads: int) 
         springs = ts.Springs("isotropic", volume=True)
         potential = springs.potential(problem)
         solver = choice.choose("multigrid", problem.mesh.nodes, problem.loading.held)
-        ready = solver.ready(potential.hessian(problem.mesh.nodes), problem.mesh.nodes)
-        assert isinstance(ready, Preconditioned) and ready.coarse is not None
-        free = ~problem.loading.held
-        a, b = (np.where(free, np.random.default_rng(seed).normal(size=free.shape), 0.0) for seed in (3, 4))
-        image = [ready.coarse.cycle(ready.level, one).copy() for one in (a, b)]
-        assert (image[0] * a).sum() > 0 and (image[1] * b).sum() > 0
-        assert (image[0] * b).sum() == pytest.approx((image[1] * a).sum(), rel=1e-4)
+        check_cycle(solver.ready(potential.hessian(problem.mesh.nodes), problem.mesh.nodes), problem)
         path = ts.solve(problem, springs, ts.Newton(load_steps=1, tolerance=1e-8, linear="multigrid"))
         assert path.status is ts.Status.CONVERGED and path.cost is not None
         assert not path.cost.notes and path.cost.linear in MULTIGRID
@@ -364,13 +368,7 @@ def test_geometric_v_cycle_is_symmetric_and_positive(n_threads: int) -> None:
     matrix = ts.Springs("isotropic").potential(problem).projected_hessian(bent)
     threads.set_threads(n_threads)
     try:
-        ready = chosen("geometric multigrid", problem).ready(matrix, bent)
-        assert isinstance(ready, Preconditioned) and ready.coarse is not None
-        free = ~problem.loading.held
-        a, b = (np.where(free, np.random.default_rng(seed).normal(size=free.shape), 0.0) for seed in (3, 4))
-        image = [ready.coarse.cycle(ready.level, one).copy() for one in (a, b)]
-        assert (image[0] * a).sum() > 0 and (image[1] * b).sum() > 0
-        assert (image[0] * b).sum() == pytest.approx((image[1] * a).sum(), rel=1e-4)
+        check_cycle(chosen("geometric multigrid", problem).ready(matrix, bent), problem)
     finally:
         threads.set_threads(None)
 

@@ -3,6 +3,7 @@
 The cases come from the tables: every rule on every kind of element that it is made for, every law on every element.
 """
 
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -29,11 +30,6 @@ from truespring.models import (
     Model,
     VolumeSprings,
     fem_potential,
-    gaussian,
-    heml,
-    linked,
-    mass_tensor,
-    volume,
 )
 from truespring.models.fem_potential import FemPotential
 from truespring.models.gaussian_rule import GAUSSIAN_LAWS
@@ -684,11 +680,11 @@ def test_the_stress_is_carried_on_by_its_derivative(name: str) -> None:
 
 @pytest.mark.parametrize("name", EVERY)
 def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An element at a time on three threads: the same but for the order of sums."""
-    potential = potential_of(name)
-    positions = deformed(potential.nodes, 31)
+    """Small slices, or all elements on three threads: the same but for the order of sums."""
+    positions = deformed(potential_of(name).nodes, 31)
 
     def answers() -> list[Floats]:
+        potential = CASES[name].build()  # one that remembers nothing
         assert isinstance(potential, Projectable)
         by_stress = []
         if isinstance(potential, Stressed):
@@ -705,18 +701,22 @@ def test_slices_and_threads_change_nothing(name: str, monkeypatch: pytest.Monkey
         ]
 
     at_once = answers()
-    for module in (fem_potential, gaussian, heml, linked, mass_tensor, volume):
-        monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
-    monkeypatch.setattr(fem_potential, "_SLICE_POINTS", 1)
-    monkeypatch.setattr(assembly, "_SLICE_BYTES", 1)
+    with monkeypatch.context() as patched:
+        patched.setattr(fem_potential, "_SLICE_POINTS", 1)
+        patched.setattr(assembly, "_SLICE_BYTES", 1)
+        sliced = answers()
+    for module_name, module in tuple(sys.modules.items()):
+        if module_name.startswith("truespring.models.") and hasattr(module, "_SMALLEST_PIECE"):
+            monkeypatch.setattr(module, "_SMALLEST_PIECE", 1)
     monkeypatch.setattr(assembly, "_SMALLEST_SLAB", 1)
     set_threads(3)
     try:
-        one_by_one = answers()
+        shared = answers()
     finally:
         set_threads(None)
-    for one, other in zip(one_by_one, at_once, strict=True):
-        assert one == near(other, rel=1e-12, abs=1e-13 * np.nanmax(np.abs(other)), nan_ok=True)
+    for found in (sliced, shared):
+        for one, other in zip(found, at_once, strict=True):
+            assert one == near(other, rel=1e-12, abs=1e-13 * np.nanmax(np.abs(other)), nan_ok=True)
 
 
 @pytest.mark.parametrize("name", EVERY)

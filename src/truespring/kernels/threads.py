@@ -179,13 +179,17 @@ def _libraries() -> Any:
     return ThreadpoolController()
 
 
+# The limit is that of the process: held by one thread at a time, so that each restores what was there before.
+_limiting = threading.RLock()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit numerical libraries to one thread within the block.
 
     Their threads wait for each other in loops, which takes longer than the work on small matrices.
     """
-    with _libraries().limit(limits=1):
+    with _limiting, _libraries().limit(limits=1):
         yield
 
 
