@@ -92,7 +92,7 @@ def geometry_of(problem: Problem, finite: bool = True) -> Geometry:
     return Geometry(upright, partial(select, problem.mesh))
 
 
-def _coarser(problem: Problem, potential: Potential) -> "Sequence[sparse.csr_array[Any]]":
+def _interpolations(problem: Problem, potential: Potential) -> "Sequence[sparse.csr_array[Any]]":
     """Return weights of the nodes of a potential from those of coarser meshes, empty unless the mesh is a lattice."""
     weights = interpolations(problem.mesh, _COARSEST)
     if not weights or not isinstance(potential, Refined):
@@ -113,9 +113,9 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
-    geometry = replace(geometry_of(problem, model.finite), coarser=partial(_coarser, problem, potential))
+    geometry = replace(geometry_of(problem, model.finite), interpolations=partial(_interpolations, problem, potential))
     if model.finite and model.any_mesh:
-        geometry = replace(geometry, coarse=partial(_coarse, model, CoarseBody.finest(problem, loading)))
+        geometry = replace(geometry, coarse_body=partial(_coarse_body, model, CoarseBody.finest(problem, loading)))
     solver.check(problem.loading, geometry)
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
@@ -147,8 +147,8 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     )
 
 
-def _coarse(model: Model, body: CoarseBody) -> Coarse | None:
-    """Return a body by a model on a mesh of cells twice as large, None if there is none; see `Geometry.coarse`."""
+def _coarse_body(model: Model, body: CoarseBody) -> Coarse | None:
+    """Return a body by a model on a mesh of cells twice as large, None if there is none; see `Geometry.coarse_body`."""
     coarse = body.coarser() if body.loading.held.shape == body.mesh.nodes.shape else None
     if coarse is None or min(coarse.counts) < _FEWEST_CELLS:
         return None
@@ -157,8 +157,8 @@ def _coarse(model: Model, body: CoarseBody) -> Coarse | None:
         return None
     geometry = replace(
         geometry_of(coarse.problem),
-        coarser=partial(_coarser, coarse.problem, potential),
-        coarse=partial(_coarse, model, coarse),
+        interpolations=partial(_interpolations, coarse.problem, potential),
+        coarse_body=partial(_coarse_body, model, coarse),
     )
     return Coarse(potential, coarse.loading, geometry, coarse.weights)
 

@@ -226,12 +226,12 @@ def _jump(balance: Balance, geometry: Geometry, linear: str) -> Jump | None:
     nodes = balance.potential.nodes
     if len(nodes) < _COARSEST[nodes.shape[1]] or not isinstance(balance.potential, Stressed):
         return None
-    coarse = geometry.coarse()
+    coarse = geometry.coarse_body()
     if coarse is None:
         return None
     tolerance = max(balance.tolerance, _TOLERANCE)
     nodes, held, volumes = coarse.potential.nodes, coarse.loading.held, volumes_of(coarse.potential)
-    chosen = choose(linear, nodes, held, coarse.geometry.coarser, volumes)
+    chosen = choose(linear, nodes, held, coarse.geometry.interpolations, volumes)
     # Without a reporter, whose exceptions are not to be taken for failures of the coarse mesh.
     below = Balance(coarse.potential, coarse.loading, tolerance, balance.max_iterations, chosen)
     path = CoarsePath(below, coarse.geometry.admissible, _jump(below, coarse.geometry, linear))

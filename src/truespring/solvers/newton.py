@@ -73,7 +73,7 @@ class Newton(Solver):
         """
         geometry = geometry or Geometry()
         admissible = geometry.admissible
-        linear = choose(self.linear, potential.nodes, loading.held, geometry.coarser, volumes_of(potential))
+        linear = choose(self.linear, potential.nodes, loading.held, geometry.interpolations, volumes_of(potential))
         balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
         last = descend(balance, 0.0, potential.nodes)
         yield self._with_cost(last.state, balance)
@@ -200,7 +200,7 @@ class Nearby(Newton):
             loading,
             self.tolerance,
             self.max_iterations,
-            choose(self.linear, potential.nodes, loading.held, geometry.coarser, volumes_of(potential)),
+            choose(self.linear, potential.nodes, loading.held, geometry.interpolations, volumes_of(potential)),
             report,
         )
         positions = potential.nodes.copy() if self.start is None else self.start(potential)

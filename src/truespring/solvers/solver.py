@@ -40,15 +40,15 @@ class Geometry:
     Attributes:
         admissible: returns whether positions [m], shape (n_nodes, dim), leave all elements uninverted.
         select: returns the node numbers of a selection, shape (n,); selections are those of supports and loads.
-        coarser: returns weights of the nodes from those of coarser meshes, see `linear.choice.choose`; empty if there
-            are none.
-        coarse: returns the same body on a mesh of cells twice as large, None if there is none.
+        interpolations: returns weights of the nodes from those of coarser meshes, see `linear.choice.choose`; empty if
+            there are none.
+        coarse_body: returns the same body on a mesh of cells twice as large, None if there is none.
     """
 
     admissible: Callable[[Floats], bool] = _admits_all
     select: Callable[[Any], Ints] = _selects_none
-    coarser: Callable[[], Sequence[Any]] = tuple
-    coarse: Callable[[], "Coarse | None"] = _no_coarse
+    interpolations: Callable[[], Sequence[Any]] = tuple
+    coarse_body: Callable[[], "Coarse | None"] = _no_coarse
 
 
 class Coarse(NamedTuple):
