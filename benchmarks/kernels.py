@@ -8,8 +8,9 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
+from itertools import cycle
 from typing import Any
 from unittest.mock import patch
 
@@ -19,11 +20,11 @@ import truespring as ts
 from benchmarks.cases import Case
 from benchmarks.limits import Kernel, Moved, bandwidth, measure
 from benchmarks.parts import n_bytes
-from benchmarks.phases import phases
+from benchmarks.phases import ITERATIVE, phases
 from benchmarks.programs.common import TOLERANCE
 from benchmarks.programs.truespring import problem_of
 from truespring.kernels import threads
-from truespring.linear import iterative
+from truespring.linear import gradients
 from truespring.potential import SparseMatrix, Stressed
 from truespring.problem import Problem
 
@@ -38,10 +39,16 @@ def of_potential(problem: Problem, potential: Stressed, positions: np.ndarray) -
     They must read positions and elements, and write the force, or the tangent.
     """
     given = positions.nbytes + problem.mesh.elements.size * 4
-    yield Kernel("force", lambda: potential.gradient(positions), given + positions.nbytes)
+    turns = in_turn(positions)
+    yield Kernel("force", lambda: potential.gradient(next(turns)), given + positions.nbytes)
     stress = potential.stress(positions)
     matrix = potential.hessian(positions, stress)
-    yield Kernel("tangent", lambda: potential.hessian(positions, stress), given + matrix.data.nbytes)
+    yield Kernel("tangent", lambda: potential.hessian(next(turns), stress), given + matrix.data.nbytes)
+
+
+def in_turn(positions: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield two copies of positions in turn: potentials keep what they computed for the last positions."""
+    return cycle((positions.copy(), positions * (1 + 1e-12)))
 
 
 def of_solver(used: "Used", memory: int, matrix: SparseMatrix, positions: np.ndarray) -> Iterator[Kernel]:
@@ -73,13 +80,15 @@ class Used:
 @contextmanager
 def watched() -> Iterator[Used]:
     """Yield what solutions give to conjugate gradients."""
-    used, iterate = Used(), iterative.conjugate_gradients
+    used, iterate = Used(), gradients.conjugate_gradients
 
     def spied(product: Callable[..., Any], precondition: Callable[..., Any], *rest: Any, **more: Any) -> Any:
         used.product, used.precondition = product, precondition
         return iterate(product, precondition, *rest, **more)
 
-    with patch.object(iterative, "conjugate_gradients", spied):
+    with ExitStack() as stack:
+        for module in ITERATIVE:
+            stack.enter_context(patch.object(module, "conjugate_gradients", spied))
         yield used
 
 

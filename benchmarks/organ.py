@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import truespring as ts
+from benchmarks.kernels import in_turn
 from truespring.study import read_study
 
 #: Poisson's ratios, and the models.
@@ -47,13 +48,13 @@ def measured(poisson: float, name: str) -> dict:
     if not paths[0].complete:
         raise SystemExit(f"{paths[0].status}: {paths[0].status.advice}")
     potential, positions = model.potential(problem), paths[0].states[-1].positions
-    stress, cost = potential.stress(positions), paths[0].cost
+    stress, cost, turns = potential.stress(positions), paths[0].cost, in_turn(positions)
     return {
         "poisson": poisson,
         "model": paths[0].label,
         "n_elements": len(problem.mesh.elements),
-        "force": timed(lambda: potential.gradient(positions)),
-        "tangent": timed(lambda: potential.hessian(positions, stress)),
+        "force": timed(lambda: potential.gradient(next(turns))),
+        "tangent": timed(lambda: potential.hessian(next(turns), stress)),
         "solve": statistics.median(path.seconds for path in paths),
         "iterations": paths[0].newton_iterations,
         "cg": cost.cg_iterations if cost else 0,

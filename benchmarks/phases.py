@@ -8,9 +8,12 @@ from functools import wraps
 from typing import Any
 from unittest.mock import patch
 
-from truespring.linear import iterative
+from truespring.linear import iterative, pressure
 
-# Methods of a potential, of the iterative solver and functions of its module, by phase.
+#: Modules that call conjugate gradients.
+ITERATIVE = (iterative, pressure)
+
+# Methods of a potential, of the iterative solvers and functions of their modules, by phase.
 _POTENTIAL = {
     "gradient": "forces",
     "energy": "energy",
@@ -53,7 +56,9 @@ def phases(potential: type) -> Iterator[Counter[str]]:
 
         for name, phase in _POTENTIAL.items():
             replaced(potential, name, phase)
-        for name, phase in _FUNCTIONS.items():
-            replaced(iterative, name, phase)
-        replaced(iterative.Multigrid, "ready", "set-up of the linear solver")
+        for module in ITERATIVE:
+            for name, phase in _FUNCTIONS.items():
+                replaced(module, name, phase)
+        for solver in (iterative.Multigrid, pressure.PressureMultigrid):
+            replaced(solver, "ready", "set-up of the linear solver")
         yield taken
