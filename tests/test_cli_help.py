@@ -17,7 +17,7 @@ import pytest
 
 import truespring
 from tests.test_examples import EXAMPLES
-from truespring.cli import main, printing
+from truespring.cli import main, names, printing
 from truespring.cli.parser import VERBS, build_parser, parse
 from truespring.cli.verb import COMMON
 
@@ -126,14 +126,23 @@ def test_options_without_effect_change_nothing(capsys: pytest.CaptureFixture[str
 
 def test_names_in_help_are_those_of_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
     from truespring.calibration import UNKNOWNS
+    from truespring.exports import TARGETS
     from truespring.models import LAWS, RULES
     from truespring.reference import READERS
     from truespring.validity import LOAD_TYPES
+    from truespring.validity.rules import VARIANTS
 
-    for verb, tables in (("calibrate", (UNKNOWNS,)), ("map", (LAWS, RULES, LOAD_TYPES)), ("compare", (READERS,))):
+    assert [name for name, load in LOAD_TYPES.items() if load.dims == (3,)] == list(names.LOAD_TYPES_3D)
+    for verb, tables in (
+        ("calibrate", {"UNKNOWNS": UNKNOWNS}),
+        ("map", {"LAWS": LAWS, "RULES": RULES, "LOAD_TYPES": LOAD_TYPES, "VARIANTS": VARIANTS}),
+        ("compare", {"READERS": READERS}),
+        ("export", {"TARGETS": TARGETS}),
+    ):
         assert main([verb, "--help"]) == 0
         words = set(re.findall(r"[\w.+-]+", re.sub(r"-\n\s+", "-", capsys.readouterr().out)))
-        for table in tables:
+        for name, table in tables.items():
+            assert getattr(names, name) == tuple(table), f"cli/names.py: {name} = {tuple(table)}"
             assert set(table) <= words, set(table) - words
 
 

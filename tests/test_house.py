@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import truespring
+from truespring.cli.parser import VERBS
 
 SOURCE = Path(truespring.__file__).parent
 
@@ -376,11 +377,22 @@ def test_a_public_name_is_no_module() -> None:
         assert name in ("LAWS", "RULES") or getattr(truespring, name).__name__ == name
 
 
-def test_the_command_line_loads_nothing_heavy_to_answer() -> None:
-    asked = "import sys, truespring.cli; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout.split()
-    assert "truespring.cli" in loaded
-    assert not {name.split(".")[0] for name in loaded} & {*HEAVY, "numpy", "scipy", "skfem", "pydantic"}
+def test_the_help_of_a_verb_loads_nothing_heavy() -> None:
+    asked = """
+import sys
+from truespring.cli import main
+from truespring.cli.parser import VERBS
+heavy = set(sys.argv[1:])
+for name in VERBS:
+    assert main([name, "--help"]) == 0
+    print("loaded:", name, *heavy & {module.split(".")[0] for module in sys.modules})
+"""
+    heavy = [*HEAVY, "numpy", "scipy", "skfem", "pydantic"]
+    command = [sys.executable, "-c", asked, *heavy]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    loaded = [line.split()[1:] for line in shown if line.startswith("loaded:")]
+    assert [name for name, *_ in loaded] == list(VERBS)
+    assert not [line for line in loaded if len(line) > 1]
 
 
 @pytest.mark.parametrize(("former", "name"), truespring._RENAMED.items())

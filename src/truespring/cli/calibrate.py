@@ -3,13 +3,12 @@
 import argparse
 from pathlib import Path
 
+from truespring.cli.names import UNKNOWNS
 from truespring.cli.printing import console, print_file, print_json, progress, reserve, say, writing
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
-    from truespring.calibration import UNKNOWNS
-
     parser.add_argument("study", help="study with the springs to fit, under its load")
     parser.add_argument("case", nargs="*", help="studies of the same body with further loads to fit")
     parser.add_argument(

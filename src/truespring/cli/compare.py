@@ -2,6 +2,7 @@
 
 import argparse
 
+from truespring.cli.names import READERS
 from truespring.cli.printing import console, print_each, print_file, progress, reserve, writing
 from truespring.cli.solve import print_failures
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_timeout, relative_error
@@ -21,8 +22,6 @@ FILE_OPTIONS = {
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
-    from truespring.reference import READERS
-
     parser.add_argument(
         "source",
         nargs="+",

@@ -3,13 +3,12 @@
 import argparse
 from typing import Any
 
+from truespring.cli.names import TARGETS
 from truespring.cli.printing import console, print_each, progress, reserve, say, show, writing
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
-    from truespring.exports import TARGETS
-
     add_studies(parser)
     parser.add_argument(
         "--to",

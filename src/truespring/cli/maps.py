@@ -2,15 +2,12 @@
 
 import argparse
 
+from truespring.cli.names import LAWS, LOAD_TYPES, LOAD_TYPES_3D, RULES, VARIANTS
 from truespring.cli.printing import console, counting, print_file, print_json, reserve, writing
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_workers, one_of
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
-    from truespring.models import LAWS, RULES
-    from truespring.validity import LOAD_TYPES
-    from truespring.validity.rules import VARIANTS
-
     parser.add_argument("study", help="study file (TOML)")
     parser.add_argument(
         "--law",
@@ -19,13 +16,12 @@ def _add(parser: argparse.ArgumentParser) -> None:
         **one_of(LAWS),
         help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean",
     )
-    in_space = [name for name, load in LOAD_TYPES.items() if load.dims == (3,)]
     parser.add_argument(
         "--load",
         action="append",
         metavar="TYPE",
         **one_of((*LOAD_TYPES, "all")),
-        help=f"{', '.join(LOAD_TYPES)} or all ({', '.join(in_space)}: in 3D only; own: the load of the study); "
+        help=f"{', '.join(LOAD_TYPES)} or all ({', '.join(LOAD_TYPES_3D)}: in 3D only; own: the load of the study); "
         "repeat for several; default: own",
     )
     parser.add_argument(

@@ -72,10 +72,7 @@ class _PrintCompletion(argparse.Action):
 
 
 def build_parser(filled: Collection[str]) -> tuple[Parser, dict[str, Parser]]:
-    """Return the parser and the parsers of the verbs.
-
-    Only the verbs in `filled` get their arguments, since adding these may import tables of the library.
-    """
+    """Return the parser and the parsers of the verbs; only the verbs in `filled` get their arguments."""
     parser = Parser(
         prog="truespring",
         description="Mass-spring models that match their material: solved at large deformation and compared with FEM.",

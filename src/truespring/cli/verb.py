@@ -19,7 +19,7 @@ class Verb:
     Attributes:
         name: name of the verb.
         summary: one line for the list of verbs and the top of the verb's help.
-        add: adds the arguments to a parser; called only for the verb of a command line, so it may import tables.
+        add: adds the arguments to a parser; called only for the verb of a command line.
         run: runs the verb and returns its exit code.
         examples: command lines at the end of the verb's help, on the studies that `truespring new KIND` writes.
         common: the options in COMMON that the verb's help lists; the verb accepts the others, without effect.
