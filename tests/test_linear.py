@@ -13,8 +13,8 @@ from scipy.sparse.linalg import spsolve
 
 import truespring as ts
 from truespring.errors import ProblemError
-from truespring.kernels import threads
-from truespring.linear import choice, direct
+from truespring.kernels import threads, vectors
+from truespring.linear import choice, direct, levels
 from truespring.linear.gradients import IndefiniteError
 from truespring.linear.iterative import Preconditioned
 from truespring.linear.levels import Matrix
@@ -241,31 +241,60 @@ def test_names_are_checked() -> None:
         ts.Newton(method="mip")
 
 
-@pytest.mark.parametrize("n_threads", [1, 2, 5])
-def test_the_preconditioner_is_positive_however_rows_are_shared(n_threads: int) -> None:
-    """Nodes in no order at all: nearly every block crosses from the rows of one thread to those of another."""
-    threads.set_threads(n_threads)
-    try:
-        mesh = ts.box((1.0, 1.0, 1.0), (14, 14, 14))
-        order = np.random.default_rng(2).permutation(mesh.n_nodes)
-        shuffled = np.empty_like(mesh.nodes)
-        shuffled[order] = mesh.nodes
-        problem = ts.Problem(
-            ts.Mesh(shuffled, order[mesh.elements], mesh.element),
-            ts.Material(1.0, 0.45),
-            None,
-            ts.Fixed("left"),
-            ts.Force("right", (0.0, -0.01, 0.0)),
-        )
-        springs = ts.Springs("isotropic", volume=True)
-        potential = springs.potential(problem)
-        solver = choice.choose("multigrid", problem.mesh.nodes, problem.loading.held)
-        check_cycle(solver.ready(potential.hessian(problem.mesh.nodes), problem.mesh.nodes), problem)
-        path = ts.solve(problem, springs, ts.Newton(load_steps=1, tolerance=1e-8, linear="multigrid"))
-        assert path.status is ts.Status.CONVERGED and path.cost is not None
-        assert not path.cost.notes and path.cost.linear in MULTIGRID
-    finally:
-        threads.set_threads(None)
+def shuffled() -> ts.Problem:
+    """A cube with nodes in no order at all: nearly every block crosses from one piece of the rows to another."""
+    mesh = ts.box((1.0, 1.0, 1.0), (14, 14, 14))
+    order = np.random.default_rng(2).permutation(mesh.n_nodes)
+    nodes = np.empty_like(mesh.nodes)
+    nodes[order] = mesh.nodes
+    return ts.Problem(
+        ts.Mesh(nodes, order[mesh.elements], mesh.element),
+        ts.Material(1.0, 0.45),
+        None,
+        ts.Fixed("left"),
+        ts.Force("right", (0.0, -0.01, 0.0)),
+    )
+
+
+@pytest.mark.parametrize("n_pieces", [1, 2, 5])
+def test_the_preconditioner_is_positive_however_rows_are_divided(
+    n_pieces: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(levels, "_PIECES", n_pieces)
+    monkeypatch.setattr(levels, "_SMALLEST_PIECE", 50_000)
+    problem = shuffled()
+    springs = ts.Springs("isotropic", volume=True)
+    potential = springs.potential(problem)
+    solver = choice.choose("multigrid", problem.mesh.nodes, problem.loading.held)
+    tangent = solver.ready(potential.hessian(problem.mesh.nodes), problem.mesh.nodes)
+    assert isinstance(tangent, Preconditioned) and len(tangent.level.bounds) == n_pieces + 1
+    check_cycle(tangent, problem)
+    path = ts.solve(problem, springs, ts.Newton(load_steps=1, tolerance=1e-8, linear="multigrid"))
+    assert path.status is ts.Status.CONVERGED and path.cost is not None
+    assert not path.cost.notes and path.cost.linear in MULTIGRID
+
+
+@pytest.mark.parametrize("name", MULTIGRID)
+def test_results_do_not_depend_on_the_number_of_threads(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tangents and V-cycles are the same to the last bit; sums over all nodes differ by rounding."""
+    monkeypatch.setattr(vectors, "SMALLEST", 1000)
+    problem = shuffled()
+    nodes, held = problem.mesh.nodes, problem.loading.held
+    residual = np.where(held, 0.0, np.random.default_rng(4).normal(size=held.shape))
+    matrices, cycles, solutions, iterations = [], [], [], []
+    for count in (1, 2, 3):
+        with threads.limited(count):
+            solver, matrix = chosen(name, problem), ts.Springs("gaussian").potential(problem).hessian(nodes)
+            tangent = solver.ready(matrix, nodes)
+            assert isinstance(tangent, Preconditioned) and len(tangent.level.bounds) > 4
+            matrices.append(matrix.data)
+            cycles.append(tangent.precondition(residual).copy())
+            solutions.append(tangent.solve(residual, 1e-9))
+            iterations.append(solver.cg_iterations)
+    assert all((one == matrices[0]).all() for one in matrices)
+    assert all((one == cycles[0]).all() for one in cycles)
+    assert len(set(iterations)) == 1
+    assert all(np.abs(one - solutions[0]).max() <= 1e-11 * np.abs(solutions[0]).max() for one in solutions)
 
 
 @pytest.mark.parametrize("per_second", [60, 360, 480, 2000, 10_000])

@@ -5,9 +5,10 @@ its column. Instead of the diagonal, the sum `rest` of a row's blocks is stored 
 rest_i x_i + sum A_ij (x_j - x_i). A rigid translation then has exact forces for any number of nodes; rounding a block
 only changes the stiffness of a spring slightly.
 
-Each thread has a piece of the rows. A block whose row and column are in different pieces is crossing: loops over pieces
-skip it where two threads could write to one row, and the loops over `bounds` (first row of each piece, then the number
-of rows, shape (n_pieces + 1,)) add it.
+The rows are divided into pieces, whose number does not depend on that of the threads; a thread has some of them.
+`bounds` are the first row of each piece, then the number of rows, shape (n_pieces + 1,); `first` and `last` of loops
+with `bounds` are pieces. A block whose row and column are in different pieces is crossing: loops over pieces skip it
+where two threads could write to one row, and `product_across` and `subtract_across` add it.
 
 Unless stated, `starts`, `columns` and `lower` are of the blocks left of the diagonal. `zero` has length k, the number
 of unknowns per node.
@@ -123,21 +124,26 @@ def condense(
 
 
 @kernel
-def product(first: int, last: int, starts: Any, columns: Any, lower: Any, rest: Any, x: Any, y: Any, zero: Any) -> None:
+def product(
+    first: int, last: int, bounds: Any, starts: Any, columns: Any, lower: Any, rest: Any, x: Any, y: Any, zero: Any
+) -> None:
     """Write y = A x without the contributions of crossing blocks to rows of other pieces.
 
-    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), rest (n, k, k), x, y (n, k).
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), rest (n, k, k), x, y
+    (n, k).
     """
-    for i in range(first, last):
-        here = row(x, i, zero)
-        s = times(rest, i, here, zero)
-        for p in range(starts[i], starts[i + 1]):
-            j = columns[unsigned(p)]
-            d = minus(row(x, j, zero), here)
-            s = plus(s, times(lower, p, d, zero))
-            if j >= first:
-                put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
-        put(y, i, s)
+    for piece in range(first, last):
+        begin = bounds[piece]
+        for i in range(begin, bounds[piece + 1]):
+            here = row(x, i, zero)
+            s = times(rest, i, here, zero)
+            for p in range(starts[i], starts[i + 1]):
+                j = columns[unsigned(p)]
+                d = minus(row(x, j, zero), here)
+                s = plus(s, times(lower, p, d, zero))
+                if j >= begin:
+                    put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
+            put(y, i, s)
 
 
 @kernel
@@ -187,13 +193,14 @@ def dense(first: int, last: int, matrix: Any, x: Any, result: Any) -> None:
             result[i] += matrix[j, i] * x[j]
 
 
-# Gauss-Seidel within the rows of one thread, Jacobi between threads: symmetric and reproducible.
+# Gauss-Seidel within pieces, Jacobi between them: symmetric, and independent of the number of threads.
 
 
 @kernel
 def sweep_forward(
     first: int,
     last: int,
+    bounds: Any,
     starts: Any,
     columns: Any,
     lower: Any,
@@ -206,44 +213,60 @@ def sweep_forward(
 ) -> None:
     """Write z = (D + L)^-1 r, with `added` in D, and the residual `left` of z, without crossing blocks.
 
-    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k), added, r, z, left (n, k).
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k),
+    added, r, z, left (n, k).
     """
-    for i in range(first, last):
-        s = row(r, i, zero)
-        for p in range(starts[i], starts[i + 1]):
-            j = columns[unsigned(p)]
-            if j >= first:
-                s = minus(s, times(lower, p, row(z, j, zero), zero))
-        s = times(inverse, i, s, zero)
-        put(z, i, s)
-        put(left, i, each(row(added, i, zero), s))
-        for p in range(starts[i], starts[i + 1]):
-            j = columns[unsigned(p)]
-            if j >= first:
-                put(left, j, minus(row(left, j, zero), times_transposed(lower, p, s, zero)))
+    for piece in range(first, last):
+        begin = bounds[piece]
+        for i in range(begin, bounds[piece + 1]):
+            s = row(r, i, zero)
+            for p in range(starts[i], starts[i + 1]):
+                j = columns[unsigned(p)]
+                if j >= begin:
+                    s = minus(s, times(lower, p, row(z, j, zero), zero))
+            s = times(inverse, i, s, zero)
+            put(z, i, s)
+            put(left, i, each(row(added, i, zero), s))
+            for p in range(starts[i], starts[i + 1]):
+                j = columns[unsigned(p)]
+                if j >= begin:
+                    put(left, j, minus(row(left, j, zero), times_transposed(lower, p, s, zero)))
 
 
 @kernel
 def sweep_backward(
-    first: int, last: int, starts: Any, columns: Any, lower: Any, inverse: Any, added: Any, r: Any, z: Any, zero: Any
+    first: int,
+    last: int,
+    bounds: Any,
+    starts: Any,
+    columns: Any,
+    lower: Any,
+    inverse: Any,
+    added: Any,
+    r: Any,
+    z: Any,
+    zero: Any,
 ) -> None:
     """Add (D + U)^-1 (r - A z) to z, with `added` in D; r excludes the crossing blocks and is overwritten.
 
-    Shapes: starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k), added, r, z (n, k).
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), inverse (n, k, k),
+    added, r, z (n, k).
     """
-    for i in range(last - 1, first - 1, -1):
-        s = plus(row(r, i, zero), each(row(added, i, zero), row(z, i, zero)))
-        # Backwards through memory without exception, so that the processor prefetches.
-        for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
-            j = columns[unsigned(p)]
-            if j >= first:
-                s = minus(s, times(lower, p, row(z, j, zero), zero))
-        s = times(inverse, i, s, zero)
-        put(z, i, s)
-        for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
-            j = columns[unsigned(p)]
-            if j >= first:
-                put(r, j, minus(row(r, j, zero), times_transposed(lower, p, s, zero)))
+    for piece in range(last - 1, first - 1, -1):
+        begin = bounds[piece]
+        for i in range(bounds[piece + 1] - 1, begin - 1, -1):
+            s = plus(row(r, i, zero), each(row(added, i, zero), row(z, i, zero)))
+            # Backwards through memory without exception, so that the processor prefetches.
+            for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
+                j = columns[unsigned(p)]
+                if j >= begin:
+                    s = minus(s, times(lower, p, row(z, j, zero), zero))
+            s = times(inverse, i, s, zero)
+            put(z, i, s)
+            for p in range(starts[i + 1] - 1, starts[i] - 1, -1):
+                j = columns[unsigned(p)]
+                if j >= begin:
+                    put(r, j, minus(row(r, j, zero), times_transposed(lower, p, s, zero)))
 
 
 @kernel

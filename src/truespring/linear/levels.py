@@ -1,7 +1,7 @@
 """Matrices of multigrid levels, in the form that smoothers and products use."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,9 @@ Real = Floats | Singles
 
 # Smallest number of matrix entries that is worth another thread.
 _SMALLEST_PIECE = 80_000
+# Largest number of pieces of a level, unless each then had more than `_LARGE_PIECE` matrix entries: more pieces would
+# take more time for the blocks between them, fewer would not be enough for all threads.
+_PIECES, _LARGE_PIECE = 8, 2_000_000
 # Eigenvalues of the coarsest matrix below this share of the largest are zero.
 _KERNEL = 1e-7
 
@@ -43,7 +46,7 @@ class Level:
         rest: sum of the blocks of each row, shape (n, k, k).
         inverse: inverse of each diagonal block with `added`, shape (n, k, k).
         added: added to the diagonal for the smoother, shape (n, k).
-        pieces: range of rows of each thread.
+        bounds: first row of each piece of the smoother, and the number of rows, shape (n_pieces + 1,).
     """
 
     starts: ShortInts
@@ -52,7 +55,7 @@ class Level:
     rest: Floats
     inverse: Real
     added: Real
-    pieces: list[tuple[int, int]]
+    bounds: ShortInts
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -64,19 +67,23 @@ class Level:
         """Memory of the arrays [bytes]."""
         return sum(array.nbytes for array in (self.columns, self.lower, self.rest, self.inverse))
 
-    @cached_property
-    def bounds(self) -> ShortInts:
-        """First row of each thread, and the number of rows, shape (n_threads + 1,)."""
-        return np.array([0, *(last for _, last in self.pieces)], dtype=np.int32)
+    def run(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Call function(first, last, bounds, starts, columns, lower, *arguments, zero) on pieces first to last."""
+        from truespring.kernels.threads import run
+
+        known = (self.bounds, self.starts, self.columns, self.lower)
+        run(function, len(self.bounds) - 1, *known, *arguments, (0.0,) * self.shape[1], smallest=1)
+
+    def across(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Call function(bounds, starts, columns, lower, *arguments, zero), for the blocks between pieces."""
+        function(self.bounds, self.starts, self.columns, self.lower, *arguments, (0.0,) * self.shape[1])
 
     def product(self, x: Floats, result: Floats) -> float:
         """Write A x to `result` and return x . A x; `x` and `result` have shape (n, k)."""
         from truespring.kernels import blocks
-        from truespring.kernels.threads import run_on
 
-        zero, matrix = (0.0,) * self.shape[1], (self.starts, self.columns, self.lower)
-        run_on(self.pieces, blocks.product, *matrix, self.rest, x, result, zero)
-        blocks.product_across(self.bounds, *matrix, x, result, zero)
+        self.run(blocks.product, self.rest, x, result)
+        self.across(blocks.product_across, x, result)
         return scalar_product(x, result)
 
 
@@ -91,7 +98,7 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     Raises SingularMatrixError if a diagonal block is missing.
     """
     from truespring.kernels import blocks
-    from truespring.kernels.threads import pieces, run
+    from truespring.kernels.threads import run
 
     n = len(starts) - 1
     counts = np.empty(n, np.int32)
@@ -104,7 +111,10 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     lower = np.empty((len(lower_columns), size, size), precision)
     rest, inverse = np.empty((n, size, size)), np.empty((n, size, size), precision)
     added = np.empty((n, size), precision)
-    return Level(lower_starts, lower_columns, lower, rest, inverse, added, pieces(n, worth(n, lower.size)))
+    most = max(_PIECES, lower.size // _LARGE_PIECE)
+    n_pieces = max(1, min(most, lower.size // _SMALLEST_PIECE))
+    bounds = (n * np.arange(n_pieces + 1, dtype=np.int64) // n_pieces).astype(np.int32)
+    return Level(lower_starts, lower_columns, lower, rest, inverse, added, bounds)
 
 
 def condense(level: Level, matrix: Matrix, scale: float) -> bool:

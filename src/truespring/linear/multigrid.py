@@ -75,25 +75,22 @@ class Hierarchy:
     def _cycle(self, depth: int, level: Level, r: Floats) -> Floats:
         """Return an approximate solution on the level `depth`."""
         from truespring.kernels import blocks
-        from truespring.kernels.threads import run_on
 
         coarsest = depth == len(self.transfers)
         if coarsest and self.inverse is not None:
             solution = np.empty(r.size)
             blocks.dense(0, r.size, self.inverse, r.ravel(), solution)
             return solution.reshape(r.shape)
-        zero, bounds = (0.0,) * level.shape[1], level.bounds
-        matrix = (level.starts, level.columns, level.lower)
         z, left, coarse = (np.empty(r.shape), np.empty(r.shape), r) if coarsest else self._room[depth]
-        run_on(level.pieces, blocks.sweep_forward, *matrix, level.inverse, level.added, r, z, left, zero)
+        level.run(blocks.sweep_forward, level.inverse, level.added, r, z, left)
         if not coarsest:
-            blocks.subtract_across(bounds, *matrix, z, left, zero)
+            level.across(blocks.subtract_across, z, left)
             self.transfers[depth].restrict(left, coarse)
             coarser = self.levels[depth] if depth < len(self.levels) else level
             self.transfers[depth].prolong(self._cycle(depth + 1, coarser, coarse), z)
         left[:] = r
-        blocks.subtract_across(bounds, *matrix, z, left, zero)
-        run_on(level.pieces, blocks.sweep_backward, *matrix, level.inverse, level.added, left, z, zero)
+        level.across(blocks.subtract_across, z, left)
+        level.run(blocks.sweep_backward, level.inverse, level.added, left, z)
         return z
 
 
