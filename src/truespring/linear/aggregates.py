@@ -231,7 +231,7 @@ def _coarsen(level: Level, matrix: Matrix, scale: float, modes: Floats) -> tuple
     unknown = coarse_modes[:, np.arange(n_modes), np.arange(n_modes)] == 0
     starts, columns, data = _galerkin(matrix, transfer, n_coarse)
     data *= scale
-    return transfer, coarse_modes, Matrix(starts, columns, data, unknown)
+    return transfer, coarse_modes, Matrix(starts, columns, data, np.ascontiguousarray(unknown))
 
 
 def _aggregates(matrix: Matrix) -> tuple[ShortInts, int]:

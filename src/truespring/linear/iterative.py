@@ -28,8 +28,10 @@ class Multigrid:
         `interpolations` are the weights of the nodes from those of a coarser mesh, and so on, sparse, shape (n,
         n_coarse); without them coarse levels are made by aggregation.
         """
+        from truespring.kernels.threads import writable
+
         self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
-        self._held = np.ascontiguousarray(held)
+        self._held = writable(held)
         self._coarsening: Coarsening = (
             Nested(nodes, self._held, interpolations) if len(interpolations) else Aggregates(nodes, self._held)
         )

@@ -125,7 +125,7 @@ class FemPotential:
         assert section is not None  # see require_continuum
         corner_slopes, slopes, weights = self._reference
         chosen = _filled_up(first, last)
-        nodes, dim, n_points = self.elements[chosen], self.mesh.dim, len(weights)
+        nodes, dim, n_points = writable(self.elements[chosen]), self.mesh.dim, len(weights)
         n = len(nodes)
         gradients = np.empty((n // LANES, slopes.shape[1] * dim * n_points, LANES))
         F = np.empty((dim, dim, n_points, n))

@@ -162,18 +162,9 @@ class Balance:
         from truespring.kernels.threads import run
 
         centred = np.minimum(np.abs(positions - positions.mean(axis=0)), _LARGEST_STRETCH * self.size)
-        rows = (tangent.indptr, tangent.indices, tangent.data)
-        return (
-            8
-            * _EPS
-            * float(
-                np.sqrt(
-                    sum(
-                        run(blocks.rounding, len(centred), *rows, centred, self.loading.held, (0.0,) * centred.shape[1])
-                    )
-                )
-            )
-        )
+        rows, zero = (tangent.indptr, tangent.indices, tangent.data), (0.0,) * centred.shape[1]
+        squares = run(blocks.rounding, len(centred), *rows, centred, self.loading.held, zero)
+        return 8 * _EPS * float(np.sqrt(sum(squares)))
 
     def judged(self, state: Equilibrium) -> Found:
         """Return an equilibrium with its stability, and the tangent if it was factorised."""
