@@ -747,10 +747,13 @@ def test_page_and_summary_tell_how_a_path_was_solved_and_what_it_took(page_of: C
     cost = Cost("line search", "multigrid", 21, 120, 17, 3, 10**6, 2, ("mixed integration points were given up",))
     springs = path(problem, kind="springs", label="springs (lloyd)", cost=cost)
     once = replace(cost, newton_iterations=1, cg_iterations=0, lanczos_iterations=0, notes=())
-    found = result(springs, {"linear": path(problem, cost=once), "read": path(problem, label="read")})
+    nested = replace(once, coarse=(replace(once, newton_iterations=7), replace(once, newton_iterations=4)))
+    others = {"linear": path(problem, cost=once), "read": path(problem, label="read")}
+    found = result(springs, others | {"nested": path(problem, label="nested", cost=nested)})
     told = "".join(page_of(found).said)
     assert "line search, multigrid, 21 Newton iterations, 120 CG iterations, 17 of Lanczos for stability; mixed" in told
     assert "linear FEM: line search, multigrid, 1 Newton iteration\n" in told and "read: " not in told
+    assert "multigrid, 1 Newton iteration; on coarser meshes before that 7, 4 Newton iterations" in told
     models = summary(found)["models"]
     assert models["springs"]["solver"]["memory"] == 10**6 and models["linear"]["solver"]["newton"] == "line search"
     assert models["read"]["solver"] is None

@@ -275,7 +275,9 @@ def _effort(path: Solution) -> str | None:
     parts = [cost.newton, cost.linear, _counted(cost.newton_iterations, "Newton iteration")]
     parts += [_counted(cost.cg_iterations, "CG iteration")] if cost.cg_iterations else []
     parts += [f"{cost.lanczos_iterations} of Lanczos for stability"] if cost.lanczos_iterations else []
-    return "; ".join([", ".join(parts), *cost.notes])
+    coarse = ", ".join(str(one.newton_iterations) for one in cost.coarse)
+    started = [f"on coarser meshes before that {coarse} Newton iterations"] if coarse else []
+    return "; ".join([", ".join(parts), *started, *cost.notes])
 
 
 def _counted(count: int, thing: str) -> str:
