@@ -295,20 +295,21 @@ def test_the_shipped_loads_are_those_of_the_shipped_body(name: str) -> None:
 
 @pytest.mark.verification
 def test_the_organ_is_nearer_to_its_reference_under_loads_that_were_held_out(tmp_path: Path) -> None:
-    """Straight springs with a volume term, by displacement and force; some minutes."""
-    organ = (EXAMPLES / "organ.toml").read_text(encoding="utf-8")
-    straight = tmp_path / "organ.toml"
-    straight.write_text(
-        organ.replace('model = "gaussian"\nreferences = ["springs", ', 'model = "springs"\nreferences = [')
-    )
-    study = read_study(straight)
-    assert study.model == "springs"
-    pushed, aside, back = (read_study(EXAMPLES / f"loads/organ_{name}.toml") for name in ("pushed", "aside", "back"))
+    """Straight springs with a volume term on voxels of 2 mm, by the worst of displacement, force and torque."""
+    straight = 'model = "gaussian"\nreferences = ["springs", ', 'model = "springs"\nreferences = ['
+    (tmp_path / "loads").mkdir()
+    studies = []
+    for name in ("organ.toml", "loads/organ_pushed.toml", "loads/organ_aside.toml", "loads/organ_back.toml"):
+        text = (EXAMPLES / name).read_text(encoding="utf-8").replace("0.626 mm", "2 mm").replace(*straight)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        studies.append(read_study(tmp_path / name))
+    study, pushed, aside, back = studies
+    assert study.model == "springs" and len(study.problem.mesh.elements) < 1000
     found = calibrate_study(study, [pushed], [aside, back])
     assert found.calibration.converged and found.calibration.warnings == ()
     for one in found.calibration.cases:
         before, after = one.pair
-        assert before is not None and after is not None and after < 0.9 * before < 0.09
+        assert before is not None and after is not None and after < 0.25 * before and after < 0.15
     files = write_calibrated(found, tmp_path, "")
     carried = export_study(read_study(files[0]), ["json"], tmp_path)
     header = json.loads((tmp_path / "calibrated" / "springs.json").read_text(encoding="utf-8"))["header"]
