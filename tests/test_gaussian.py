@@ -260,16 +260,57 @@ def test_threads_do_not_change_forces_and_tangent() -> None:
     springs = ts.Springs("gaussian").potential(body(grid))
     positions = grid.nodes + np.random.default_rng(9).uniform(-0.2, 0.2, grid.nodes.shape)
 
-    def found(count: int) -> tuple[Floats, Floats]:
+    def found(count: int) -> tuple[Floats, ...]:
         set_threads(count)
-        return springs.gradient(positions), springs.hessian(positions).data.copy()
+        tangents = springs.hessian(positions).data.copy(), springs.projected_hessian(positions).data.copy()
+        return springs.gradient(positions), *tangents
 
     try:
         one, two = found(1), found(2)
     finally:
         set_threads(None)
-    assert np.array_equal(one[0], two[0])
-    assert np.array_equal(one[1], two[1])
+    assert all(np.array_equal(mine, other) for mine, other in zip(one, two, strict=True))
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_the_pressure_is_reduced_no_more_than_elements_need(kind: str) -> None:
+    """A large share of the pressure, in steps of 1/16, that leaves an element no negative eigenvalue."""
+    first = mesh_of(kind)
+    mesh = ts.Mesh(first.nodes[first.elements[0]], np.arange(first.elements.shape[1])[None], kind)
+    springs = ts.Springs("gaussian").potential(body(mesh, "plane strain" if mesh.dim == 2 else ""))
+    generator, reduced = np.random.default_rng(5), []
+    for squeeze in np.linspace(0.7, 1.4, 24):
+        x = squeeze * mesh.nodes + 0.1 * generator.normal(size=mesh.nodes.shape)
+        if not np.isfinite(springs.energy(x)):
+            continue
+        whole, found = springs.hessian(x).toarray(), springs.projected_hessian(x).toarray()
+        lowest, size = np.linalg.eigvalsh(whole)[0], np.abs(whole).max()
+        stiffer = springs.hessian(x, 2 * springs.stress(x)).toarray() - whole
+        # the springs are of constant stiffness: what a stress adds is the pressure's part, less its share of s s^T
+        law, slope = springs._state(x).law.at, springs._measures.at(x)[0].ravel()
+        against = np.outer(slope, slope) / springs._volumes / springs._state(x).ratio ** 2
+        pressed = stiffer + (law.by_y + np.minimum(law.by_y_y - law.by_y, 0.0)) * against
+        left_out = ((whole - found) * pressed).sum() / (pressed**2).sum()
+        assert found == pytest.approx(whole - left_out * pressed, abs=1e-10 * size)
+        assert np.linalg.eigvalsh(found)[0] >= -1e-9 * size
+        if lowest > -1e-12 * size:
+            assert abs(left_out) <= 1e-12
+        else:
+            assert np.linalg.eigvalsh(found + 1.01 / 16 * pressed)[0] < 0
+            reduced.append(left_out)
+    assert len(reduced) > 3 and 0 < min(reduced) < max(reduced) <= 1
+
+
+def test_stability_at_rest_of_few_different_elements() -> None:
+    """Cubes have no negative eigenvalue; flat bricks have."""
+    for sides, poisson, expected in (((2.0, 1.0, 1.0), 0.45, True), ((2.0, 1.0, 0.2), 0.3, False)):
+        springs = ts.Springs("gaussian").potential(body(ts.box(sides, (4, 2, 2)), poisson=poisson))
+        values = np.linalg.eigvalsh(springs.element_hessians(springs.nodes))
+        assert springs.semidefinite_at_rest == expected == bool(values[:, 0].min() > -1e-12 * values.max())
+    many = mesh_of("hexahedron")
+    assert len(many.elements) < 64 or not ts.Springs("gaussian").potential(body(many)).semidefinite_at_rest
+    two = ts.Springs("gaussian").potential(body(mesh_of("plane of two kinds"), "plane strain"))
+    assert two.semidefinite_at_rest == all(part.semidefinite_at_rest for part in two.parts)
 
 
 def weights(sides: Sequence[float], poisson: float, hourglass: float | None = None) -> list[float]:

@@ -59,7 +59,8 @@ class Case:
         geometric: a stress given to the Hessian makes its geometric part.
         quadratic_stress: the stress is at most quadratic in the positions.
         semidefinite: of springs, the Hessian without stress is semidefinite.
-        cuts: the projection does no more than cut negative eigenvalues off, of springs or of elements.
+        cuts: the projection does no more than cut negative eigenvalues off, of springs or of elements; in Gaussian
+            springs it reduces the pressure.
         barrier: an inverted element has infinite energy.
         ends: the law ends at a finite stretch.
         cancels: the energy at rest is a difference of terms that are not zero.
@@ -159,6 +160,7 @@ def _gaussian_case(model: ts.Springs, problem: ts.Problem) -> Case:
         problem,
         springs=True,
         semidefinite=law.constant_springs,
+        cuts=False,
         barrier=True,
         ends="jm" in law.constants,
         cancels=True,

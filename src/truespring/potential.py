@@ -46,9 +46,9 @@ class Projectable(Potential, Protocol):
     """A potential with a positive semidefinite approximation of its Hessian."""
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Return the sum of the spring or element Hessians, each projected to the nearest semidefinite matrix [N/m].
+        """Return a sum of semidefinite matrices of springs or elements that are near their Hessians [N/m].
 
-        Symmetric, shape (n_dof, n_dof).
+        Those are the Hessians where these have no negative eigenvalue. Symmetric, shape (n_dof, n_dof).
         """
         ...
 

@@ -6,6 +6,7 @@ of a matrix of the element whose rows sum to zero. Elements of one class have th
 
 from typing import Any
 
+import numpy as np
 from numba.extending import overload
 
 from truespring.kernels.measures import turn
@@ -15,6 +16,12 @@ from truespring.kernels.threads import kernel
 # A tuple of three zeros: vectors in space.
 _SPACE = (0.0, 0.0, 0.0)
 ZERO, ONE, TWO = unsigned(0), unsigned(1), unsigned(2)
+#: Number of element matrices that are factorised at a time, the lanes of vector registers.
+LANES = 16
+# Shares are multiples of 2^-_HALVINGS.
+_HALVINGS = 4
+# Share of the firm matrices that is added to them: rotations may have no stiffness but for rounding errors.
+_ROUNDING = 1e-10
 
 
 @kernel
@@ -256,3 +263,114 @@ def add_matrices(
                     spring = _stiffness(e, a, b, matrices, of, factors)
                     for c in range(dim):
                         blocks[e, a * dim + c, b * dim + c] += spring
+
+
+@kernel
+def shares(
+    first: int,
+    last: int,
+    x: Any,
+    elements: Any,
+    starts: Any,
+    others: Any,
+    coefficients: Any,
+    slope: Any,
+    second: Any,
+    pressure: Any,
+    matrices: Any,
+    of: Any,
+    factors: Any,
+    rest: Any,
+    lanes: int,
+    share: Any,
+    zero: Any,
+) -> None:
+    """Write the largest share of pressure and `rest` for which each element's tangent is positive semidefinite.
+
+    By bisection: the tangent is semidefinite if its Cholesky factorisation exists, without the rows of the first node,
+    as the energy does not depend on translations. Without the share it must be semidefinite. `rest` is added to the
+    second derivatives `second`. `lanes` is LANES; shapes: rest as second, share (n_elements,), others as in `rows`.
+    """
+    dim, k = len(zero), slope.shape[1]
+    n = (k - 1) * dim
+    size = n * (n + 1) // 2
+    block = np.empty((2, k * dim, k * dim))
+    firm, added, factor = np.empty((size, LANES)), np.empty((size, LANES)), np.empty((size, LANES))
+    column, inverse = np.empty((n, LANES)), np.empty(LANES)
+    low, high, tried, positive = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    for begin in range(first, last, LANES):
+        for lane in range(lanes):
+            low[lane], high[lane] = 0.0, 2.0
+            e = unsigned(min(begin + lane, last - 1))
+            table = (starts, others, coefficients)
+            _parts(e, x, elements, table, slope, second, rest, pressure, matrices, of, factors, block, zero)
+            p = 0
+            for i in range(dim, n + dim):
+                for j in range(dim, i + 1):
+                    firm[p, lane], added[p, lane] = (1 + _ROUNDING) * block[0, i, j], block[1, i, j]
+                    p += 1
+        for _ in range(_HALVINGS + 1):
+            for lane in range(lanes):
+                tried[lane], positive[lane] = (low[lane] + high[lane]) / 2, 1.0
+            for p in range(size):
+                for lane in range(lanes):
+                    factor[p, lane] = firm[p, lane] + tried[lane] * added[p, lane]
+            for j in range(n):
+                diagonal = unsigned(j * (j + 1) // 2 + j)
+                for lane in range(lanes):
+                    pivot = factor[diagonal, lane]
+                    positive[lane] = positive[lane] if pivot > 0 else 0.0
+                    inverse[lane] = 1 / pivot if pivot > 0 else 0.0
+                for i in range(j + 1, n):
+                    for lane in range(lanes):
+                        column[unsigned(i), lane] = factor[unsigned(i * (i + 1) // 2 + j), lane] * inverse[lane]
+                for i in range(j + 1, n):
+                    own = i * (i + 1) // 2
+                    for m in range(j + 1, i + 1):
+                        for lane in range(lanes):
+                            factor[unsigned(own + m), lane] -= (
+                                factor[unsigned(own + j), lane] * column[unsigned(m), lane]
+                            )
+            for lane in range(lanes):
+                low[lane] = tried[lane] if positive[lane] > 0 else low[lane]
+                high[lane] = high[lane] if positive[lane] > 0 else tried[lane]
+            if low.min() >= 1:
+                break
+        for lane in range(min(lanes, last - begin)):
+            share[begin + lane] = min(low[lane], 1.0)
+
+
+@kernel
+def _parts(
+    e: int,
+    x: Any,
+    elements: Any,
+    table: Any,
+    slope: Any,
+    second: Any,
+    rest: Any,
+    pressure: Any,
+    matrices: Any,
+    of: Any,
+    factors: Any,
+    block: Any,
+    zero: Any,
+) -> None:
+    """Write the lower triangle of an element's tangent without pressure and `rest`, and that of these.
+
+    `table` is that of `turn`. `block` has shape (2, k * dim, k * dim); the rows of the first node are not written.
+    """
+    dim, k, n = unsigned(len(zero)), unsigned(slope.shape[1]), unsigned(second.shape[1])
+    starts, others, coefficients = table
+    block[:] = 0.0
+    for a in range(ONE, k):
+        for b in range(ONE, a + ONE):
+            w = scaled(pressure[e], turn(x, elements[e], starts, others, coefficients, a * k + b, zero))
+            add_part(block, ONE, a * dim, b * dim, zero, zero, w)
+            for m in range(n):
+                to = line(slope, e * n + m, b, zero)
+                add_part(block, ZERO, a * dim, b * dim, _weighed(e, a, m, slope, second, zero), to, _SPACE)
+                add_part(block, ONE, a * dim, b * dim, _weighed(e, a, m, slope, rest, zero), to, _SPACE)
+            spring = _stiffness(e, a, b, matrices, of, factors)
+            for c in range(dim):
+                block[ZERO, a * dim + c, b * dim + c] += spring

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, ShortInts
 from truespring.assembly import Pattern
 from truespring.fibres import Families
+from truespring.mesh.rows import distinct_rows
 from truespring.models.cell_fields import CHANGE_OF_TENSION, beside, lengths, stretch
 from truespring.models.element_volumes import ElementVolumes
 from truespring.models.fibres import fibre_energy
@@ -16,7 +17,7 @@ from truespring.models.gaussian_weights import ROUNDING, Laplacians
 from truespring.models.invariants import Condensed, condensed
 from truespring.models.law import Constants, Law
 from truespring.models.laws import LAWS
-from truespring.models.semidefinite import semidefinite
+from truespring.models.semidefinite import clipped, is_semidefinite
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import SummedSprings
 from truespring.potential import SparseMatrix, VolumeStiffness
@@ -24,6 +25,8 @@ from truespring.problem import Problem
 
 # Smallest number of elements, or of nodes, for which threads share the work.
 _SMALLEST_PIECE = 64
+# Largest number of different elements whose eigenvalues at rest are computed: beyond it Lanczos may be faster.
+_FEW = 64
 
 
 class _State(NamedTuple):
@@ -41,6 +44,27 @@ class _State(NamedTuple):
     ratio: Floats
     law: Condensed
     fibres: tuple[Floats, Floats, Floats]
+
+
+class _Curvature(NamedTuple):
+    """Arguments of the kernels that add second derivatives; shapes as in `kernels.gaussian.rows`."""
+
+    x: Floats
+    elements: ShortInts
+    starts: ShortInts
+    others: ShortInts
+    coefficients: Floats
+    slope: Floats
+    second: Floats
+    pressure: Floats
+    matrices: Floats
+    of: Ints
+    factors: Floats
+
+    @property
+    def without_forms(self) -> "_Curvature":
+        """The same without the stiffness of the forms."""
+        return self._replace(matrices=self.matrices[:0], factors=self.factors[:0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,11 +252,8 @@ class GaussianElements:
             self._run(gaussian.slopes, writable(positions), self._pattern.elements, *self._forms, slope)
         return slope
 
-    def _curvature(self, positions: Floats, stress: Floats | None, forms: bool) -> tuple[Any, ...]:
-        """Return the arguments of the kernels that add second derivatives; without the part of the forms if constant.
-
-        `forms`: include the constant stiffness of the forms.
-        """
+    def _curvature(self, positions: Floats, stress: Floats | None) -> _Curvature:
+        """Return what second derivatives are added from, with the forms; `stress` as from `stress()`, or that here."""
         from truespring.kernels.threads import writable
 
         state = self._state(positions, energy=False)
@@ -242,20 +263,22 @@ class GaussianElements:
         second /= self._volumes[:, None, None]
         second[:, -1] /= state.ratio[:, None]  # by the volume instead of ln J
         second[:, :, -1] /= state.ratio[:, None]
-        matrices, of = self._forms
-        n_forms = len(matrices) if forms else 0
         at = (writable(positions), self._pattern.elements, *self._measures.turns, self._slopes(positions))
-        curved = (np.ascontiguousarray(second), stress[-1] / state.ratio)
-        return *at, *curved, matrices[:n_forms], of, np.ascontiguousarray(stress[:n_forms])
+        factors = np.ascontiguousarray(stress[:-1])
+        return _Curvature(*at, np.ascontiguousarray(second), stress[-1] / state.ratio, *self._forms, factors)
 
     def hessian(self, positions: Floats, stress: Floats | None = None) -> SparseMatrix:
         """Return the tangent stiffness [N/m]; `stress`, as from `stress()`, gives the geometric part."""
+        return self._assembled(self._curvature(positions, stress))
+
+    def _assembled(self, known: _Curvature) -> SparseMatrix:
+        """Return the sum of the elements' second derivatives [N/m]."""
         from truespring.kernels import gaussian
         from truespring.kernels.threads import run
 
         pattern, values = self._pattern, self._pattern.values()
         weights = np.empty(0) if self._weights is None else self._weights
-        known = self._curvature(positions, stress, forms=not self.constant)
+        known = known.without_forms if self.constant else known  # which `weights` contain
         rows = (pattern.at_starts, pattern.at, pattern.slots, pattern.starts, weights)
         run(gaussian.rows, len(self.nodes), *rows, *known, values, pattern.zero, smallest=_SMALLEST_PIECE)
         return pattern.matrix(values)
@@ -272,25 +295,50 @@ class GaussianElements:
         )
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
-        """Return the sum of the element Hessians, each with its negative eigenvalues set to zero [N/m]."""
-        known, dim = self._curvature(positions, None, forms=True), self._pattern.dim
-        return self._pattern.summed(lambda first, last: semidefinite(self._matrices(known, first, last), dim))
+        """Return the tangent stiffness with as much of the pressure as leaves each element semidefinite [N/m].
+
+        The stiffness of an element consists of that of its springs, that against changes of the forms and the volume,
+        and the pressure times the second derivative of the volume, which is indefinite. The pressure, and what the
+        second part has of negative eigenvalues, are multiplied by the largest share, up to 1, for which the element
+        has no negative eigenvalue.
+        """
+        from truespring.kernels import gaussian
+
+        known = self._curvature(positions, None)
+        firm, share = clipped(known.second), np.empty(len(self._volumes))
+        rest = known.second - firm
+        known = known._replace(second=firm, factors=np.maximum(known.factors, 0.0))
+        self._run(gaussian.shares, *known, rest, gaussian.LANES, share)
+        second = firm + share[:, None, None] * rest
+        return self._assembled(known._replace(second=second, pressure=share * known.pressure))
+
+    @cached_property
+    def semidefinite_at_rest(self) -> bool:
+        """Whether few elements differ, and none has a negative eigenvalue at rest; see Unstressed."""
+        first = distinct_rows((self.laplacians.of, self.problem.material_numbers)).first
+        return len(first) <= _FEW and is_semidefinite(self._matrices(self._curvature(self.nodes, None), first))
 
     def element_hessians(self, positions: Floats) -> Floats:
         """Return the tangent stiffness of each element [N/m], shape (n_elements, n_dof, n_dof), node by node."""
-        return self._matrices(self._curvature(positions, None, forms=True), 0, len(self._volumes))
+        return self._matrices(self._curvature(positions, None), slice(None))
 
-    def _matrices(self, known: tuple[Any, ...], first: int, last: int) -> Floats:
-        """Return the tangent stiffness of elements first to last [N/m]; `known` is from `_curvature`, with forms."""
+    def _matrices(self, known: _Curvature, here: slice | Ints) -> Floats:
+        """Return the tangent stiffness of the elements `here` [N/m]."""
         from truespring.kernels import gaussian
         from truespring.kernels.threads import run
 
-        x, elements, *turns, slope, second, pressure, matrices, of, factors = known
-        rows, n_dof = self._measures.rows, elements.shape[1] * self._pattern.dim
-        here, blocks = slice(first, last), np.zeros((last - first, n_dof, n_dof))
-        own = (x, elements[here], *turns, slope[first * rows : last * rows], second[here], pressure[here])
-        form = (matrices, of[here], np.ascontiguousarray(factors[:, here]))
-        run(gaussian.add_matrices, len(blocks), *own, *form, blocks, self._pattern.zero, smallest=_SMALLEST_PIECE)
+        slope = known.slope.reshape(-1, self._measures.rows, *known.slope.shape[1:])[here]
+        own = known._replace(
+            elements=known.elements[here],
+            slope=slope.reshape(-1, *known.slope.shape[1:]),
+            second=known.second[here],
+            pressure=known.pressure[here],
+            of=known.of[here],
+            factors=np.ascontiguousarray(known.factors[:, here]),
+        )
+        n_dof = own.elements.shape[1] * self._pattern.dim
+        blocks = np.zeros((len(own.elements), n_dof, n_dof))
+        run(gaussian.add_matrices, len(blocks), *own, blocks, self._pattern.zero, smallest=_SMALLEST_PIECE)
         return blocks
 
     def element_arrays(self) -> dict[str, Any]:
@@ -400,6 +448,11 @@ class SummedGaussian(SummedSprings[GaussianElements]):
     """Gaussian springs on elements of several kinds."""
 
     cell_note = CHANGE_OF_TENSION
+
+    @property
+    def semidefinite_at_rest(self) -> bool:
+        """Whether no undeformed element has a negative eigenvalue, as far as is known; see Unstressed."""
+        return all(part.semidefinite_at_rest for part in self.parts)
 
     @property
     def stiffness(self) -> Floats:

@@ -6,6 +6,8 @@ from truespring.arrays import Floats
 
 # Smallest number of matrices that is worth another thread.
 _SMALLEST_PIECE = 64
+# Negative eigenvalues of a smaller size are rounding errors, over the largest eigenvalue.
+_ROUNDING = 1e-12
 
 
 def semidefinite(matrices: Floats, dim: int) -> Floats:
@@ -28,6 +30,23 @@ def semidefinite(matrices: Floats, dim: int) -> Floats:
     with one_blas_thread():
         run(project, n, smallest=_SMALLEST_PIECE)
     return found
+
+
+def clipped(matrices: Floats) -> Floats:
+    """Return symmetric matrices of a few rows, shape (n, m, m), with their negative eigenvalues set to zero."""
+    if matrices.shape[1] == 1:
+        return np.maximum(matrices, 0.0)
+    values, vectors = np.linalg.eigh(matrices)
+    return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ vectors.swapaxes(1, 2))
+
+
+def is_semidefinite(matrices: Floats) -> bool:
+    """Return whether symmetric matrices, shape (n, n_dof, n_dof), have no negative eigenvalues, but for rounding."""
+    from truespring.kernels.threads import one_blas_thread
+
+    with one_blas_thread():
+        values = np.linalg.eigvalsh(matrices)
+    return bool((values[:, 0] >= -_ROUNDING * values[:, -1]).all())
 
 
 def _differences(k: int) -> Floats:
