@@ -152,10 +152,10 @@ def polygons(
     here = IdentityTransform()
     pen = renderer.new_gc()
     pen.set_joinstyle("round")
-    for places, fill, edge, width in zip(closed, fills.tolist(), edges.tolist(), widths.tolist(), strict=True):
-        pen.set_foreground(edge, isRGBA=True)
-        pen.set_linewidth(width)
-        renderer.draw_path(pen, Path(places, codes), here, fill if fill[3] else None)
+    paths = [Path(places, codes) for places in closed]
+    placing = (np.empty((0, 3, 3)), np.zeros((1, 2)), here)  # no other transformations and offsets
+    solid = ([(0, None)], [True], [None], "screen")
+    renderer.draw_path_collection(pen, here, paths, *placing, fills, edges, widths, *solid)
     return np.array(renderer.buffer_rgba())
 
 
