@@ -16,7 +16,7 @@ test: .venv/test
 
 # Runs the long tests, and rebuilds docs/verification.md and the picture of the README.
 verification: .venv/test
-	$(BIN)/python -m pytest -q -m verification
+	$(BIN)/python -m pytest -q -n 2 -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
 

@@ -33,9 +33,10 @@ def test_generated_studies_are_answered(tmp_path: Path) -> None:
 
 
 @pytest.mark.verification
-def test_many_generated_studies_are_answered(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("verb", "part"), [(verb, part) for verb in LONG for part in range(4)])
+def test_many_generated_studies_are_answered(verb: str, part: int, tmp_path: Path) -> None:
     assert sum(map(len, LONG.values())) == 20_000
-    assert run_all(LONG, tmp_path) == {}
+    assert run_all({verb: LONG[verb][part::4]}, tmp_path) == {}
 
 
 def test_the_generator_makes_what_it_says() -> None:
