@@ -81,7 +81,8 @@ class PressureMultigrid:
         """
         self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
         self._held, self._volumes = held, volumes
-        self._whole, self._shear = (Multigrid(nodes, held, interpolations) for _ in range(2))
+        self._begin = (nodes, held, interpolations)
+        self._multigrids: list[Multigrid] = []
         self._columns: ShortInts = np.empty(0, np.int32)
         self._places: tuple[_Places, ...] = ()
         self._values = np.empty(0)
@@ -91,6 +92,19 @@ class PressureMultigrid:
     def name(self) -> str:
         """Name for notes and reports."""
         return f"{self._shear.name} with pressures" if self._apart else self._whole.name
+
+    @cached_property
+    def _whole(self) -> Multigrid:
+        return self._counted()
+
+    @cached_property
+    def _shear(self) -> Multigrid:
+        return self._counted()
+
+    def _counted(self) -> Multigrid:
+        """Return a multigrid whose costs count."""
+        self._multigrids.append(Multigrid(*self._begin))
+        return self._multigrids[-1]
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> "Preconditioned | Separated":
         """Prepare a tangent, shape (n_dof, n_dof), at `positions` [m]; raise SingularMatrixError as Multigrid does."""
@@ -130,7 +144,7 @@ class PressureMultigrid:
 
     def count(self) -> None:
         """Update the costs to those of both multigrids."""
-        both = (self._whole, self._shear)
+        both = self._multigrids
         self.factorisations = sum(one.factorisations for one in both)
         self.cg_iterations = sum(one.cg_iterations for one in both)
         self.lanczos_iterations = sum(one.lanczos_iterations for one in both)

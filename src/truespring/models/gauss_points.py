@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,31 @@ from truespring.fibres import Families
 from truespring.models.elasticity_parts import Elasticity, of_tensor
 from truespring.models.law import Constants, Frame
 from truespring.models.strain import voigt_pairs
-from truespring.models.symmetric import contracted, inverted, trace, voigt_places
+from truespring.models.symmetric import contracted, identity, inverted, trace, voigt_places
 
 # Smallest number of blocks of elements for which threads share a slice.
 _SMALLEST_PIECE = 4
+
+
+class Exchange(NamedTuple):
+    """The replacement of the volume ratio at the Gauss points by the mean of each element.
+
+    Attributes:
+        J: volume ratio, axes (point, element); 1 for a linear law.
+        theta: ln(Jm / J), Jm the mean of J over the undeformed element; for a linear law the change of the trace.
+        scale: factor exp(2 theta / d) of C; 1 for a linear law, NaN in an inverted element.
+        reference: `scale` where stresses have axes of the reference, 1 where they are current: S times it is the
+            stress at the deformation of the element.
+        metric: C in axes of the reference, else the identity, axes (component, point, element) or of length 1.
+        inverse: inverse of `metric`, the derivative of ln J with respect to the strain.
+    """
+
+    J: Floats
+    theta: Floats
+    scale: Floats
+    reference: Floats
+    metric: Floats
+    inverse: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +167,23 @@ class Points:
     def mean(self, values: Floats) -> Floats:
         """Return the mean over each undeformed element, axes (1, element)."""
         return np.asarray((values * self.volumes).sum(axis=0, keepdims=True) / self.volumes.sum(axis=0, keepdims=True))
+
+    @cached_property
+    def exchange(self) -> Exchange:
+        """The replacement of the volume ratio by its mean over each undeformed element."""
+        eye = identity(self.strain)
+        if self.frame == "small":
+            own = trace(self.strain)
+            ones = np.ones_like(own)
+            return Exchange(ones, self.mean(own) - own, ones, ones, eye, eye)
+        valid = (self.J > 0).all(axis=0, keepdims=True)
+        J = np.where(valid, self.J, 1.0)
+        theta = np.log(self.mean(J) / J)
+        scale = np.where(valid, np.exp(2 * theta / self.dim), np.nan)
+        if self.frame == "current":
+            return Exchange(J, theta, scale, np.ones_like(J), eye, eye)
+        metric = np.where(valid, self.strain, eye)
+        return Exchange(J, theta, scale, scale, metric, inverted(metric))
 
     def own(self, values: Floats) -> Floats:
         """Return values, the last axis the elements, without those of the elements that fill up the slice."""

@@ -1,7 +1,6 @@
 """Elements of mean dilatation, which do not lock for nearly incompressible materials."""
 
-from functools import cached_property, lru_cache
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -9,30 +8,9 @@ from truespring.arrays import Floats
 from truespring.models.elasticity_parts import Elasticity
 from truespring.models.element_volumes import ElementVolumes
 from truespring.models.fem_potential import FemPotential
-from truespring.models.gauss_points import Points
-from truespring.models.symmetric import contracted, identity, inverted, outer, trace
+from truespring.models.gauss_points import Exchange, Points
+from truespring.models.symmetric import contracted, identity, outer
 from truespring.potential import VolumeStiffness
-
-
-class _Exchange(NamedTuple):
-    """The replacement of the volume ratio at the Gauss points.
-
-    Attributes:
-        J: volume ratio, axes (point, element); 1 for a linear law.
-        theta: ln(Jm / J), Jm the mean of J over the undeformed element; for a linear law the change of the trace.
-        scale: factor exp(2 theta / d) of C; 1 for a linear law, NaN in an inverted element.
-        reference: `scale` where stresses have axes of the reference, 1 where they are current: S times it is the
-            stress at the deformation of the element.
-        metric: C in axes of the reference, else the identity, axes (component, point, element) or of length 1.
-        inverse: inverse of `metric`, the derivative of ln J with respect to the strain.
-    """
-
-    J: Floats
-    theta: Floats
-    scale: Floats
-    reference: Floats
-    metric: Floats
-    inverse: Floats
 
 
 class MeanDilatationPotential(FemPotential):
@@ -48,7 +26,7 @@ class MeanDilatationPotential(FemPotential):
 
     def _strain(self, at: Points) -> Floats:
         """Return the strain with the mean volume ratio, undeformed in an inverted element."""
-        exchange = _exchange(at)
+        exchange = at.exchange
         if not self.law.finite:
             return at.strain + exchange.theta / at.dim * exchange.metric
         valid = np.isfinite(exchange.scale)
@@ -60,11 +38,11 @@ class MeanDilatationPotential(FemPotential):
 
     def _law_gradient(self, at: Points) -> Floats:
         """Return the deformation gradient with the mean volume ratio, axes (i, j, point, element)."""
-        return np.sqrt(_exchange(at).scale) * at.F
+        return np.sqrt(at.exchange.scale) * at.F
 
     def _strain_change(self, at: Points, step: Floats) -> Floats:
         """Return the linear change of the strain of the law for a step, axes (component, point, element)."""
-        own, exchange = at.strain_change(step), _exchange(at)
+        own, exchange = at.strain_change(step), at.exchange
         grown = contracted(exchange.inverse, own)  # of ln J
         theta = at.mean(exchange.J * grown) / at.mean(exchange.J) - grown
         return exchange.reference * (own + theta / at.dim * exchange.metric)
@@ -75,7 +53,7 @@ class MeanDilatationPotential(FemPotential):
         S' is the stress at constant theta, p the derivative of the energy with respect to theta, g its part that acts
         on ln J through ln Jm.
         """
-        exchange = _exchange(at)
+        exchange = at.exchange
         stress = exchange.reference * self._respond(at).stress
         pressure = at.pressure_of(stress, exchange.metric)
         return stress + (_share(pressure, exchange, at) - pressure) * exchange.inverse
@@ -90,10 +68,14 @@ class MeanDilatationPotential(FemPotential):
         return self._measures.at(self.nodes)[1]
 
     def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
-        """Return the parts of lam and mu in the energy, lam/2 (ln Jm)^2, as stiffness of the volume of each element."""
-        if not self._carries_pressure or self.constants.plane_stress:
+        """Return the parts of lam and mu in the energy as stiffness of the volume of each element.
+
+        They are lam/2 (ln Jm)^2, or for the linear law lam/2 times the squared change of the undeformed volume. Other
+        laws have no such part.
+        """
+        if self.constants.plane_stress or not (self._carries_pressure or self.law.trace == "small"):
             return ()
-        slope, volume = self._measures.at(positions)
+        slope, volume = self._measures.at(positions if self.law.finite else self.nodes)
         constants, share = self.constants.raveled, self._volumes / volume**2
         return (VolumeStiffness(self._pattern.elements, slope, constants.lam * share, constants.mu * share),)
 
@@ -104,7 +86,7 @@ class MeanDilatationPotential(FemPotential):
         derivative of S' : C / d with respect to the strain at constant theta. Terms of the strain at one point have
         the form of the tangent of a law; the mean adds y m^T + m y^T + b m m^T.
         """
-        exchange, response, dim = _exchange(at), self._respond(at), at.dim
+        exchange, response, dim = at.exchange, self._respond(at), at.dim
         metric, inverse, reference = exchange.metric, exchange.inverse, exchange.reference
         own = reference * (response.stress if stress is None else stress)
         elasticity = self._elasticity(at, response, self._excess(at, response, stress)).scaled(reference**2)
@@ -126,26 +108,7 @@ class MeanDilatationPotential(FemPotential):
         return at.matrices(own + (share - pressure) * inverse, elasticity, y, m)
 
 
-@lru_cache(maxsize=2)
-def _exchange(at: Points) -> _Exchange:
-    """Return the replacement of the volume ratio; remembered for the last points, before and after a step."""
-    strain = at.strain
-    eye = identity(strain)
-    if at.frame == "small":
-        own = trace(strain)
-        ones = np.ones_like(own)
-        return _Exchange(ones, at.mean(own) - own, ones, ones, eye, eye)
-    valid = (at.J > 0).all(axis=0, keepdims=True)
-    J = np.where(valid, at.J, 1.0)
-    theta = np.log(at.mean(J) / J)
-    scale = np.where(valid, np.exp(2 * theta / at.dim), np.nan)
-    if at.frame == "current":
-        return _Exchange(J, theta, scale, np.ones_like(J), eye, eye)
-    metric = np.where(valid, strain, eye)
-    return _Exchange(J, theta, scale, scale, metric, inverted(metric))
-
-
-def _coupled(tensor: Floats, exchange: _Exchange, at: Points) -> Elasticity:
+def _coupled(tensor: Floats, exchange: Exchange, at: Points) -> Elasticity:
     """Return T (x) M + M (x) T of a symmetric tensor T, M = `exchange.inverse`."""
     if at.frame != "reference":
         return Elasticity(0.0, 0.0, tensor)
@@ -153,6 +116,6 @@ def _coupled(tensor: Floats, exchange: _Exchange, at: Points) -> Elasticity:
     return Elasticity(0.0, 0.0, rest=product + product.swapaxes(0, 1))
 
 
-def _share(pressure: Floats, exchange: _Exchange, at: Points) -> Floats:
+def _share(pressure: Floats, exchange: Exchange, at: Points) -> Floats:
     """Return the share of each point in the pressure on the mean ratio [Pa], axes (point, element)."""
     return at.mean(pressure) / at.mean(exchange.J) * exchange.J

@@ -12,6 +12,7 @@ from truespring.models.gauss_points import Points
 from truespring.models.law import Response
 from truespring.models.quadratic import QuadraticPotential
 from truespring.models.symmetric import contracted, identity, trace
+from truespring.potential import VolumeStiffness
 
 
 class _Volume(NamedTuple):
@@ -106,3 +107,19 @@ class QuadraticMeanPotential(QuadraticPotential):
         share = stiffness / at.volumes.sum(axis=0) / 2
         own = response.stress if stress is None else stress
         return at.matrices(own, self._elasticity(at, response, excess), along, share * along)
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the parts of lam and mu in the energy as stiffness of the mean v of each element, times its volume."""
+        if self.constants.plane_stress:
+            return ()
+        elements, dim = self._pattern.elements, self.mesh.dim
+        slope, stiffness, shear = np.empty((*elements.shape, dim)), np.empty(len(elements)), np.empty(len(elements))
+        for first, last in self.slices():
+            at = self._points(positions, first, last)
+            volume, share = self._volume(at), 1 / at.volumes.sum(axis=0)
+            if self.law.trace == "logarithmic":
+                share = share / volume.mean[0] ** 2
+            slope[first:last] = at.own(at.forces(volume.slope)).T.reshape(last - first, -1, dim)
+            stiffness[first:last] = at.own(at.constants.lam * share)
+            shear[first:last] = at.own(at.constants.mu * share)
+        return (VolumeStiffness(elements, slope, stiffness, shear),)

@@ -8,6 +8,8 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.assembly import Pattern
+from truespring.models.element_volumes import ElementVolumes
+from truespring.potential import VolumeStiffness
 from truespring.problem import Problem
 
 # Smallest number of elements for which threads share a slice.
@@ -99,6 +101,16 @@ class VolumeTerm:
 
         stiff = np.maximum(self.kappa, 0.0)
         self.pattern.add(partial(self._matrices, writable(positions), stiff, np.zeros_like(stiff)), values)
+
+    @cached_property
+    def _measures(self) -> ElementVolumes:
+        return ElementVolumes(self.problem, self.pattern.elements, 1)
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the second derivative of the energy by the volume of each element, and the material's mu likewise."""
+        slope, volume = self._measures.at(positions)
+        shear = self.problem.of_elements(lambda material: material.lame.mu) * self._at_rest / volume**2
+        return (VolumeStiffness(self.pattern.elements, slope, self.kappa / self._at_rest, shear),)
 
     def stiffening(self, positions: Floats, first: int = 0, last: int | None = None) -> Floats:
         """Return the stiffness of elements against volume change [N/m], shape (n, n_dof, n_dof)."""

@@ -9,7 +9,7 @@ from truespring.errors import ModelError
 from truespring.models.network import SpringNetwork
 from truespring.models.spring_data import VOLUME_TERM, SpringData
 from truespring.models.volume import VolumeTerm
-from truespring.potential import SparseMatrix
+from truespring.potential import SparseMatrix, VolumeStiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,10 @@ class VolumeSprings:
         matrix = self._checked(self.network.hessian(positions, tension))
         self.term.add_hessian(positions, pressure, matrix.data)
         return matrix
+
+    def volume_stiffness(self, positions: Floats) -> tuple[VolumeStiffness, ...]:
+        """Return the stiffness of the volume term; see Volumetric."""
+        return self.term.volume_stiffness(positions)
 
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return the projected Hessian of the springs plus the positive semidefinite part of the term [N/m]."""
