@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
 from truespring.cli.parser import parse
@@ -58,10 +58,11 @@ def _run_verb(arguments: list[str]) -> int:
         if options is None:
             return WRONG_INPUT
         options.command = command_line(arguments)
-        _load(options)
-        with _threads(options.threads), ExitStack() as options.reserved:
-            code: int = options.run(options)
-            return code
+        with _compiling(options):
+            _load(options)
+            with _threads(options.threads), ExitStack() as options.reserved:
+                code: int = options.run(options)
+                return code
     except TruespringError as error:
         for line in str(error).splitlines():
             say(line)
@@ -96,6 +97,25 @@ def _load(options: argparse.Namespace) -> None:
     finally:
         gc.freeze()
         gc.enable()
+
+
+def _compiling(options: argparse.Namespace) -> AbstractContextManager[None]:
+    """Return a context that compiles kernels in a second process, for the first command after the installation.
+
+    Only for verbs that solve studies in this process. The dimension is a guess from the text of the first study.
+    """
+    if options.verb not in ("verify", "solve") or not Path(options.study[0]).is_file():  # a pipe is read only once
+        return nullcontext()
+    import tomllib
+
+    from truespring.kernels.ahead import compiling_ahead
+
+    try:
+        mesh = tomllib.loads(Path(options.study[0]).read_text(encoding="utf-8"))["mesh"]
+        dim = len(mesh["size"])
+    except (OSError, ValueError, KeyError, TypeError):  # read and checked later
+        return nullcontext()
+    return compiling_ahead(dim) if dim in (2, 3) else nullcontext()
 
 
 @contextmanager
