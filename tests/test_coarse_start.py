@@ -160,6 +160,34 @@ def test_a_state_far_from_its_start_is_not_taken(share: float) -> None:
     assert note.startswith("started") if share > 0.8 else note.endswith("led to a distant state")
 
 
+@dataclass(frozen=True)
+class SofterBelow(Model):
+    """Gaussian springs, of half the stiffness on meshes with few nodes."""
+
+    n_nodes: int
+
+    def potential(self, problem: Problem) -> Potential:
+        assert problem.material is not None
+        soft = replace(problem.material, young=0.5 * problem.material.young)
+        few = problem.mesh.n_nodes < self.n_nodes
+        return ts.Springs("gaussian").potential(replace(problem, material=soft, regions=()) if few else problem)
+
+
+def test_a_mesh_that_is_too_coarse_is_replaced_by_the_next_one() -> None:
+    """States on 49 nodes are far from those on 16: the path is followed on 49 nodes in small steps."""
+    problem = plate(ts.Material(30.0, 0.3), counts=(24, 24))
+    started, _ = both(problem, SofterBelow(40))
+    assert [one.notes for one in started.cost.coarse] == [
+        (),
+        ("not started from a coarser mesh from load factor 1 on: a start from a coarser mesh led to a distant state",),
+        ("started from solutions on 49 nodes",),
+    ]
+    assert started.cost.notes == ("started from solutions on 169 nodes",)
+    # not on meshes that are nearly as large as the finest one
+    assert both(problem, SofterBelow(500))[0].cost.notes[0].endswith("led to a distant state")
+    assert both(problem, SofterBelow(100))[0].cost.notes[0].startswith("started")
+
+
 class OnItsOwnMesh(Model):
     """Gaussian springs that fail on other meshes."""
 

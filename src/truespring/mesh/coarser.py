@@ -13,6 +13,7 @@ from scipy import sparse
 from truespring.arrays import Floats, Ints
 from truespring.mesh.kinds import MIXED
 from truespring.mesh.mesh import Mesh
+from truespring.remembering import remembered
 
 # Largest distance of a node from its place in the lattice, in cells.
 _ON_THE_LATTICE = 1e-6
@@ -33,6 +34,7 @@ class Coarser:
         parents: coarse cell of each element of the finer mesh, shape (finer n_elements,).
         cells: coarse cell of each element of the coarser mesh, shape (coarser n_elements,).
         counts: number of coarse cells along each axis of the lattice, between its ends.
+        thickness: smallest number of cells of the finer mesh along an axis of the lattice.
     """
 
     mesh: Mesh
@@ -40,6 +42,7 @@ class Coarser:
     parents: Ints
     cells: Ints
     counts: tuple[int, ...]
+    thickness: int
 
 
 class _Lattice(NamedTuple):
@@ -60,6 +63,7 @@ class _Lattice(NamedTuple):
     ends: Ints
 
 
+@remembered
 def coarser(mesh: Mesh) -> Coarser | None:
     """Return a mesh of cells twice as large; None unless the mesh is a lattice whose cells are divided alike.
 
@@ -79,7 +83,8 @@ def coarser(mesh: Mesh) -> Coarser | None:
     made = Mesh(nodes, elements.reshape(-1, corners.shape[2]), mesh.element)
     counts = tuple(int(count) for count in lowest.max(axis=0) + 1)
     weights = _weights(lattice.places, used, shape)
-    return Coarser(made, weights, parents.ravel(), np.repeat(np.arange(len(keys)), corners.shape[1]), counts)
+    cells = np.repeat(np.arange(len(keys)), corners.shape[1])
+    return Coarser(made, weights, parents.ravel(), cells, counts, int(lattice.places.max(axis=0).min()))
 
 
 def interpolations(mesh: Mesh, n_smallest: int) -> "tuple[sparse.csr_array[Any], ...]":
@@ -89,16 +94,10 @@ def interpolations(mesh: Mesh, n_smallest: int) -> "tuple[sparse.csr_array[Any],
     larger cells would be far too stiff in bending. Empty unless the mesh is a lattice.
     """
     found: list[sparse.csr_array[Any]] = []
-    while mesh.n_nodes > n_smallest and _thickness(mesh) > 2 and (step := coarser(mesh)) is not None:
+    while mesh.n_nodes > n_smallest and (step := coarser(mesh)) is not None and step.thickness > 2:
         found.append(step.weights)
         mesh = step.mesh
     return tuple(found)
-
-
-def _thickness(mesh: Mesh) -> int:
-    """Return the smallest number of cells along an axis of a lattice, 0 of other meshes."""
-    lattice = _lattice(mesh)
-    return 0 if lattice is None else int(lattice.places.max(axis=0).min())
 
 
 def _keys(places: Ints, shape: Ints) -> Ints:

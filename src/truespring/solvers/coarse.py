@@ -6,7 +6,8 @@ coarse mesh only starts the iteration on the next finer one: the equilibrium fou
 
 A start must not change the branch. Coarse states are used as long as the path there is simple: on the coarsest mesh,
 followed in small steps, each state is stable, and no step moves the body much further than the step before, as it does
-near a bifurcation or a limit point; on the next meshes, the state found is stable and near its start.
+near a bifurcation or a limit point; on the next meshes, the state found is stable and near its start. If it is not, the
+coarsest mesh was too coarse, and the path is followed in small steps on the next one.
 """
 
 from collections.abc import Callable
@@ -31,6 +32,8 @@ from truespring.solvers.solver import Geometry
 _WORTH, _LARGE_STEP = {2: 20_000, 3: 8_000}, 0.3
 # A mesh with fewer nodes is the coarsest, in the plane and in space.
 _COARSEST = {2: 2_500, 3: 1_200}
+# Largest number of free directions for which "auto" factorises: stability is needed here, but not modes.
+_DIRECT = 600
 # Largest step on the coarsest mesh, as a share of the full load.
 _STEP = 1 / 4
 # A step that moves the body by more than this multiple of what the step before suggests is near a critical point.
@@ -53,9 +56,15 @@ _Found = TypeVar("_Found")
 class CoarsePath:
     """The path on a coarse mesh, as long as it is simple; levels are asked for in ascending order."""
 
-    def __init__(self, balance: Balance, admissible: Callable[[Floats], bool], jump: "Jump | None") -> None:
-        """Begin at the undeformed body; `jump` starts from the next coarser mesh, None on the coarsest."""
-        self.balance, self.jump, self._admissible = balance, jump, admissible
+    def __init__(
+        self, balance: Balance, admissible: Callable[[Floats], bool], jump: "Jump | None", small: bool
+    ) -> None:
+        """Begin at the undeformed body; `jump` starts from the next coarser mesh, None on the coarsest.
+
+        `small` states whether small steps on this mesh are cheap compared with the finest one.
+        """
+        self.balance, self.jump, self._admissible, self._small = balance, jump, admissible, small
+        self._marches = jump is None
         nodes = balance.potential.nodes
         still = np.zeros_like(nodes)
         self._last = Equilibrium(0.0, nodes, still, still, 0.0, 0, 0.0, converged=True)
@@ -74,14 +83,17 @@ class CoarsePath:
 
     def displacement(self, level: float) -> Floats | None:
         """Return the displacement at a level [m], shape (n_nodes, dim); None if the path is not simple up to there."""
-        reached = self._marched(level) if self.jump is None else self._jumped(self.jump, level)
+        reached = self._marched(level) if self.jump is None or self._marches else self._jumped(self.jump, level)
         return self._last.positions - self.balance.potential.nodes if reached else None
 
     def _jumped(self, jump: "Jump", level: float) -> bool:
-        """Move to a level by a start from the next coarser mesh; return whether that succeeded."""
+        """Move to a level by a start from the next coarser mesh, else in small steps; return whether that succeeded."""
         found, why = jump.find(level, self._last, self._previous)
-        if found is None or why:
+        if found is None:
             return False
+        if why:
+            self._marches = self._small
+            return self._marches and self._marched(level)
         self._previous, self._last = self._last, found.state
         return True
 
@@ -217,12 +229,15 @@ def jump_from_coarser(balance: Balance, geometry: Geometry, linear: str, load_st
     nodes = balance.potential.nodes
     if len(nodes) < _WORTH.get(nodes.shape[1], np.inf) or load_step < _LARGE_STEP:
         return None
-    jump = _unless_it_fails(lambda: _jump(balance, geometry, linear), balance)
+    jump = _unless_it_fails(lambda: _jump(balance, geometry, linear, len(nodes) // _MUCH_COARSER), balance)
     return jump if jump is not None and _MUCH_COARSER * jump.coarsest <= len(nodes) else None
 
 
-def _jump(balance: Balance, geometry: Geometry, linear: str) -> Jump | None:
-    """Return starts from the next coarser mesh, whose own starts are from the one after it, and so on."""
+def _jump(balance: Balance, geometry: Geometry, linear: str, n_small: int) -> Jump | None:
+    """Return starts from the next coarser mesh, whose own starts are from the one after it, and so on.
+
+    Steps are small on the coarsest mesh, and if need be on meshes of up to `n_small` nodes.
+    """
     nodes = balance.potential.nodes
     if len(nodes) < _COARSEST[nodes.shape[1]] or not isinstance(balance.potential, Stressed):
         return None
@@ -231,10 +246,12 @@ def _jump(balance: Balance, geometry: Geometry, linear: str) -> Jump | None:
         return None
     tolerance = max(balance.tolerance, _TOLERANCE)
     nodes, held, volumes = coarse.potential.nodes, coarse.loading.held, volumes_of(coarse.potential)
-    chosen = choose(linear, nodes, held, coarse.geometry.interpolations, volumes)
+    linear_here = "multigrid" if linear == "auto" and (~held).sum() > _DIRECT else linear
+    chosen = choose(linear_here, nodes, held, coarse.geometry.interpolations, volumes)
     # Without a reporter, whose exceptions are not to be taken for failures of the coarse mesh.
     below = Balance(coarse.potential, coarse.loading, tolerance, balance.max_iterations, chosen)
-    path = CoarsePath(below, coarse.geometry.admissible, _jump(below, coarse.geometry, linear))
+    still_coarser = _jump(below, coarse.geometry, linear, n_small)
+    path = CoarsePath(below, coarse.geometry.admissible, still_coarser, len(nodes) <= n_small)
     return Jump(balance, geometry.admissible, path, coarse.weights)
 
 
