@@ -2,7 +2,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test verification validity table1 hourglass bench viewer clean
+# Debian's PETSc (apt-get install libpetsc-real3.18-dev openmpi-bin libopenmpi-dev), and the petsc4py of its version.
+PETSC_DIR ?= /usr/lib/petscdir/petsc3.18/x86_64-linux-gnu-real
+PETSC4PY ?= 3.18.5
+
+.PHONY: demo petsc test verification validity table1 hourglass bench viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -14,8 +18,8 @@ test: .venv/test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q -n 2 -m "not verification"
 
-# Runs the long tests, and rebuilds docs/verification.md and the picture of the README.
-verification: .venv/test
+# Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the picture of the README.
+verification: .venv/test $(if $(wildcard $(PETSC_DIR)/include/petscversion.h),.venv/petsc)
 	$(BIN)/python -m pytest -q -n 2 -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
@@ -41,6 +45,9 @@ bench: .venv/test .venv-peers/installed
 viewer:
 	cd viewer && npm ci --ignore-scripts && npm run build
 
+# Builds petsc4py for linear = "petsc", see docs/large.md.
+petsc: .venv/petsc
+
 .venv/created:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "truespring needs Python 3.11 or newer; try: make PYTHON=python3.12 ...")'
 	$(PYTHON) -m venv .venv
@@ -53,6 +60,11 @@ viewer:
 .venv/test: .venv/created pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	touch $@ .venv/demo
+
+.venv/petsc: .venv/test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'setuptools<81' 'cython<3.1' 'mpi4py>=4'
+	PETSC_DIR=$(PETSC_DIR) PETSC_ARCH= $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps petsc4py==$(PETSC4PY)
+	touch $@
 
 .venv-peers/installed: .venv/created benchmarks/peers.txt
 	$(PYTHON) -m venv .venv-peers

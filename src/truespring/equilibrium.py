@@ -13,12 +13,15 @@ from truespring.arrays import Floats
 from truespring.coarsening import CoarseBody
 from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
 from truespring.deprecation import renamed_argument
-from truespring.errors import ModelError, TruespringError, one_line
+from truespring.errors import ModelError, OneProcessError, TruespringError, one_line
+from truespring.linear import sharing
 from truespring.mesh import interpolations, select
 from truespring.models import Model, as_model, check_fibres
+from truespring.piecewise import Piecewise, own_rows
 from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
+from truespring.ranks import Communicator, ranks_of
 from truespring.solution import Solution as Solution
 from truespring.solution import State as State
 from truespring.solution import Status as Status
@@ -57,26 +60,37 @@ def solve(
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
     check_fibres(problem, model)
+    ranks = sharing(solver.linear)
     if isinstance(model, Program):
+        if ranks.size > 1 and model.solves:
+            raise ModelError(f"{model.label}: another program runs beside one process only: start one process")
         return model.run(problem, solver, progress, timeout)
     moduli = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
     from truespring.kernels.threads import compiling
 
     with compiling() as compiled:
         started = time.perf_counter()
-        path = _solve(problem, model, solver, _timed(progress, timeout))
+        try:
+            path = _solve(problem, model, solver, _timed(progress, timeout, ranks), ranks)
+        except Exception as error:
+            if not ranks.is_on_all(error):
+                raise OneProcessError(error_words(error)) from error
+            raise
         return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=moduli)
 
 
-def _timed(report: Reporter | None, timeout: float | None) -> Reporter | None:
-    """Return a reporter that raises TimeoutError after the time limit [s]."""
+def _timed(report: Reporter | None, timeout: float | None, ranks: Communicator) -> Reporter | None:
+    """Return a reporter that raises TimeoutError on all processes after the time limit [s]."""
     if timeout is None:
         return report
     end = time.monotonic() + timeout
 
-    def timed(load_factor: float, iteration: int, residual: float) -> None:
+    def check() -> None:
         if time.monotonic() > end:
             raise TimeoutError(f"the time limit of {timeout:g} s was reached (--timeout)")
+
+    def timed(load_factor: float, iteration: int, residual: float) -> None:
+        ranks.together(check)
         if report:
             report(load_factor, iteration, residual)
 
@@ -105,20 +119,23 @@ def check_solver(problem: Problem, solver: Solver) -> None:
     solver.check(problem.loading, geometry_of(problem))
 
 
-def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | None) -> Solution:
+def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | None, ranks: Communicator) -> Solution:
     """Return the solution of a model that has a potential, without its time and moduli."""
-    potential = model.potential(problem)
+    alone = ranks.size == 1
+    potential = model.potential(problem) if alone else Piecewise(model, problem, ranks)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
         raise ModelError(
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
     geometry = replace(geometry_of(problem, model.finite), interpolations=partial(_interpolations, problem, potential))
-    if model.finite and model.any_mesh:
+    if model.finite and model.any_mesh and alone:
         geometry = replace(geometry, coarse_body=partial(_coarse_body, model, CoarseBody.finest(problem, loading)))
-    solver.check(problem.loading, geometry)
+    ranks.together(lambda: solver.check(problem.loading, geometry))
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
+    if isinstance(potential, Piecewise):
+        loading = own_rows(loading, potential.layout)
     found, broken = _followed(solver.follow(potential, loading, report, geometry), potential)
     found, below_rounding = _above_rounding(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
@@ -198,6 +215,8 @@ def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list
     except TruespringError:
         raise
     except (ArithmeticError, ValueError, RuntimeError, MemoryError, TimeoutError) as error:  # as numpy and SciPy raise
+        if not ranks_of(potential).is_on_all(error):
+            raise OneProcessError(error_words(error)) from error
         at = found[-1].load_factor if found else 0.0
         broken = (f"stopped beyond load factor {at:.6g}: {error_words(error)}; {Status.NOT_CONVERGED.advice}",)
         return found or [_rest(potential.nodes)], broken

@@ -56,6 +56,10 @@ class OutputError(TruespringError):
     """An output folder cannot be written, or another run is writing to it."""
 
 
+class OneProcessError(BaseException):
+    """An exception on one of several processes, of which the others do not know: all of them have to end."""
+
+
 def nearest(word: str, allowed: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the allowed word nearest to `word`, empty if none is near."""
     close = close_words(word, allowed)

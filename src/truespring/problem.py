@@ -131,20 +131,16 @@ class Problem:
         """For each kind of elements their numbers, shape (n,), and a problem of them without supports and loads."""
         if self.mesh.element != MIXED:
             return ((np.arange(len(self.mesh.elements)), self),)
-        return tuple(
-            (
-                numbers,
-                replace(
-                    self,
-                    mesh=part,
-                    supports=(),
-                    loads=(),
-                    regions=_regions_of(self, self.material_numbers[numbers]),
-                    stated=False,
-                ),
-            )
-            for numbers, part in self.mesh.blocks
-        )
+        return tuple((numbers, self._on(part, numbers)) for numbers, part in self.mesh.blocks)
+
+    def part(self, numbers: Ints, nodes: Ints) -> "Problem":
+        """Return a problem of some elements without supports and loads; `numbers` and `nodes` as in `Mesh.part`."""
+        return self._on(self.mesh.part(numbers, nodes), numbers)
+
+    def _on(self, part: Mesh, numbers: Ints) -> "Problem":
+        """Return a problem without supports and loads on a mesh of the elements `numbers`, shape (n,)."""
+        regions = _regions_of(self, self.material_numbers[numbers])
+        return replace(self, mesh=part, supports=(), loads=(), regions=regions, stated=False)
 
     def of_elements(self, value: Callable[[Material], float]) -> Floats:
         """Return `value` of the material of each element, shape (n_elements,), in the unit of `value`."""

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
+from truespring.cli.launch import Launch, launch
 from truespring.cli.parser import parse
 from truespring.cli.printing import StandardOutputError, say, standard_output
 from truespring.cli.verb import CLOSED_PIPE, CONVERGED, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT
-from truespring.errors import TruespringError, one_line
+from truespring.errors import OneProcessError, TruespringError, one_line
 from truespring.report.command import command_line
 
 
@@ -25,10 +26,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):  # no error for characters that the terminal cannot show
             stream.reconfigure(errors="backslashreplace")
-    try:
-        code = _run_verb(sys.argv[1:] if arguments is None else list(arguments))
-    except SystemExit as end:  # from the parser, after it has printed the help or an error
-        code = end.code if isinstance(end.code, int) else CONVERGED
+    started = launch(os.environ)
+    with started.silenced():
+        try:
+            code = _run_verb(sys.argv[1:] if arguments is None else list(arguments), started)
+        except SystemExit as end:  # from the parser, after it has printed the help or an error
+            code = end.code if isinstance(end.code, int) else CONVERGED
+    code = started.end(code)
     try:
         with standard_output():
             sys.stdout.flush()
@@ -51,17 +55,19 @@ def _output_failed(reason: OSError) -> int:
     return CLOSED_PIPE if closed else NOT_CONVERGED
 
 
-def _run_verb(arguments: list[str]) -> int:
+def _run_verb(arguments: list[str], started: Launch) -> int:
     """Parse and run a command line; return its exit code, and print an error as one line."""
     try:
         options = parse(arguments)
         if options is None:
             return WRONG_INPUT
-        options.command = command_line(arguments)
+        started.check_verb(options.verb)
+        options.command, options.launch = command_line(arguments), started
         with _compiling(options):
             _load(options)
             with _threads(options.threads), ExitStack() as options.reserved:
                 code: int = options.run(options)
+                started.orderly = True
                 return code
     except TruespringError as error:
         for line in str(error).splitlines():
@@ -76,6 +82,9 @@ def _run_verb(arguments: list[str]) -> int:
         return _output_failed(error.reason)
     except OSError as error:
         say(f"{error.filename or type(error).__name__}: {error.strerror or one_line(str(error))}")
+        return NOT_CONVERGED
+    except OneProcessError as error:
+        say(f"one of {started.size} processes failed: {error}")
         return NOT_CONVERGED
     except Exception as error:
         if sys.flags.dev_mode:  # with python -X dev show the traceback
@@ -102,9 +111,11 @@ def _load(options: argparse.Namespace) -> None:
 def _compiling(options: argparse.Namespace) -> AbstractContextManager[None]:
     """Return a context that compiles kernels in a second process, for the first command after the installation.
 
-    Only for verbs that solve studies in this process. The dimension is a guess from the text of the first study.
+    Only for verbs that solve studies in one process. The dimension is a guess from the text of the first study.
     """
-    if options.verb not in ("verify", "solve") or not Path(options.study[0]).is_file():  # a pipe is read only once
+    if options.launch.size > 1 or options.verb not in ("verify", "solve"):
+        return nullcontext()
+    if not Path(options.study[0]).is_file():  # a pipe is read only once
         return nullcontext()
     import tomllib
 

@@ -30,6 +30,10 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.study import read_studies, realised_moduli, run, verify_command, write_overview, write_rest
 
     studies = read_studies(options.study)
+    options.launch.check_studies(studies)
+    if options.launch.rank:
+        shared = [run(study, None, comparing, options.timeout) for study in studies]
+        return CONVERGED if all(result.converged for result in shared) else NOT_CONVERGED
     reserve(options, studies)
     screen = console(options)
     results = []

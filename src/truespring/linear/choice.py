@@ -3,6 +3,7 @@
 Held directions are excluded: right sides and solutions, shape (n_nodes, dim), are zero there.
 """
 
+import importlib.util
 from collections.abc import Callable, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol
@@ -11,9 +12,11 @@ from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError, nearest
 from truespring.linear.direct import FACTORISERS, Direct, direct_bytes, present
 from truespring.linear.iterative import Multigrid
+from truespring.linear.petsc import INSTALL, MODULES, Petsc
 from truespring.linear.pressure import PressureMultigrid
 from truespring.memory import available_memory
 from truespring.potential import SparseMatrix, VolumeStiffness
+from truespring.ranks import ALONE, Communicator, Layout, layout_alone, started_processes
 
 # Largest number of free directions for which "auto" factorises, in the plane and in space: as fast as multigrid there.
 _DIRECT = MappingProxyType({2: 8_000, 3: 3_000})
@@ -72,7 +75,7 @@ class LinearSolver(Protocol):
 
 
 #: Allowed values of a solver's `linear`.
-LINEAR = ("auto", "direct", "multigrid", *FACTORISERS)
+LINEAR = ("auto", "direct", "multigrid", "petsc", *FACTORISERS)
 
 
 def check_linear(name: str) -> None:
@@ -81,6 +84,19 @@ def check_linear(name: str) -> None:
         raise ProblemError(f"linear = '{name}' is unknown{nearest(name, LINEAR)}; allowed: {', '.join(LINEAR)}")
     if name in FACTORISERS and not present(name):
         raise ProblemError(f"linear = '{name}' is not installed; try: pip install {FACTORISERS[name].package}")
+    missing = _missing(MODULES) if name == "petsc" else []
+    if missing:
+        raise ProblemError(f"linear = 'petsc' needs {' and '.join(missing)}; {INSTALL}")
+
+
+def _missing(modules: Sequence[str]) -> list[str]:
+    """Return those of some Python modules that are not installed."""
+    return [name for name in modules if importlib.util.find_spec(name) is None]
+
+
+def sharing(name: str) -> Communicator:
+    """Return the processes that share a body with the linear solver `name`: those of mpiexec with "petsc", else one."""
+    return started_processes() if name == "petsc" else ALONE
 
 
 def choose(
@@ -89,12 +105,14 @@ def choose(
     held: Bools,
     coarser: Callable[[], Sequence[Any]] = tuple,
     volumes: Callable[[Floats], Sequence[VolumeStiffness]] | None = None,
+    layout: Layout | None = None,
 ) -> LinearSolver:
     """Return the linear solver `name`, one of LINEAR; "auto" chooses by size and dimension.
 
     `nodes` [m] and `held` have shape (n_nodes, dim). `coarser` returns the weights of the nodes from those of a coarser
     mesh, of these from a still coarser one, and so on, for multigrid: sparse, shape (n, n_coarse). `volumes` returns
-    the stiffness against changes of volume at positions [m], see Volumetric.
+    the stiffness against changes of volume at positions [m], see Volumetric. `layout` has the nodes of each process,
+    for "petsc"; by default one process has all.
 
     Raises ProblemError if a factorisation does not fit in memory, by estimate.
     """
@@ -102,6 +120,8 @@ def choose(
     n_free, dim = int((~held).sum()), nodes.shape[1]
     if name == "auto":
         name = "direct" if dim not in _DIRECT or n_free <= _DIRECT[dim] else "multigrid"
+    if name == "petsc":
+        return Petsc(held, layout or layout_alone(len(nodes)))
     if name == "multigrid":
         return PressureMultigrid(nodes, held, coarser(), volumes) if volumes else Multigrid(nodes, held, coarser())
     needed, there = direct_bytes(nodes.shape), available_memory()

@@ -9,6 +9,8 @@ from truespring.arrays import Floats
 
 Product = Callable[[Floats, Floats], float]
 Preconditioner = Callable[[Floats], Floats]
+#: Sums a number over processes that have rows of the vectors each.
+Total = Callable[[float], float]
 
 # The lowest Ritz value is accepted if its error bound is below this share of it.
 _SETTLED = 0.3
@@ -60,16 +62,21 @@ def _turn_towards(z: Floats, share: float, p: Floats) -> None:
 
 
 def _advance(length: float, p: Floats, q: Floats, x: Floats, r: Floats) -> float:
-    """Add length p to x, subtract length q from r, and return the norm of r."""
+    """Add length p to x, subtract length q from r, and return r . r."""
     from truespring.kernels import vectors
     from truespring.kernels.threads import run
 
     flat = (p.ravel(), q.ravel(), x.ravel(), r.ravel())
-    return float(np.sqrt(sum(run(vectors.advance, x.size, length, *flat, smallest=vectors.SMALLEST))))
+    return float(sum(run(vectors.advance, x.size, length, *flat, smallest=vectors.SMALLEST)))
 
 
 def conjugate_gradients(
-    product: Product, precondition: Preconditioner, right: Floats, accuracy: float, max_iterations: int
+    product: Product,
+    precondition: Preconditioner,
+    right: Floats,
+    accuracy: float,
+    max_iterations: int,
+    total: Total = float,
 ) -> Solved:
     """Return x of A x = right, shape (n, k), with a relative residual of at most `accuracy`.
 
@@ -79,24 +86,27 @@ def conjugate_gradients(
         right: right side, shape (n, k).
         accuracy: relative residual of the solution.
         max_iterations: largest number of iterations.
+        total: sum over processes, if each has rows of the vectors.
 
     Raises IndefiniteError if A has negative curvature along a direction, SlowError if the iterations do not reach the
     accuracy or the preconditioner is not positive definite.
     """
     x, r = np.zeros(right.shape), right.copy()
-    target = accuracy * norm(right)
+    target = accuracy * np.sqrt(total(scalar_product(right, right)))
     p, q = np.zeros(right.shape), np.empty(right.shape)
     previous = np.inf
     for iteration in range(1, max_iterations + 1):
         z = precondition(r)
-        slope = scalar_product(r, z)
-        if not slope > 0:
-            raise SlowError(x)  # the preconditioner is that of another state and not positive definite here
+        slope = total(scalar_product(r, z))
+        if not slope > 0:  # the preconditioner is not positive definite, because of this matrix or of an earlier one
+            if product(z, q) < 0:
+                raise IndefiniteError("the matrix is not positive")
+            raise SlowError(x)
         _turn_towards(z, slope / previous, p)
         curvature = product(p, q)
         if not curvature > 0:
             raise IndefiniteError("the matrix is not positive")
-        size = _advance(slope / curvature, p, q, x, r)
+        size = np.sqrt(total(_advance(slope / curvature, p, q, x, r)))
         if size <= target:
             return Solved(x, iteration)
         previous = slope
@@ -110,8 +120,10 @@ class Lowest(NamedTuple):
     iterations: int
 
 
-def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Floats) -> Lowest:
+def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Floats, total: Total = float) -> Lowest:
     """Return an estimate of the lowest eigenvalue of the preconditioned matrix, from `start`, shape (n, k).
+
+    `total` sums over processes, if each has rows of the vectors.
 
     The coefficients of conjugate gradients form the tridiagonal matrix of Lanczos (Golub and Van Loan, 10.3 and 11.5).
     A direction of negative curvature ends the iteration: its Rayleigh quotient is returned.
@@ -121,18 +133,20 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     r, x = start.copy(), np.zeros(start.shape)
     p, q = np.zeros(start.shape), np.empty(start.shape)
     previous, length = np.inf, 1.0
+    enough = _ENLARGED * np.sqrt(total(start.size))
     diagonal: list[float] = []
     beside: list[float] = []
     for iteration in range(1, _MOST + 1):
         z = precondition(r)
-        slope = scalar_product(r, z)
-        if not slope > 0:
-            return Lowest(None, iteration)
+        slope = total(scalar_product(r, z))
+        if not slope > 0:  # the preconditioner is not positive definite, because of this matrix or of an earlier one
+            curvature = product(z, q)
+            return Lowest(curvature if curvature < 0 else None, iteration)
         share = slope / previous
         if diagonal:
             beside.append(np.sqrt(share) / length)
             values, vectors = eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]))
-            long_enough = iteration > _FEWEST or _enlarged(values.astype(np.float64)) > _ENLARGED * np.sqrt(start.size)
+            long_enough = iteration > _FEWEST or _enlarged(values.astype(np.float64)) > enough
             if long_enough and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
                 return Lowest(float(values[0]), iteration)
         _turn_towards(z, share, p)

@@ -23,6 +23,8 @@ from truespring.mesh.rows import ascending, distinct_rows
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
 _DEGENERATE = 1e-9
+# Share of the elements of a bounding box below which equal bricks have a stepped surface.
+_FILLED = 0.99
 
 
 _NONE: Mapping[str, Ints] = MappingProxyType({})
@@ -222,12 +224,42 @@ class Mesh:
             Block(numbers, self._part(kind, own, numbers)) for kind, (numbers, own) in unmerged(self.elements).items()
         )
 
+    @cached_property
+    def is_stepped(self) -> bool:
+        """Whether the mesh consists of equal hexahedra that do not fill their bounding box, as voxels do.
+
+        The box has the directions of the edges of the elements. Of a `part`, it is that of the whole mesh.
+        """
+        if self.element != "hexahedron" or not self.forms.single:
+            return False
+        corners = self.nodes[self.elements[0]]
+        edges = corners[[1, 3, 4]] - corners[0]
+        counts = np.ptp(self.nodes @ np.linalg.inv(edges), axis=0)
+        return bool(len(self.elements) < _FILLED * np.prod(counts))
+
+    def part(self, numbers: Ints, nodes: Ints) -> "Mesh":
+        """Return a mesh of some elements, without checks, groups and middle nodes.
+
+        `numbers` are the elements, shape (n,), and `nodes` the distinct nodes of them, in the order of the new mesh.
+        """
+        place = np.zeros(self.n_nodes, dtype=np.int64)
+        place[nodes] = np.arange(len(nodes))
+        found = self._unchecked(self.nodes[nodes], place[self.elements[numbers]], self.element, numbers)
+        if len(found.blocks) == 1:
+            found = found.blocks[0].mesh
+        found.__dict__["is_stepped"] = self.is_stepped
+        return found
+
     def _part(self, kind: str, elements: Ints, numbers: Ints) -> "Mesh":
         """Return a mesh of some elements of one kind on all nodes, without checks; `numbers` are theirs in this one."""
+        return self._unchecked(self.nodes, elements, kind, numbers)
+
+    def _unchecked(self, nodes: Floats, elements: Ints, kind: str, numbers: Ints) -> "Mesh":
+        """Return a mesh of the elements `numbers` of this one, without checks and groups."""
         part = object.__new__(Mesh)
         groups = dict.fromkeys(("node_groups", "element_groups", "facet_groups"), _NONE)
         vectors = MappingProxyType(self.vectors_of(numbers))
-        own = {"nodes": self.nodes, "elements": elements, "element": kind, "notes": (), "element_vectors": vectors}
+        own = {"nodes": nodes, "elements": elements, "element": kind, "notes": (), "element_vectors": vectors}
         part.__dict__.update(own, **groups)
         return part
 

@@ -1,6 +1,6 @@
 """The finite element model."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from truespring.errors import ModelError, nearest
 from truespring.models.fem_potential import FemPotential
@@ -69,6 +69,11 @@ class Fem(Model):
     def element_is_open(self) -> bool:
         """Whether the mesh determines the interpolation."""
         return self.element is None
+
+    def on_pieces(self, problem: Problem) -> "Fem | None":
+        """Return the model with the interpolation on the whole mesh; None for elements of second order."""
+        chosen = self.chosen_element(problem)
+        return None if chosen.startswith("quadratic") else replace(self, element=chosen)
 
     def second_order(self, problem: Problem) -> "Fem | None":
         """Return the model with elements of second order, or None if the elements of this model are not linear."""

@@ -22,8 +22,6 @@ HOURGLASS_LIMITS: Mapping[str, float] = MappingProxyType({"quadrilateral": 0.0, 
 STEPPED_HOURGLASS = 1.2
 #: Weight below which nodes are joined by no spring, over the largest: rounding.
 ROUNDING = 1e-12
-# Share of the elements of a bounding box below which equal bricks have a stepped surface.
-_FILLED = 0.99
 
 # Hourglass modes of a hexahedron, the products yz, xz, xy and xyz of its corners' signs, shape (8, 4).
 _SIGNS = 2.0 * CORNERS - 1
@@ -34,20 +32,7 @@ def default_hourglass(problem: Problem, poisson: float) -> float:
     """Return the default of `hourglass` for a material on the mesh of a problem; see docs/hourglass.md."""
     if problem.mesh.dim == 2:
         return 1.0
-    return STEPPED_HOURGLASS if has_stepped_surface(problem.mesh) else 1 / (1 + poisson**2)
-
-
-def has_stepped_surface(mesh: Mesh) -> bool:
-    """Return whether a mesh consists of equal hexahedra that do not fill their bounding box, as voxels do.
-
-    The box has the directions of the edges of the elements.
-    """
-    if mesh.element != "hexahedron" or not mesh.forms.single:
-        return False
-    corners = mesh.nodes[mesh.elements[0]]
-    edges = corners[[1, 3, 4]] - corners[0]
-    counts = np.ptp(mesh.nodes @ np.linalg.inv(edges), axis=0)
-    return bool(len(mesh.elements) < _FILLED * np.prod(counts))
+    return STEPPED_HOURGLASS if problem.mesh.is_stepped else 1 / (1 + poisson**2)
 
 
 def hourglass_values(problem: Problem, hourglass: float | None) -> Floats:

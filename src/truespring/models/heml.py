@@ -64,6 +64,10 @@ class Heml(Model):
         """Name in figures and tables."""
         return f"HEML ({LAWS[self.law].label})"
 
+    def on_pieces(self, problem: Problem) -> "Heml":
+        """Return the model itself: its energy is a sum over elements."""
+        return self
+
     def second_order(self, problem: Problem) -> Fem:
         """Return finite elements of second order with the same law, the limit of this model on fine meshes."""
         return Fem(self.law)

@@ -86,6 +86,14 @@ class Model:
         """Return the interpolation of finite elements on the mesh, one of ELEMENTS; None for other models."""
         return None
 
+    def on_pieces(self, problem: Problem) -> "Model | None":
+        """Return the model whose potentials on pieces of the mesh add up to that of this model on all of it.
+
+        None if the energy is not such a sum over elements. Pieces have no elements in common. What depends on the whole
+        mesh, such as a default, is fixed in the model that is returned.
+        """
+        return None
+
     def second_order(self, problem: Problem) -> "Model | None":
         """Return a model with elements of second order and the same limit on fine meshes; None if there is none."""
         return None

@@ -226,6 +226,17 @@ class Springs(Model):
         """Return warnings: effective moduli that differ from those of the material, locking."""
         return springs_warnings(problem, self)
 
+    def on_pieces(self, problem: Problem) -> "Springs | None":
+        """Return the springs as a sum over elements; None for a mean, a volume term or springs of second order.
+
+        A spring at the boundary of a piece may be negative there and not in the sum, which is checked here.
+        """
+        if self.sharing == "single" or self.volume or self.element is not None:
+            return None
+        if self.rule is None or RULES[self.rule].potential is None:
+            self.network(problem, self.element_stiffness(problem))
+        return self.allowing_negative()
+
     def allowing_negative(self) -> "Springs":
         """Return a copy that allows negative stiffness."""
         return replace(self, allow_negative=True)

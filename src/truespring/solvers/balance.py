@@ -14,6 +14,7 @@ from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
 from truespring.potential import Potential, SparseMatrix, Unstressed
+from truespring.ranks import ranks_of
 from truespring.solvers.cost import Cost
 
 #: Called after each iteration with load factor, iteration and relative residual.
@@ -95,6 +96,7 @@ class Balance:
         spent: number of Newton iterations at all levels.
         free: true for free directions, shape (n_nodes, dim).
         size: diagonal of the undeformed body's bounding box [m].
+        ranks: the processes that share the potential: matrices have the rows of each, all else is that of all nodes.
     """
 
     potential: Potential
@@ -108,6 +110,7 @@ class Balance:
 
     def __post_init__(self) -> None:
         self.free = ~self.loading.held
+        self.ranks = ranks_of(self.potential)
         self.size = float(np.linalg.norm(np.ptp(self.potential.nodes, axis=0)))
 
     def total_energy(self, positions: Floats, load_factor: float) -> tuple[float, float]:
@@ -148,6 +151,18 @@ class Balance:
         blocks.sort_indices()
         return blocks
 
+    def product(self, matrix: SparseMatrix, motion: Floats) -> Floats:
+        """Return a matrix times a displacement [m], shape (n_nodes, dim)."""
+        return self.ranks.joined((matrix @ motion.ravel()).reshape(motion.shape))
+
+    def diagonal(self, matrix: SparseMatrix) -> Floats:
+        """Return the diagonal of a matrix, shape (n_nodes, dim)."""
+        return self.ranks.joined(matrix.diagonal().reshape(self.free.shape))
+
+    def is_finite(self, matrix: SparseMatrix) -> bool:
+        """Return whether the values of a matrix and their sum are finite."""
+        return bool(np.isfinite(self.ranks.sum(float(matrix.data.sum()))))
+
     def accuracy(self, residual: float) -> float:
         """Return the relative accuracy for a linear system at a relative residual of the balance."""
         last = self.tolerance / residual / 3 if residual else 1.0
@@ -164,7 +179,7 @@ class Balance:
         centred = np.minimum(np.abs(positions - positions.mean(axis=0)), _LARGEST_STRETCH * self.size)
         rows, zero = (tangent.indptr, tangent.indices, tangent.data), (0.0,) * centred.shape[1]
         squares = run(blocks.rounding, len(centred), *rows, centred, self.loading.held, zero)
-        return 8 * _EPS * float(np.sqrt(sum(squares)))
+        return 8 * _EPS * float(np.sqrt(self.ranks.sum(float(sum(squares)))))
 
     def judged(self, state: Equilibrium) -> Found:
         """Return an equilibrium with its stability, and the tangent if it was factorised."""
@@ -206,7 +221,10 @@ class Balance:
         return self.judged(found.state) if self.go_direct("an unstable state was found") else found
 
     def go_direct(self, reason: str) -> bool:
-        """Use factorisations from now on; return whether they fit in memory."""
+        """Use factorisations from now on; return whether they fit in memory and one process has the whole matrix."""
+        if self.ranks.size > 1:
+            self.note(f"{reason}: a factorisation would help, but needs one process")
+            return False
         try:
             directly = choose("direct", self.potential.nodes, self.loading.held)
         except ProblemError:
@@ -321,7 +339,7 @@ def stepped(
 
     None if the tangent is not positive definite.
     """
-    if not np.isfinite(tangent.data.sum()):
+    if not balance.is_finite(tangent):
         return None
     try:
         step = _solved(balance, tangent, positions, right, accuracy)

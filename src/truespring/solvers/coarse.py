@@ -125,8 +125,7 @@ def _linear_response(balance: Balance, level: float) -> Floats | None:
     """Return the displacement at a level by the tangent of the undeformed body [m], shape (n_nodes, dim)."""
     nodes, loading = balance.potential.nodes, balance.loading
     tangent, motion = balance.hessian(nodes, 0.0), loading.motion(level)
-    pulled = (tangent @ motion.ravel()).reshape(motion.shape)
-    right = np.where(balance.free, loading.force(nodes, level) - pulled, 0.0)
+    right = np.where(balance.free, loading.force(nodes, level) - balance.product(tangent, motion), 0.0)
     step = stepped(balance, tangent, nodes, right, _LINEAR)
     return None if step is None else step + motion
 

@@ -151,7 +151,7 @@ def _check(steps: int, max_iterations: int, tolerance: float, linear: str) -> No
     if not 0 < tolerance < 1:
         raise ProblemError(f"tolerance = {tolerance}: must be between 0 and 1")
     check_linear(linear)
-    if linear in ("auto", "multigrid"):
+    if linear not in ("direct", *FACTORISERS):
         allowed = ", ".join(("direct", *FACTORISERS))
         raise ProblemError(f"linear = '{linear}': path following needs factorisations; allowed: {allowed}")
 

@@ -76,7 +76,7 @@ def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, force
 
 def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats, residual: float) -> Step | None:
     """Return a descent direction by the tangent if it is positive definite, else by an approximation that is."""
-    if not np.isfinite(tangent.data).all():
+    if not balance.is_finite(tangent):
         return None
     for candidate in _candidates(balance, positions, tangent):
         direction = stepped(balance, candidate, positions, -force, balance.accuracy(residual))
@@ -95,7 +95,7 @@ def _candidates(balance: Balance, positions: Floats, tangent: SparseMatrix) -> I
     if isinstance(balance.potential, Projectable):
         projected = balance.in_blocks(balance.potential.projected_hessian(positions))
         yield projected
-    diagonal = np.abs(projected.diagonal())
+    diagonal = np.abs(balance.diagonal(projected)).ravel()
     for share in (1e-6, 1e-4, 1e-2, 1.0, 10.0):
         yield balance.in_blocks(projected + sparse.diags_array(share * (diagonal + diagonal.mean())).tocsr())
 

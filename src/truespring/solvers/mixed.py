@@ -95,7 +95,7 @@ def _step(
             candidate = balance.in_blocks(balance.potential.projected_hessian(positions))
         right = -watch.force
         if motion is not None:
-            right = np.where(balance.free, right - (candidate @ motion.ravel()).reshape(right.shape), 0.0)
+            right = np.where(balance.free, right - balance.product(candidate, motion), 0.0)
         step = stepped(balance, candidate, positions, right, balance.accuracy(watch.residual))
         if step is not None:
             return step if motion is None else step + motion

@@ -8,9 +8,10 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.conditions import Loading
 from truespring.errors import ProblemError, nearest
-from truespring.linear.choice import check_linear, choose
+from truespring.linear.choice import LinearSolver, check_linear, choose
 from truespring.linear.gradients import norm
 from truespring.potential import Potential, Stressed, volumes_of
+from truespring.ranks import layout_of
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Reporter
 from truespring.solvers.branching import stabilised
@@ -34,8 +35,8 @@ class Newton(Solver):
         max_cutbacks: largest number of halvings of a load step.
         method: "auto" uses mixed integration points if the potential has a stress, and line search on the energy if
             these find no stable state nearby; "mixed" and "line-search" use one of them only.
-        linear: "auto" chooses by size and dimension; "multigrid"; "direct" for the first installed library of
-            factorisations, or one of them: "scipy", "rslab", "pardiso".
+        linear: "auto" chooses by size and dimension; "multigrid"; "petsc", which several processes may share;
+            "direct" for the first installed library of factorisations, or one of them: "scipy", "rslab", "pardiso".
         coarse_start: whether large load steps on large lattices start from the solution on coarser meshes.
     """
 
@@ -73,7 +74,7 @@ class Newton(Solver):
         """
         geometry = geometry or Geometry()
         admissible = geometry.admissible
-        linear = choose(self.linear, potential.nodes, loading.held, geometry.interpolations, volumes_of(potential))
+        linear = linear_of(self.linear, potential, loading, geometry)
         balance = Balance(potential, loading, self.tolerance, self.max_iterations, linear, report)
         last = descend(balance, 0.0, potential.nodes)
         yield self._with_cost(last.state, balance)
@@ -200,7 +201,7 @@ class Nearby(Newton):
             loading,
             self.tolerance,
             self.max_iterations,
-            choose(self.linear, potential.nodes, loading.held, geometry.interpolations, volumes_of(potential)),
+            linear_of(self.linear, potential, loading, geometry),
             report,
         )
         positions = potential.nodes.copy() if self.start is None else self.start(potential)
@@ -211,6 +212,12 @@ class Nearby(Newton):
         if found is None or not found.state.converged or not admissible(found.state.positions):
             found = descend(balance, 1.0, positions)
         yield self._with_cost(found.state, balance)
+
+
+def linear_of(name: str, potential: Potential, loading: Loading, geometry: Geometry) -> LinearSolver:
+    """Return the linear solver `name` for a potential, see `choose`."""
+    volumes, layout = volumes_of(potential), layout_of(potential)
+    return choose(name, potential.nodes, loading.held, geometry.interpolations, volumes, layout)
 
 
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
@@ -234,10 +241,10 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
     motion = loading.motion(level) - loading.motion(state.load_factor)
     yield state.positions + motion
     if last.tangent is not None:
-        push = advance * loading.force(state.positions).ravel()
+        push = advance * loading.force(state.positions)
         if motion.any():
-            push = push - balance.hessian(state.positions, state.load_factor) @ motion.ravel()
-        push = np.where(balance.free, push.reshape(motion.shape), 0.0)
+            push = push - balance.product(balance.hessian(state.positions, state.load_factor), motion)
+        push = np.where(balance.free, push, 0.0)
         yield state.positions + motion + last.tangent.solve(push)
     if previous is not None and not state.branched:
         ratio = advance / (state.load_factor - previous.load_factor)

@@ -51,9 +51,9 @@ class SolverKeys(Keys):
         default="auto",
         description="Newton's method with mixed integration points, with a line search, or one after the other",
     )
-    linear: Literal["auto", "direct", "multigrid", "pardiso", "rslab", "scipy"] = Field(
+    linear: Literal["auto", "direct", "multigrid", "pardiso", "petsc", "rslab", "scipy"] = Field(
         default="auto",
-        description="solver of linear systems: direct or multigrid, by size; or a library that factorises",
+        description="solver of linear systems: by size; direct, multigrid, petsc; or a library that factorises",
     )
     coarse_start: bool = Field(
         default=True,
