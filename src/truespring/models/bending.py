@@ -42,7 +42,8 @@ def bending_factors(
     if not sizes:
         return MappingProxyType({})
     one = sample(problem, np.zeros(1, dtype=np.int64))
-    return MappingProxyType({depth: _bending_factor(one, springs, sizes[depth]) for depth in sorted(sizes)})
+    matrix = _element_matrix(one, springs)
+    return MappingProxyType({depth: _bending_factor(one, springs, matrix, sizes[depth]) for depth in sorted(sizes)})
 
 
 @remembered
@@ -84,8 +85,10 @@ def bending_excess(problem: Problem) -> float:
     return max(found)
 
 
-def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tuple[int, ...]) -> float:
+def _bending_factor(problem: Problem, springs: SpringsByRule | None, matrix: Floats, counts: tuple[int, ...]) -> float:
     """Return EI of a strip of elements like the first in pure bending along x, over EI of the material [-].
+
+    `matrix` is the stiffness of an element whose links are not shared [N/m].
 
     A column of elements is bent to unit curvature, u = (-x y, x^2 / 2), plus the periodic displacement that minimises
     the energy; EI is twice this energy per length. For springs on squares with summed sharing the factor is
@@ -104,7 +107,6 @@ def _bending_factor(problem: Problem, springs: SpringsByRule | None, counts: tup
     n_free = dim * int(np.prod(grid))
     stiffness, force, energy = np.zeros((n_free, n_free)), np.zeros(n_free), 0.0
     single = springs is not None and springs.sharing == "single"
-    matrix = _element_matrix(problem, springs)
     for cell in np.ndindex(*counts):
         if single:
             matrix = _element_matrix(problem, springs, _shares_of_links(problem, cell, counts))
