@@ -460,7 +460,9 @@ def test_no_state_of_a_runaway_counts_as_balanced() -> None:
 def test_an_indefinite_tangent_is_shifted_by_ever_more_of_its_diagonal() -> None:
     """The smallest shift that helps is the best: it is tried first."""
     tangent = sparse.csr_array(np.array([[2.0, 5.0], [5.0, -4.0]]))
-    balance: Any = SimpleNamespace(potential=None, in_blocks=lambda matrix: matrix)
+    balance: Any = SimpleNamespace(
+        potential=None, in_blocks=lambda matrix: matrix, diagonal=lambda matrix: matrix.diagonal()
+    )
     first, *others = _candidates(balance, np.zeros((1, 2)), tangent)
     assert first is tangent
     shares = [(one - tangent).diagonal() / [2.0 + 3.0, 4.0 + 3.0] for one in others]
