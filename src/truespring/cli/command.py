@@ -124,7 +124,7 @@ def _compiling(options: argparse.Namespace) -> AbstractContextManager[None]:
     try:
         mesh = tomllib.loads(Path(options.study[0]).read_text(encoding="utf-8"))["mesh"]
         dim = len(mesh["size"])
-    except (OSError, ValueError, KeyError, TypeError):  # read and checked later
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # read and checked later
         return nullcontext()
     return compiling_ahead(dim) if dim in (2, 3) else nullcontext()
 
