@@ -5,6 +5,7 @@ import gc
 import importlib
 import io
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -16,6 +17,9 @@ from truespring.cli.printing import StandardOutputError, say, standard_output
 from truespring.cli.verb import CLOSED_PIPE, CONVERGED, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT
 from truespring.errors import OneProcessError, TruespringError, one_line
 from truespring.report.command import command_line
+
+# Number of characters of a study in which its mesh is looked for.
+_BEGINNING = 10_000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -117,15 +121,15 @@ def _compiling(options: argparse.Namespace) -> AbstractContextManager[None]:
         return nullcontext()
     if not Path(options.study[0]).is_file():  # a pipe is read only once
         return nullcontext()
-    import tomllib
-
     from truespring.kernels.ahead import compiling_ahead
 
     try:
-        mesh = tomllib.loads(Path(options.study[0]).read_text(encoding="utf-8"))["mesh"]
-        dim = len(mesh["size"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # read and checked later
+        with Path(options.study[0]).open(encoding="utf-8", errors="replace") as file:
+            text = file.read(_BEGINNING)
+    except OSError:  # reported by the reader
         return nullcontext()
+    size = re.search(r"^size *= *\[([^\]\n]*)\]", text, re.MULTILINE)
+    dim = len(size[1].split(",")) if size else 0
     return compiling_ahead(dim) if dim in (2, 3) else nullcontext()
 
 
