@@ -71,13 +71,24 @@ def test_the_second_process_ends_with_the_block(monkeypatch: pytest.MonkeyPatch)
     start_one = ahead._started
     monkeypatch.setattr(ahead, "_started", start)
     monkeypatch.setattr(ahead, "n_threads", lambda: 2)
+    monkeypatch.setattr(ahead, "_nothing_cached", lambda: False)
     with compiling_ahead(2):
-        assert processes == []  # kernels are in the cache
+        assert processes == []
     monkeypatch.setattr(ahead, "_nothing_cached", lambda: True)
     with pytest.raises(KeyError), compiling_ahead(2):
         assert processes[0].poll() is None
         raise KeyError
     assert processes[0].returncode is not None
+
+
+def test_the_second_process_ends_in_order_after_its_work() -> None:
+    """Its thread that waits for the end of the first process does not stop it from ending."""
+    code = (
+        "import threading, time; from truespring.kernels import ahead; "
+        "threading.Thread(target=ahead._end_with_parent, daemon=True).start(); time.sleep(0.2)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE) as process:
+        assert process.wait(60) == 0
 
 
 @pytest.mark.verification

@@ -307,10 +307,12 @@ def test_stability_at_rest_of_few_different_elements() -> None:
         springs = ts.Springs("gaussian").potential(body(ts.box(sides, (4, 2, 2)), poisson=poisson))
         values = np.linalg.eigvalsh(springs.element_hessians(springs.nodes))
         assert springs.semidefinite_at_rest == expected == bool(values[:, 0].min() > -1e-12 * values.max())
-    many = mesh_of("hexahedron")
-    assert len(many.elements) < 64 or not ts.Springs("gaussian").potential(body(many)).semidefinite_at_rest
+    cubes = ts.box((5.0, 5.0, 5.0), (5, 5, 5))
+    moved = shaken(cubes, 0.05, seed=3)
+    assert not ts.Springs("gaussian").potential(body(moved)).semidefinite_at_rest  # too many to look at
     two = ts.Springs("gaussian").potential(body(mesh_of("plane of two kinds"), "plane strain"))
-    assert two.semidefinite_at_rest == all(part.semidefinite_at_rest for part in two.parts)
+    lowest = [float(np.linalg.eigvalsh(part.element_hessians(part.nodes)).min()) for part in two.parts]
+    assert two.semidefinite_at_rest == (min(lowest) > -1e-9 * YOUNG)
 
 
 def weights(sides: Sequence[float], poisson: float, hourglass: float | None = None) -> list[float]:

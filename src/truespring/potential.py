@@ -48,7 +48,7 @@ class Projectable(Potential, Protocol):
     def projected_hessian(self, positions: Floats) -> SparseMatrix:
         """Return a sum of semidefinite matrices of springs or elements that are near their Hessians [N/m].
 
-        Those are the Hessians where these have no negative eigenvalue. Symmetric, shape (n_dof, n_dof).
+        Symmetric, shape (n_dof, n_dof).
         """
         ...
 

@@ -67,12 +67,11 @@ def _run_verb(arguments: list[str], started: Launch) -> int:
             return WRONG_INPUT
         started.check_verb(options.verb)
         options.command, options.launch = command_line(arguments), started
-        with _compiling(options):
-            _load(options)
-            with _threads(options.threads), ExitStack() as options.reserved:
-                code: int = options.run(options)
-                started.orderly = True
-                return code
+        with _threads(options.threads), ExitStack() as compiling, ExitStack() as options.reserved:
+            _load(options, compiling)
+            code: int = options.run(options)
+            started.orderly = True
+            return code
     except TruespringError as error:
         for line in str(error).splitlines():
             say(line)
@@ -97,40 +96,43 @@ def _run_verb(arguments: list[str], started: Launch) -> int:
         return NOT_CONVERGED
 
 
-def _load(options: argparse.Namespace) -> None:
+def _load(options: argparse.Namespace, compiling: ExitStack) -> None:
     """Import the library without garbage collection, and exclude its objects from later collections.
 
     Modules stay in memory anyway; scanning them took a tenth of the time of a small study. `new` does not need them.
+    Until `compiling` ends, a second process compiles kernels where that helps.
     """
     if options.verb == "new" or "truespring.study" in sys.modules:  # loaded by an earlier command of this process
         return
     gc.disable()
     try:
+        if options.verb in ("verify", "solve") and options.launch.size == 1:
+            compiling.enter_context(_compiling(options.study[0]))
         importlib.import_module("truespring.study")
     finally:
         gc.freeze()
         gc.enable()
 
 
-def _compiling(options: argparse.Namespace) -> AbstractContextManager[None]:
+def _compiling(study: str) -> AbstractContextManager[None]:
     """Return a context that compiles kernels in a second process, for the first command after the installation.
 
-    Only for verbs that solve studies in one process. The dimension is a guess from the text of the first study.
+    The dimension is a guess from the text of the study: only rectangles and boxes have a size.
     """
-    if options.launch.size > 1 or options.verb not in ("verify", "solve"):
-        return nullcontext()
-    if not Path(options.study[0]).is_file():  # a pipe is read only once
-        return nullcontext()
-    from truespring.kernels.ahead import compiling_ahead
-
     try:
-        with Path(options.study[0]).open(encoding="utf-8", errors="replace") as file:
+        if not Path(study).is_file():  # a pipe is read only once
+            return nullcontext()
+        with Path(study).open(encoding="utf-8", errors="replace") as file:
             text = file.read(_BEGINNING)
-    except OSError:  # reported by the reader
+    except (OSError, ValueError):  # reported by the reader
         return nullcontext()
     size = re.search(r"^size *= *\[([^\]\n]*)\]", text, re.MULTILINE)
     dim = len(size[1].split(",")) if size else 0
-    return compiling_ahead(dim) if dim in (2, 3) else nullcontext()
+    if dim not in (2, 3):
+        return nullcontext()
+    from truespring.kernels.ahead import compiling_ahead
+
+    return compiling_ahead(dim)
 
 
 @contextmanager

@@ -104,7 +104,7 @@ def _started(dim: int) -> "subprocess.Popen[bytes] | None":
 
 def _end_with_parent() -> None:
     """End this process when the other end of its standard input is closed."""
-    sys.stdin.buffer.read()
+    os.read(sys.stdin.fileno(), 1)  # not sys.stdin.read: its lock would be held at the end of this process
     os._exit(0)
 
 

@@ -20,7 +20,7 @@ ZERO, ONE, TWO = unsigned(0), unsigned(1), unsigned(2)
 LANES = 16
 # Shares are multiples of 2^-_HALVINGS.
 _HALVINGS = 4
-# Share of the firm matrices that is added to them: rotations may have no stiffness but for rounding errors.
+# Share of the positive parts that is added to them: rotations may have no stiffness but for rounding errors.
 _ROUNDING = 1e-10
 
 
@@ -280,22 +280,22 @@ def shares(
     matrices: Any,
     of: Any,
     factors: Any,
-    rest: Any,
+    negative: Any,
     lanes: int,
     share: Any,
     zero: Any,
 ) -> None:
-    """Write the largest share of pressure and `rest` for which each element's tangent is positive semidefinite.
+    """Write the largest share of pressure and `negative` for which each element's tangent is positive semidefinite.
 
     By bisection: the tangent is semidefinite if its Cholesky factorisation exists, without the rows of the first node,
-    as the energy does not depend on translations. Without the share it must be semidefinite. `rest` is added to the
-    second derivatives `second`. `lanes` is LANES; shapes: rest as second, share (n_elements,), others as in `rows`.
+    as the energy does not depend on translations. Without the share it must be semidefinite. `negative` is added to the
+    second derivatives `second`. `lanes` is LANES; shapes: negative as second, share (n_elements,), others as in `rows`.
     """
     dim, k = len(zero), slope.shape[1]
     n = (k - 1) * dim
     size = n * (n + 1) // 2
     block = np.empty((2, k * dim, k * dim))
-    firm, added, factor = np.empty((size, LANES)), np.empty((size, LANES)), np.empty((size, LANES))
+    base, added, factor = np.empty((size, LANES)), np.empty((size, LANES)), np.empty((size, LANES))
     column, inverse = np.empty((n, LANES)), np.empty(LANES)
     low, high, tried, positive = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for begin in range(first, last, LANES):
@@ -303,18 +303,18 @@ def shares(
             low[lane], high[lane] = 0.0, 2.0
             e = unsigned(min(begin + lane, last - 1))
             table = (starts, others, coefficients)
-            _parts(e, x, elements, table, slope, second, rest, pressure, matrices, of, factors, block, zero)
+            _parts(e, x, elements, table, slope, second, negative, pressure, matrices, of, factors, block, zero)
             p = 0
             for i in range(dim, n + dim):
                 for j in range(dim, i + 1):
-                    firm[p, lane], added[p, lane] = (1 + _ROUNDING) * block[0, i, j], block[1, i, j]
+                    base[p, lane], added[p, lane] = (1 + _ROUNDING) * block[0, i, j], block[1, i, j]
                     p += 1
         for _ in range(_HALVINGS + 1):
             for lane in range(lanes):
                 tried[lane], positive[lane] = (low[lane] + high[lane]) / 2, 1.0
             for p in range(size):
                 for lane in range(lanes):
-                    factor[p, lane] = firm[p, lane] + tried[lane] * added[p, lane]
+                    factor[p, lane] = base[p, lane] + tried[lane] * added[p, lane]
             for j in range(n):
                 diagonal = unsigned(j * (j + 1) // 2 + j)
                 for lane in range(lanes):
@@ -348,7 +348,7 @@ def _parts(
     table: Any,
     slope: Any,
     second: Any,
-    rest: Any,
+    negative: Any,
     pressure: Any,
     matrices: Any,
     of: Any,
@@ -356,7 +356,7 @@ def _parts(
     block: Any,
     zero: Any,
 ) -> None:
-    """Write the lower triangle of an element's tangent without pressure and `rest`, and that of these.
+    """Write the lower triangle of an element's tangent without pressure and `negative`, and that of these.
 
     `table` is that of `turn`. `block` has shape (2, k * dim, k * dim); the rows of the first node are not written.
     """
@@ -370,7 +370,7 @@ def _parts(
             for m in range(n):
                 to = line(slope, e * n + m, b, zero)
                 add_part(block, ZERO, a * dim, b * dim, _weighed(e, a, m, slope, second, zero), to, _SPACE)
-                add_part(block, ONE, a * dim, b * dim, _weighed(e, a, m, slope, rest, zero), to, _SPACE)
+                add_part(block, ONE, a * dim, b * dim, _weighed(e, a, m, slope, negative, zero), to, _SPACE)
             spring = _stiffness(e, a, b, matrices, of, factors)
             for c in range(dim):
                 block[ZERO, a * dim + c, b * dim + c] += spring

@@ -51,19 +51,32 @@ class Tangent(Protocol):
 class LinearSolver(Protocol):
     """A method that prepares tangents for solving.
 
-    Attributes:
-        factorisations, cg_iterations, lanczos_iterations: costs so far, see Cost.
-        memory: largest memory of factors or coarse levels so far [bytes].
+    Costs are those so far, see Cost.
     """
-
-    factorisations: int
-    cg_iterations: int
-    lanczos_iterations: int
-    memory: int
 
     @property
     def name(self) -> str:
         """Name for notes and reports."""
+        ...
+
+    @property
+    def factorisations(self) -> int:
+        """The number of factorisations, or of times that coarse levels were built."""
+        ...
+
+    @property
+    def cg_iterations(self) -> int:
+        """The number of iterations of conjugate gradients."""
+        ...
+
+    @property
+    def lanczos_iterations(self) -> int:
+        """The number of Lanczos iterations."""
+        ...
+
+    @property
+    def memory(self) -> int:
+        """Largest memory of factors or coarse levels [bytes]."""
         ...
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:

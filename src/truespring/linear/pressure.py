@@ -79,7 +79,6 @@ class PressureMultigrid:
 
         `volumes` returns the stiffness of cells against a change of volume at positions [m], shape (n_nodes, dim).
         """
-        self.factorisations, self.cg_iterations, self.lanczos_iterations, self.memory = 0, 0, 0, 0
         self._held, self._volumes = held, volumes
         self._begin = (nodes, held, interpolations)
         self._multigrids: list[Multigrid] = []
@@ -121,9 +120,7 @@ class PressureMultigrid:
 
     def whole(self, matrix: SparseMatrix, positions: Floats) -> Preconditioned:
         """Prepare a tangent for multigrid."""
-        found = self._whole.ready(matrix, positions)
-        self.count()
-        return found
+        return self._whole.ready(matrix, positions)
 
     def sheared(
         self, matrix: SparseMatrix, positions: Floats, cells: Sequence[VolumeStiffness]
@@ -134,21 +131,31 @@ class PressureMultigrid:
             shear = self._shear.ready(self._without(matrix, cells, excess), positions)
         except SingularMatrixError:
             return None
-        self.count()
         return None if shear.coarse is None else (shear, _volumes(cells, excess, self._held, shear))
 
     def spent(self, iterations: int, digits: float) -> None:
         """Count iterations for this number of digits."""
         self._shear.spent(iterations, digits)
-        self.count()
 
-    def count(self) -> None:
-        """Update the costs to those of both multigrids."""
-        both = self._multigrids
-        self.factorisations = sum(one.factorisations for one in both)
-        self.cg_iterations = sum(one.cg_iterations for one in both)
-        self.lanczos_iterations = sum(one.lanczos_iterations for one in both)
-        self.memory = sum(one.memory for one in both) + self._values.nbytes
+    @property
+    def factorisations(self) -> int:
+        """The number of times that coarse levels were built, of both multigrids."""
+        return sum(one.factorisations for one in self._multigrids)
+
+    @property
+    def cg_iterations(self) -> int:
+        """The number of iterations of conjugate gradients, of both multigrids."""
+        return sum(one.cg_iterations for one in self._multigrids)
+
+    @property
+    def lanczos_iterations(self) -> int:
+        """The number of Lanczos iterations, of both multigrids."""
+        return sum(one.lanczos_iterations for one in self._multigrids)
+
+    @property
+    def memory(self) -> int:
+        """Largest memory of the coarse levels of both multigrids, and of the values of A [bytes]."""
+        return sum(one.memory for one in self._multigrids) + self._values.nbytes
 
     def _without(
         self, matrix: SparseMatrix, cells: Sequence[VolumeStiffness], excess: Sequence[Floats]
@@ -255,10 +262,7 @@ class Separated:
         if not right.any():
             return np.zeros(right.shape)
         if not self.apart or self._parts is None:  # parts are built when they are asked for
-            try:
-                return self.whole.solve(right, accuracy)
-            finally:
-                self.solver.count()
+            return self.whole.solve(right, accuracy)
         r = self._parts[0].scale * right
         x, left, spent, target = np.zeros(r.shape), r, 0, accuracy * norm(r)
         try:
@@ -300,10 +304,7 @@ class Separated:
     def negative_eigenvalues(self) -> int | None:
         """0 if the lowest eigenvalue of A is positive, else as multigrid finds it for the whole tangent."""
         found = None if self._parts is None else self._parts[0].negative_eigenvalues
-        if found != 0:
-            found = self.whole.negative_eigenvalues
-        self.solver.count()
-        return found
+        return self.whole.negative_eigenvalues if found != 0 else found
 
     def lowest_mode(self) -> None:
         """Return None: modes need a factorisation."""

@@ -299,17 +299,17 @@ class GaussianElements:
 
         The stiffness of an element consists of that of its springs, that against changes of the forms and the volume,
         and the pressure times the second derivative of the volume, which is indefinite. The pressure, and what the
-        second part has of negative eigenvalues, are multiplied by the largest share, up to 1, for which the element
-        has no negative eigenvalue.
+        second part has of negative eigenvalues, are multiplied by the largest of the shares 0, 1/16, ..., 1 for which
+        the element has no negative eigenvalue.
         """
         from truespring.kernels import gaussian
 
         known = self._curvature(positions, None)
-        firm, share = clipped(known.second), np.empty(len(self._volumes))
-        rest = known.second - firm
-        known = known._replace(second=firm, factors=np.maximum(known.factors, 0.0))
-        self._run(gaussian.shares, *known, rest, gaussian.LANES, share)
-        second = firm + share[:, None, None] * rest
+        positive, share = clipped(known.second), np.empty(len(self._volumes))
+        negative = known.second - positive
+        known = known._replace(second=positive, factors=np.maximum(known.factors, 0.0))
+        self._run(gaussian.shares, *known, negative, gaussian.LANES, share)
+        second = positive + share[:, None, None] * negative
         return self._assembled(known._replace(second=second, pressure=share * known.pressure))
 
     @cached_property

@@ -230,6 +230,7 @@ class Balance:
         except ProblemError:
             self.note(f"{reason}: a factorisation would help, but does not fit in memory")
             return False
+        assert isinstance(directly, Direct)
         self.note(f"{reason}: {directly.name} from then on instead of {self.linear.name}")
         before = self.linear
         directly.cg_iterations, directly.lanczos_iterations = before.cg_iterations, before.lanczos_iterations
