@@ -19,7 +19,7 @@ from truespring.potential import SparseMatrix, VolumeStiffness
 from truespring.ranks import ALONE, Communicator, Layout, layout_alone, started_processes
 
 # Largest number of free directions for which "auto" factorises, in the plane and in space: as fast as multigrid there.
-_DIRECT = MappingProxyType({2: 8_000, 3: 3_000})
+_DIRECT = MappingProxyType({2: 8_000, 3: 1_000})
 
 
 class Tangent(Protocol):
