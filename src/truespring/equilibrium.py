@@ -14,14 +14,14 @@ from truespring.coarsening import CoarseBody
 from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.errors import ModelError, OneProcessError, TruespringError, one_line
-from truespring.linear import sharing
+from truespring.linear import processes_of
 from truespring.mesh import interpolations, select
 from truespring.models import Model, as_model, check_fibres
 from truespring.piecewise import Piecewise, own_rows
 from truespring.potential import Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
-from truespring.ranks import Communicator, ranks_of
+from truespring.ranks import Communicator, layout_of, ranks_of
 from truespring.solution import Solution as Solution
 from truespring.solution import State as State
 from truespring.solution import Status as Status
@@ -60,7 +60,7 @@ def solve(
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
     check_fibres(problem, model)
-    ranks = sharing(solver.linear)
+    ranks = processes_of(solver.linear)
     if isinstance(model, Program):
         if ranks.size > 1 and model.solves:
             raise ModelError(f"{model.label}: another program runs beside one process only: start one process")
@@ -128,14 +128,20 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
     loading = potential.loading if isinstance(potential, Refined) else problem.loading
-    geometry = replace(geometry_of(problem, model.finite), interpolations=partial(_interpolations, problem, potential))
+    upright = geometry_of(problem, model.finite)
+    geometry = replace(
+        upright,
+        admissible=lambda positions: bool(ranks.first(float(upright.admissible(positions)))),
+        interpolations=partial(_interpolations, problem, potential),
+    )
     if model.finite and model.any_mesh and alone:
         geometry = replace(geometry, coarse_body=partial(_coarse_body, model, CoarseBody.finest(problem, loading)))
     ranks.together(lambda: solver.check(problem.loading, geometry))
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
-    if isinstance(potential, Piecewise):
-        loading = own_rows(loading, potential.layout)
+    layout = layout_of(potential)
+    if layout is not None:
+        loading = own_rows(loading, layout)
     found, broken = _followed(solver.follow(potential, loading, report, geometry), potential)
     found, below_rounding = _above_rounding(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)

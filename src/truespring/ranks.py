@@ -1,9 +1,11 @@
 """Processes that share the work on one body: their sums, and the nodes that each of them owns."""
 
 import pickle
+import time
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -11,6 +13,9 @@ import numpy as np
 from truespring.arrays import Floats, Ints, ShortInts
 
 _Made = TypeVar("_Made")
+
+# A process that raised an exception waits so long for the same one on the others [s].
+_PATIENCE = 5.0
 
 
 class Communicator(Protocol):
@@ -34,16 +39,23 @@ class Communicator(Protocol):
         """Return the largest of a number over the processes."""
         ...
 
+    def first(self, value: float) -> float:
+        """Return the number of the first process: for decisions on numbers that may differ by rounding errors."""
+        ...
+
     def joined(self, values: Floats) -> Floats:
         """Return the sum of arrays of the same shape, exact where all but one process have zero."""
         ...
 
     def together(self, work: Callable[[], _Made]) -> _Made:
-        """Return what `work` returns on this process; if it raises an exception on one, raise that on all."""
+        """Return what `work` returns on this process; if it raises an exception on one, raise that on all.
+
+        `work` must exchange nothing: the other processes would wait for the one that raised.
+        """
         ...
 
     def is_on_all(self, error: BaseException) -> bool:
-        """Return whether an exception is known to be raised on all processes."""
+        """Return whether all processes raise an exception of this class, and call this function, within seconds."""
         ...
 
 
@@ -57,6 +69,10 @@ class OneProcess:
         return value
 
     def largest(self, value: float) -> float:
+        """Return the value."""
+        return value
+
+    def first(self, value: float) -> float:
         """Return the value."""
         return value
 
@@ -81,10 +97,9 @@ class Processes:
     """Processes of a communicator of mpi4py."""
 
     def __init__(self, handle: Any) -> None:
-        """Store the communicator."""
-        self.handle = handle
+        """Store the communicator, and duplicate it for comparing exceptions; all processes call this."""
+        self.handle, self._aside = handle, handle.Dup()
         self.rank, self.size = int(handle.rank), int(handle.size)
-        self._raised: BaseException | None = None
 
     def sum(self, value: float) -> float:
         """Return the sum over the processes, in the order of the ranks, so that it is the same on all."""
@@ -93,6 +108,10 @@ class Processes:
     def largest(self, value: float) -> float:
         """Return the largest value of the processes."""
         return float(self._gathered(value).max())
+
+    def first(self, value: float) -> float:
+        """Return the value of the first process."""
+        return float(self._gathered(value)[0])
 
     def _gathered(self, value: float) -> Floats:
         """Return the values of the processes, shape (size,)."""
@@ -114,14 +133,22 @@ class Processes:
         except Exception as error:  # any: the other processes wait for this one
             own = error
         errors = self.handle.allgather(None if own is None else _portable(own))
-        self._raised = next((error for error in errors if error is not None), None)
-        if self._raised is not None:
-            raise self._raised from own
+        raised = next((error for error in errors if error is not None), None)
+        if raised is not None:
+            raise raised from own
         return made[0]
 
     def is_on_all(self, error: BaseException) -> bool:
-        """Return whether `together` raised the exception."""
-        return error is self._raised
+        """Return whether all processes call this with an exception of the same class within seconds."""
+        name = f"{type(error).__module__}.{type(error).__qualname__}"
+        own, found = np.array([zlib.crc32(name.encode())]), np.empty(self.size, np.int64)
+        request = self._aside.Iallgather(own, found)
+        until = time.monotonic() + _PATIENCE
+        while not request.Test():
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.01)
+        return bool((found == own).all())
 
 
 def _portable(error: Exception) -> Exception:
@@ -133,6 +160,7 @@ def _portable(error: Exception) -> Exception:
     return error
 
 
+@cache
 def started_processes() -> Communicator:
     """Return the processes that mpiexec has started, or that of this process alone."""
     from mpi4py import MPI
@@ -210,4 +238,5 @@ def layout_of(potential: object) -> Layout | None:
 
 def ranks_of(potential: object) -> Communicator:
     """Return the processes that share a potential."""
-    return potential.layout.ranks if isinstance(potential, Shared) else ALONE
+    layout = layout_of(potential)
+    return ALONE if layout is None else layout.ranks

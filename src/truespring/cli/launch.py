@@ -5,7 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,21 +62,25 @@ class Launch:
 
     def check_studies(self, studies: "list[Study]") -> None:
         """Raise ProblemError if the solvers of some studies do not share a body among the processes."""
-        if self.size == 1:
-            return
-        from truespring.linear import sharing
+        from truespring.linear import processes_of
 
         for study in studies:
-            if study.solver.linear != "petsc":
+            if self.size > 1 and study.solver.linear != "petsc":
                 raise ProblemError(
                     f"{study.file}: solver.linear = '{study.solver.linear}' runs in one process, mpiexec started "
                     f"{self.size}: set linear = 'petsc', or remove mpiexec"
                 )
-            joined = sharing(study.solver.linear).size
-            if joined != self.size:
+            joined = processes_of(study.solver.linear).size
+            if joined < self.size:
                 raise ProblemError(
                     f"mpiexec started {self.size} processes, of which mpi4py finds {joined}: use the mpiexec of "
                     "the MPI library that mpi4py was built with"
+                )
+            if joined > self.size:
+                known = ", ".join(size for size, _ in _VARIABLES)
+                raise ProblemError(
+                    f"mpi4py finds {joined} processes, but none of the environment variables {known} has their number: "
+                    "start them with mpiexec, or with srun --mpi=pmi2"
                 )
 
     def end(self, code: int) -> int:
@@ -88,7 +92,7 @@ class Launch:
             return code
         try:
             from mpi4py import MPI
-        except ImportError:  # the error of the missing package has been printed
+        except (ImportError, RuntimeError):  # the error of the missing package or library has been printed
             return code
         if MPI.COMM_WORLD.size == 1:
             return code
@@ -97,7 +101,9 @@ class Launch:
         while not request.Test():
             if not self.orderly and time.monotonic() > until:
                 sys.stderr.write(self.messages.getvalue())
-                sys.stderr.flush()
+                for stream in (sys.stdout, sys.stderr):
+                    with suppress(OSError, ValueError):  # its reader has ended
+                        stream.flush()
                 MPI.COMM_WORLD.Abort(code)
             time.sleep(0.01)
         if self.rank and code not in found[: self.rank]:

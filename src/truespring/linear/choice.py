@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol
 
 from truespring.arrays import Bools, Floats
-from truespring.errors import ProblemError, nearest
+from truespring.errors import ProblemError, nearest, one_line
 from truespring.linear.direct import FACTORISERS, Direct, direct_bytes, present
 from truespring.linear.iterative import Multigrid
 from truespring.linear.petsc import INSTALL, MODULES, Petsc
@@ -107,9 +107,17 @@ def _missing(modules: Sequence[str]) -> list[str]:
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
-def sharing(name: str) -> Communicator:
-    """Return the processes that share a body with the linear solver `name`: those of mpiexec with "petsc", else one."""
-    return started_processes() if name == "petsc" else ALONE
+def processes_of(name: str) -> Communicator:
+    """Return the processes that share a body with the linear solver `name`: those of mpiexec with "petsc", else one.
+
+    Raises ProblemError if the MPI library cannot be loaded.
+    """
+    if name != "petsc":
+        return ALONE
+    try:
+        return started_processes()
+    except (ImportError, RuntimeError) as error:  # as mpi4py raises
+        raise ProblemError(f"linear = 'petsc': mpi4py does not load MPI ({one_line(str(error))}); {INSTALL}") from None
 
 
 def choose(

@@ -126,7 +126,7 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
     `total` sums over processes, if each has rows of the vectors.
 
     The coefficients of conjugate gradients form the tridiagonal matrix of Lanczos (Golub and Van Loan, 10.3 and 11.5).
-    A direction of negative curvature ends the iteration: its Rayleigh quotient is returned.
+    A direction of negative curvature ends the iteration: a negative number is returned.
     """
     from scipy.linalg import eigh_tridiagonal
 
@@ -147,7 +147,8 @@ def lowest_eigenvalue(product: Product, precondition: Preconditioner, start: Flo
             beside.append(np.sqrt(share) / length)
             values, vectors = eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]))
             long_enough = iteration > _FEWEST or _enlarged(values.astype(np.float64)) > enough
-            if long_enough and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]:
+            settled = long_enough and beside[-1] * abs(vectors[-1, 0]) <= _SETTLED * values[0]
+            if total(float(settled)):  # one process decides for all
                 return Lowest(float(values[0]), iteration)
         _turn_towards(z, share, p)
         curvature = product(p, q)

@@ -6,11 +6,13 @@ the matrix and the preconditioner. Held directions get rows and columns of the i
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from itertools import chain
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Bools, Floats, ShortInts
+from truespring.errors import OneProcessError, one_line
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import SlowError, conjugate_gradients, lowest_eigenvalue, scalar_product
 from truespring.memory import slices
@@ -38,6 +40,20 @@ _OPTIONS = {
 }
 
 
+class _Rows(NamedTuple):
+    """Rows of the own nodes of a tangent.
+
+    Attributes:
+        starts: beginning of each row, shape (n_owned + 1,).
+        columns: node of each block, shape (n_blocks,).
+        data: [N/m], shape (n_blocks, dim, dim).
+    """
+
+    starts: ShortInts
+    columns: ShortInts
+    data: Floats
+
+
 class Petsc:
     """Conjugate gradients preconditioned by PETSc's GAMG."""
 
@@ -55,9 +71,14 @@ class Petsc:
         self._library, self._comm = PETSc, layout.ranks.handle or PETSc.COMM_SELF
         self._matrix: Any = None
         self._preconditioner: Any = None
+        # PETSc's vectors for operand and result.
+        self.vectors: tuple[Any, ...] = ()
         self._starts: ShortInts = np.empty(0, np.int32)
         self._columns: ShortInts = np.empty(0, np.int32)
-        self._first_pace = self._pace = 0.0
+        self._first_pace, self._stale = 0.0, False
+        PETSc.garbage_cleanup(
+            self._comm
+        )  # frees what former solvers left: objects that Python collects are only listed
         options = PETSc.Options(_PREFIX)
         for name, value in _OPTIONS.items():
             if not options.hasName(name):
@@ -68,30 +89,39 @@ class Petsc:
 
         Raises SingularMatrixError if values are not finite, or if no coarse levels exist.
         """
-        largest = self.ranks.largest(float(np.abs(matrix.data).max(initial=0.0)))
+        largest = self.ranks.largest(self.ranks.together(lambda: float(np.abs(matrix.data).max(initial=0.0))))
         if not 0 < largest < np.inf:
             raise SingularMatrixError("the matrix is zero or has values that are not finite")
         scale = 2.0 ** -float(np.frexp(largest)[1])
+        rows = self.ranks.together(lambda: self._own_rows(matrix))
+        new = self.ranks.largest(float(self._new(rows)))
         try:
-            self.ranks.together(lambda: self._fill(matrix, scale))
-            self.ranks.together(lambda: self._prepare(positions))
+            if new:
+                self._allocate(rows)
+            self.ranks.together(lambda: self._fill(rows, scale))
+            self._matrix.assemble()
+            self._prepare(positions)
         except self._library.Error as error:
+            if not self.ranks.is_on_all(error):
+                raise OneProcessError(f"PETSc: {one_line(str(error))}") from error
             raise SingularMatrixError(f"PETSc: {error}") from None
         return Preconditioned(self, self._matrix, self._preconditioner, scale)
 
-    def _fill(self, matrix: SparseMatrix, scale: float) -> None:
-        """Copy the own rows times `scale` to PETSc's matrix."""
-        owned, dim = self.layout.owned, self.held.shape[1]
+    def _own_rows(self, matrix: SparseMatrix) -> "_Rows":
+        """Return the own rows of a tangent."""
+        owned = self.layout.owned
         counts, data, columns = np.diff(matrix.indptr), matrix.data, matrix.indices
         if int(counts.sum()) > int(counts[owned].sum()):  # other rows are not empty
             own = np.repeat(self.layout.owner == self.ranks.rank, counts)
             data, columns = data[own], columns[own]
         counts = counts[owned]
-        starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int32)], dtype=np.int32)
-        if self.ranks.largest(float(self._new(starts, columns))):
-            self._allocate(starts, columns)
+        return _Rows(np.concatenate([[0], np.cumsum(counts, dtype=np.int32)], dtype=np.int32), columns, data)
+
+    def _fill(self, given: "_Rows", scale: float) -> None:
+        """Copy the own rows times `scale` to PETSc's matrix; nothing is exchanged."""
+        owned, dim, (starts, columns, data) = self.layout.owned, self.held.shape[1], given
         row = self.layout.numbers[owned[0]]
-        for part in slices(len(owned), 3 * 8 * dim * dim * max(float(counts.mean()), 1.0)):
+        for part in slices(len(owned), 3 * 8 * dim * dim * max(len(columns) / len(owned), 1.0)):
             at = starts[part.start : part.stop + 1]
             inside = slice(int(at[0]), int(at[-1]))
             rows = owned[part]
@@ -104,14 +134,14 @@ class Petsc:
             numbers = np.arange(row + part.start, row + part.stop, dtype=np.int32)
             blocks = np.ascontiguousarray(values.transpose(0, 2, 1))
             self._matrix.setValuesBlockedIJV(at - at[0], self.layout.numbers[columns[inside]], blocks, rowmap=numbers)
-        self._matrix.assemble()
 
-    def _new(self, starts: ShortInts, columns: ShortInts) -> bool:
+    def _new(self, rows: "_Rows") -> bool:
         """Return whether the sparsity differs from that of the last matrix."""
-        return not (np.array_equal(starts, self._starts) and np.array_equal(columns, self._columns))
+        return not (np.array_equal(rows.starts, self._starts) and np.array_equal(rows.columns, self._columns))
 
-    def _allocate(self, starts: ShortInts, columns: ShortInts) -> None:
-        """Make PETSc's matrix for a sparsity."""
+    def _allocate(self, rows: "_Rows") -> None:
+        """Make PETSc's matrix and vectors for a sparsity."""
+        starts, columns, _ = rows
         dim, n_dof, n_own = self.held.shape[1], self.held.size, len(self.layout.owned) * self.held.shape[1]
         self._free()
         self._starts, self._columns = starts, columns.copy()
@@ -125,28 +155,29 @@ class Petsc:
         self._matrix.setPreallocationNNZ((np.repeat(dim * own, dim), np.repeat(dim * others, dim)))
         self._matrix.setOption(self._library.Mat.Option.ROW_ORIENTED, False)
         self._matrix.setOption(self._library.Mat.Option.SYMMETRIC, True)
+        self.vectors = self._matrix.createVecs()
 
     def _prepare(self, positions: Floats) -> None:
         """Make the preconditioner, with new coarse levels if the last ones are missing or slow."""
-        if self._preconditioner is not None and self._pace > _SLOWER * self._first_pace:
+        if self._preconditioner is not None and self.ranks.first(float(self._stale)):
             self._preconditioner.destroy()
             self._preconditioner = None
         building = self._preconditioner is None
         if building:
-            self._matrix.setNearNullSpace(self._rigid_body_modes(positions))
+            self._set_rigid_body_modes(positions)
             self._preconditioner = self._library.PC().create(self._comm)
             self._preconditioner.setOptionsPrefix(_PREFIX)
             self._preconditioner.setType("gamg")
             self._preconditioner.setFromOptions()
-            self._first_pace = self._pace = 0.0
+            self._first_pace, self._stale = 0.0, False
         self._preconditioner.setOperators(self._matrix)
         self._preconditioner.setUp()
         if building:
             self.factorisations += 1
             self.memory = max(self.memory, int(self.ranks.sum(self._bytes())))
 
-    def _rigid_body_modes(self, positions: Floats) -> Any:
-        """Return the rigid-body modes at positions [m] as PETSc's null space."""
+    def _set_rigid_body_modes(self, positions: Floats) -> None:
+        """Make the rigid-body modes at positions [m] the near-null space of PETSc's matrix."""
         modes = modes_at(centred(positions)[self.layout.owned])
         vectors = []
         for mode in modes.T:
@@ -157,28 +188,42 @@ class Petsc:
             for other in vectors[:number]:
                 vector.axpy(-vector.dot(other), other)
             vector.normalize()
-        return self._library.NullSpace().create(vectors=vectors, comm=self._comm)
+        space = self._library.NullSpace().create(vectors=vectors, comm=self._comm)
+        self._matrix.setNearNullSpace(space)
+        for one in (*vectors, space):  # the matrix keeps them
+            one.destroy()
 
     def _bytes(self) -> float:
         """Return the memory of the matrices of all levels on this process [bytes]."""
         kept, local = self._preconditioner, self._library.Mat.InfoType.LOCAL
         levels = range(kept.getMGLevels())
-        matrices = [kept.getMGSmoother(level).getOperators()[0] for level in levels]
-        matrices += [kept.getMGInterpolation(level) for level in levels[1:]]
-        return float(sum(_ENTRY * one.getInfo(local)["nz_allocated"] for one in matrices))
+        smoothers = [kept.getMGSmoother(level) for level in levels]
+        operators = [smoother.getOperators() for smoother in smoothers]
+        between = [kept.getMGInterpolation(level) for level in levels[1:]]
+        matrices = [of_solution for of_solution, _ in operators] + between
+        found = sum(_ENTRY * one.getInfo(local)["nz_allocated"] for one in matrices)
+        for one in (*smoothers, *chain(*operators), *between):  # the preconditioner keeps them
+            one.destroy()
+        return float(found)
 
     def _free(self) -> None:
         """Free PETSc's memory."""
-        for one in (self._preconditioner, self._matrix):
+        for one in (self._preconditioner, self._matrix, *self.vectors):
             if one is not None:
                 one.destroy()
-        self._preconditioner = self._matrix = None
+        self._preconditioner, self._matrix, self.vectors = None, None, ()
 
     def spent(self, iterations: int, digits: float) -> None:
-        """Count iterations, and take their number for two digits as the pace of the coarse levels."""
+        """Count the iterations of a solution to `digits` digits; if there were many, replace the coarse levels."""
         self.cg_iterations += iterations
-        self._pace = 2 * iterations / max(digits, 2.0)
-        self._first_pace = self._first_pace or self._pace
+        pace = 2 * iterations / max(digits, 2.0)
+        self._first_pace = self._first_pace or pace
+        self._stale = pace > _SLOWER * self._first_pace
+
+    def failed(self, iterations: int) -> None:
+        """Count iterations that did not reach the accuracy; replace the coarse levels."""
+        self.cg_iterations += iterations
+        self._stale = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,18 +244,13 @@ class Preconditioned:
     lasting: ClassVar[bool] = False
 
     @cached_property
-    def _vectors(self) -> tuple[Any, Any]:
-        """PETSc's vectors for operand and result."""
-        return self.matrix.createVecRight(), self.matrix.createVecLeft()
-
-    @cached_property
     def _held(self) -> Bools:
         """Held directions of the own nodes, shape (n_owned, dim)."""
         return np.asarray(self.solver.held[self.solver.layout.owned])
 
     def product(self, x: Floats, result: Floats) -> float:
         """Write the product of the matrix and x to `result`, shape (n_owned, dim) both; return x . A x of all nodes."""
-        given, found = self._vectors
+        given, found = self.solver.vectors
         given.array[:] = x.ravel()
         self.matrix.mult(given, found)
         result[:] = found.array_r.reshape(x.shape)
@@ -218,7 +258,7 @@ class Preconditioned:
 
     def precondition(self, r: Floats) -> Floats:
         """Return an approximate solution for a residual, shape (n_owned, dim), zero in held directions."""
-        given, found = self._vectors
+        given, found = self.solver.vectors
         given.array[:] = r.ravel()
         self.preconditioner.apply(given, found)
         return np.where(self._held, 0.0, found.array_r.reshape(r.shape))
@@ -236,7 +276,7 @@ class Preconditioned:
         try:
             found = conjugate_gradients(self.product, self.precondition, *system)
         except SlowError as slow:
-            solver.spent(_MAX_ITERATIONS, 0.0)
+            solver.failed(_MAX_ITERATIONS)
             raise SlowError(self._of_all(slow.best)) from None
         solver.spent(found.iterations, -np.log10(accuracy))
         return self._of_all(found.solution)

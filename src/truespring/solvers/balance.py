@@ -120,7 +120,8 @@ class Balance:
         work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
         following = [load_factor * load.energy(positions) for load in self.loading.following]
         total = stored - float(work.sum()) + sum(following)
-        return total, abs(stored) + float(np.abs(work).sum()) + sum(map(abs, following))
+        size = abs(stored) + float(np.abs(work).sum()) + sum(map(abs, following))
+        return self.ranks.first(total), self.ranks.first(size)
 
     def force(self, positions: Floats, load_factor: float) -> Floats:
         """Return the unbalanced force [N], zero in held directions, shape (n_nodes, dim)."""
@@ -129,8 +130,16 @@ class Balance:
 
     def unbalanced(self, internal: Floats, applied: Floats) -> tuple[Floats, float]:
         """Return the unbalanced force [N], zero in held directions, shape (n_nodes, dim), and its scale [N]."""
-        scale = max(norm(applied), norm(internal))
+        scale = max(self.norm(applied), self.norm(internal))
         return np.where(self.free, internal - applied, 0.0), scale
+
+    def norm(self, vector: Floats) -> float:
+        """Return the Euclidean norm of a vector of all nodes, shape (n_nodes, dim), the same on all processes."""
+        return self.ranks.first(norm(vector))
+
+    def scalar_product(self, one: Floats, other: Floats) -> float:
+        """Return the scalar product of vectors of all nodes, shape (n_nodes, dim), the same on all processes."""
+        return self.ranks.first(float((one * other).sum()))
 
     def hessian(self, positions: Floats, load_factor: float, *stress: Floats) -> SparseMatrix:
         """Return the tangent [N/m] with that of following loads, shape (n_dof, n_dof), in blocks of shape (dim, dim).
@@ -143,7 +152,7 @@ class Balance:
         return tangent
 
     def in_blocks(self, matrix: SparseMatrix) -> SparseMatrix:
-        """Return a matrix of shape (n_dof, n_dof) in blocks of shape (dim, dim), columns ascending."""
+        """Return a matrix of shape (n_dof, n_dof) in blocks of shape (dim, dim)."""
         dim = self.free.shape[1]
         if matrix.format == "bsr" and matrix.blocksize == (dim, dim):
             return matrix
@@ -286,7 +295,7 @@ class Watch:
         internal = self._balance.potential.gradient(positions)
         applied = self._balance.loading.force(positions, self.load_factor)
         self.force, self._scale = self._balance.unbalanced(internal, applied)
-        self._size = norm(self.force)
+        self._size = self._balance.norm(self.force)
         self.residual = self._size / self._scale if self._scale else 0.0
         if self._balance.report:
             self._balance.report(self.load_factor, iteration, self.residual)

@@ -8,7 +8,7 @@ from scipy import sparse
 
 from truespring.arrays import Floats
 from truespring.linear.direct import SingularMatrixError
-from truespring.linear.gradients import IndefiniteError
+from truespring.linear.gradients import IndefiniteError, SlowError
 from truespring.potential import Projectable, SparseMatrix
 from truespring.solvers.balance import Balance, Found, Watch, stepped
 
@@ -66,11 +66,17 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
 
 
 def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
-    """Return the positions after a full Newton step, None if there is none or its energy is not finite."""
+    """Return the positions after a full Newton step, None if there is none or its energy is not finite.
+
+    An iterative solver that does not reach its accuracy gives its last iterate.
+    """
     try:
-        moved = positions - balance.ready(tangent, positions).solve(force)
+        step = balance.ready(tangent, positions).solve(force)
     except (SingularMatrixError, IndefiniteError):
         return None
+    except SlowError as slow:
+        step = slow.best
+    moved = positions - step
     return moved if np.isfinite(balance.total_energy(moved, 0.0)[0]) else None
 
 
@@ -82,7 +88,7 @@ def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Flo
         direction = stepped(balance, candidate, positions, -force, balance.accuracy(residual))
         if direction is None:
             continue
-        slope = float((direction * force).sum())
+        slope = balance.scalar_product(direction, force)
         if slope < 0:
             return Step(direction, slope, candidate is tangent)
     return None
@@ -115,7 +121,7 @@ def _search(balance: Balance, load_factor: float, positions: Floats, step: Step)
         if not np.isfinite(there) or there <= energy + _ARMIJO * length * step.slope:
             return bool(np.isfinite(there))
         equal = there - energy <= _ENERGY_ROUNDING * max(size, size_there)
-        return bool(equal and (step.direction * balance.force(moved, load_factor)).sum() <= -step.slope / 2)
+        return equal and balance.scalar_product(step.direction, balance.force(moved, load_factor)) <= -step.slope / 2
 
     length = 1.0
     while not descends(moved := positions + length * step.direction, length):
@@ -127,7 +133,9 @@ def _search(balance: Balance, load_factor: float, positions: Floats, step: Step)
             return None
     while not step.newton and length >= 1 and length < _LONGEST_STEP:
         further = positions + 2 * length * step.direction
-        if not descends(further, 2 * length) or (step.direction * balance.force(further, load_factor)).sum() > 0:
+        if not descends(further, 2 * length):
+            break
+        if balance.scalar_product(step.direction, balance.force(further, load_factor)) > 0:
             break
         moved, length = further, 2 * length
     return moved

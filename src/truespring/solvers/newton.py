@@ -9,7 +9,6 @@ from truespring.arrays import Floats
 from truespring.conditions import Loading
 from truespring.errors import ProblemError, nearest
 from truespring.linear.choice import LinearSolver, check_linear, choose
-from truespring.linear.gradients import norm
 from truespring.potential import Potential, Stressed, volumes_of
 from truespring.ranks import layout_of
 from truespring.solvers import mixed
@@ -97,7 +96,7 @@ class Newton(Solver):
                 if ever_refused and strict:
                     strict, step = False, 1.0 / self.load_steps
                     continue
-            moved_far = snapped(reached.state, last.state, previous)
+            moved_far = snapped(reached.state, last.state, previous, length=balance.norm)
             state = replace(reached.state, iterations=spent, snapped=moved_far)
             previous, last, spent = last.state, reached._replace(state=state), 0
             step = min(2 * step, 1.0 / self.load_steps)
@@ -153,7 +152,7 @@ class Newton(Solver):
         found = None
         if not self._searches(balance):
             found = self._find_mixed(balance, level, last.state, previous)
-            why = doubt(found.state, last.state, previous, admissible)
+            why = doubt(found.state, last.state, previous, admissible, balance.norm)
             if self.method == "mixed" or not why:
                 return found
             balance.note(f"line search at load factor {level:.6g}: mixed integration points {why}")
@@ -230,7 +229,7 @@ def _find_by_search(balance: Balance, level: float, last: Found, previous: Equil
     if not guesses:
         state = last.state
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))
-    start = min(guesses, key=lambda guess: norm(balance.force(guess, level)))
+    start = min(guesses, key=lambda guess: balance.norm(balance.force(guess, level)))
     return stabilised(balance, descend(balance, level, start))
 
 
