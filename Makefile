@@ -20,7 +20,7 @@ test: .venv/test
 
 # Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the picture of the README.
 verification: .venv/test $(if $(wildcard $(PETSC_DIR)/include/petscversion.h),.venv/petsc)
-	$(BIN)/python -m pytest -q -n 2 -m verification
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
 
