@@ -49,7 +49,7 @@ def _page(results: dict, runs: list[Measured], recorded: dict) -> Iterator[str]:
         f"{', '.join(f'{name} {number}' for name, number in versions.items())}.\n"
     )
     yield from _aims(results, runs)
-    yield from _compared(runs)
+    yield from _compared(runs, results["repeats"])
     yield "## Time\n"
     yield "![Time over nodes](performance.svg)\n"
     for dim, load in _LOADS:
@@ -86,7 +86,7 @@ def _sizes(runs: list[Measured], dim: int, load: str) -> list[int]:
     return sorted({run.depth for run in runs if (run.dim, run.load) == (dim, load)} & set(SIZES[dim]))
 
 
-def _compared(runs: list[Measured]) -> Iterator[str]:
+def _compared(runs: list[Measured], repeats: int) -> Iterator[str]:
     bent, pulled = (BODIES[2, load].moved for load in ("bending", "stretching"))
     plane, space, soft = (BODIES[key] for key in ((2, "bending"), (3, "bending"), (3, "soft block")))
     yield "## What is compared\n"
@@ -109,9 +109,9 @@ def _compared(runs: list[Measured]) -> Iterator[str]:
         "Seconds are wall time from the built mesh to equilibrium: sparsity pattern, assembly, factorisation or "
         "multigrid setup, and all iterations, without reading, writing and compiling (compiled code comes from a "
         "cache; each process first solves a small mesh, untimed). A process repeats a solution until it has taken 2 s, "
-        "at most five times, and reports the median; a time is the median of three processes, or of one if a solution "
-        "takes 20 s and for meshes of the time to the same error. All programs use the smallest number of equal load "
-        "steps (1, 2, 4, 8 or 16) that converges; failed attempts are not timed.\n"
+        f"at most five times, and reports the median; a time is the median of at most {repeats} processes: of one if a "
+        "solution takes 20 s and for meshes of the time to the same error. All programs use the smallest number of "
+        "equal load steps (1, 2, 4, 8 or 16) that converges; failed attempts are not timed.\n"
     )
     rows = []
     for name, program in PROGRAMS.items():

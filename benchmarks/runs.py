@@ -25,13 +25,13 @@ ROOT = HERE.parent
 CACHE = HERE / ".cache"
 
 #: Time limit of a solution [s]; beyond it the program does not solve larger meshes of that load.
-LIMIT = 120.0
+LIMIT = 90.0
 
 #: Time limit of all measurements [s]; a run that would start later is left out.
 WHOLE_LIMIT = 90 * 60.0
 
 # Time limit of a process [s], with reading, warm-up and failed attempts.
-_PROCESS_LIMIT = 3 * LIMIT
+_PROCESS_LIMIT = 2 * LIMIT
 
 # Beginnings of failures that larger meshes share.
 _TIME = ("longer than", "the next size would exceed")
