@@ -315,6 +315,13 @@ def test_stability_at_rest_of_few_different_elements() -> None:
     assert two.semidefinite_at_rest == (min(lowest) > -1e-9 * YOUNG)
 
 
+@pytest.mark.parametrize("section", ["plane stress", "plane strain", ""])
+def test_elements_that_are_points_have_infinite_energy(section: str) -> None:
+    mesh = ts.rectangle((1.0, 1.0), (2, 2)) if section else ts.box((1.0, 1.0, 1.0), (2, 1, 1))
+    potential = ts.Springs("gaussian").potential(body(mesh, section))
+    assert potential.energy(np.zeros_like(potential.nodes)) == np.inf  # and no warning
+
+
 def weights(sides: Sequence[float], poisson: float, hourglass: float | None = None) -> list[float]:
     """The stiffness of edges by axis, face diagonals by plane yz, xz, xy and body diagonals of a brick over mu."""
     dim = len(sides)

@@ -100,9 +100,13 @@ def _free_thickness(law: InvariantLaw, trace_C: Floats, y: Floats, constants: Co
             curvature += C_33 * (C_33 * found.by_trace_trace + found.by_trace_y)
         return Slope(pull + found.by_y / 2, curvature)
 
+    def of_the_plane() -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):  # of an element that is a point there is none
+            return np.log(trace_C / 2)
+
     lam, mu = constants.lam, constants.mu
     start = np.clip(-2 * lam / (lam + 2 * mu) * y, -50.0, 50.0)
-    return free_thickness(slope, start, lambda: np.log(trace_C / 2), mu)
+    return free_thickness(slope, start, of_the_plane, mu)
 
 
 def by_invariants(law: InvariantLaw, current: bool = False) -> Callable[[Floats, Constants], Response]:
