@@ -491,6 +491,7 @@ def test_a_search_ends_where_the_energy_says(
     balance: Any = SimpleNamespace(
         total_energy=lambda positions, level: (energy(positions[0, 0]), 1e-3),
         force=lambda positions, level: np.array([[slope(positions[0, 0])]]),
+        scalar_product=lambda a, b: float((a * b).sum()),
     )
     step = Step(np.ones((1, 1)), -abs(slope(0.0)), newton)
     found = _search(balance, 1.0, np.zeros((1, 1)), step)
