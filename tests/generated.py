@@ -29,9 +29,8 @@ from truespring.models.mass_tensor import TENSOR_LAWS
 from truespring.study import schema
 from truespring.study.toml import toml_text
 
-# No study of a handful of elements takes longer [s]: three models that all fail after 2,200 factorisations take 13
-# s, and
-# up to three times that on a processor that others use.
+# No study of a handful of elements takes longer [s]: three models that all fail after 2,200 factorisations took 29 s of
+# a slow processor.
 PATIENCE = 60
 # Of an exception that ends a model these kinds tell of a fault in the program, not of numbers that ran away.
 OWN_FAULTS = (
