@@ -99,12 +99,11 @@ class Pattern:
         to different rows, in the order of the elements.
         """
         from truespring.kernels import sparsity
-        from truespring.kernels.threads import run, writable
+        from truespring.kernels.threads import computed, run, writable
 
-        values = self.values()
+        values, known = self.values(), list(slices)
         values[:] = 0.0
-        for first, last in slices:
-            given = writable(pairs(first, last))
+        for (first, last), given in zip(known, computed(lambda ends: writable(pairs(*ends)), known), strict=True):
             low = int(self.elements[first:last].min())
             rows = int(self.elements[first:last].max()) + 1 - low
 

@@ -47,6 +47,21 @@ def take_lower(first: int, last: int, starts: Any, columns: Any, lower_starts: A
 
 
 @kernel
+def count_crossing(first: int, last: int, bounds: Any, starts: Any, columns: Any, counts: Any) -> None:
+    """Write the number of blocks of each row left of the diagonal whose columns are in an earlier piece.
+
+    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), counts (n,).
+    """
+    for piece in range(first, last):
+        for i in range(bounds[piece], bounds[piece + 1]):
+            counts[i] = 0
+            for p in range(starts[i], starts[i + 1]):
+                if columns[p] >= bounds[piece]:
+                    break
+                counts[i] += 1
+
+
+@kernel
 def condense(
     first: int,
     last: int,
@@ -147,19 +162,18 @@ def product(
 
 
 @kernel
-def product_across(bounds: Any, starts: Any, columns: Any, lower: Any, x: Any, y: Any, zero: Any) -> None:
+def product_across(rows: Any, ends: Any, starts: Any, columns: Any, lower: Any, x: Any, y: Any, zero: Any) -> None:
     """Add to y the contributions of crossing blocks to rows of other pieces, which `product` omits.
 
-    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), x, y (n, k).
+    Shapes: rows, ends (n_crossing,), see `Level`, starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), x, y
+    (n, k).
     """
-    for piece in range(1, len(bounds) - 1):
-        for i in range(bounds[piece], bounds[piece + 1]):
-            for p in range(starts[i], starts[i + 1]):
-                j = columns[unsigned(p)]
-                if j >= bounds[piece]:
-                    break
-                d = minus(row(x, j, zero), row(x, i, zero))
-                put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
+    for at in range(len(rows)):
+        i = rows[at]
+        for p in range(starts[i], ends[at]):
+            j = columns[unsigned(p)]
+            d = minus(row(x, j, zero), row(x, i, zero))
+            put(y, j, minus(row(y, j, zero), times_transposed(lower, p, d, zero)))
 
 
 @kernel
@@ -270,16 +284,15 @@ def sweep_backward(
 
 
 @kernel
-def subtract_across(bounds: Any, starts: Any, columns: Any, lower: Any, z: Any, r: Any, zero: Any) -> None:
+def subtract_across(rows: Any, ends: Any, starts: Any, columns: Any, lower: Any, z: Any, r: Any, zero: Any) -> None:
     """Subtract from r the product of the crossing blocks and z.
 
-    Shapes: bounds (n_pieces + 1,), starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), z, r (n, k).
+    Shapes: rows, ends (n_crossing,), see `Level`, starts (n + 1,), columns (n_lower,), lower (n_lower, k, k), z, r
+    (n, k).
     """
-    for piece in range(1, len(bounds) - 1):
-        for i in range(bounds[piece], bounds[piece + 1]):
-            for p in range(starts[i], starts[i + 1]):
-                j = columns[unsigned(p)]
-                if j >= bounds[piece]:
-                    break
-                put(r, i, minus(row(r, i, zero), times(lower, p, row(z, j, zero), zero)))
-                put(r, j, minus(row(r, j, zero), times_transposed(lower, p, row(z, i, zero), zero)))
+    for at in range(len(rows)):
+        i = rows[at]
+        for p in range(starts[i], ends[at]):
+            j = columns[unsigned(p)]
+            put(r, i, minus(row(r, i, zero), times(lower, p, row(z, j, zero), zero)))
+            put(r, j, minus(row(r, j, zero), times_transposed(lower, p, row(z, i, zero), zero)))

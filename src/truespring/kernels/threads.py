@@ -3,8 +3,9 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import cache, partial
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -28,6 +29,8 @@ vector_kernel: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
 _SMALLEST_PIECE = 4000
 
 Array = TypeVar("Array", bound=np.ndarray[Any, Any])
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 _chosen: int | None = None
 
@@ -87,6 +90,18 @@ def run_on(ranges: list[tuple[int, int]], function: Callable[..., Any], *argumen
         _in_use.release()
 
 
+def computed(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+    """Yield function(item) of all items in order; each thread computes one, and then all are yielded."""
+    step = n_threads()
+
+    def some(begin: int, end: int, first: int) -> list[Result]:
+        return [function(item) for item in items[first + begin : first + end]]
+
+    for first in range(0, len(items), step):
+        for results in run(some, min(step, len(items) - first), first, smallest=1):
+            yield from results
+
+
 def writable(array: Array) -> Array:
     """Return a contiguous, writable array, same shape and unit: numba compiles again for read-only arrays."""
     writable: Array = np.require(array, requirements=["C", "W"])
@@ -104,7 +119,7 @@ class _Worker:
 
     def start(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Start a call in the thread."""
-        self._call = partial(function, *arguments)
+        self._call = partial(copy_context().run, function, *arguments)  # with NumPy's settings of warnings
         self._called.release()
 
     def wait(self) -> None:

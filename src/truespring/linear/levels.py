@@ -47,6 +47,8 @@ class Level:
         inverse: inverse of each diagonal block with `added`, shape (n, k, k).
         added: added to the diagonal for the smoother, shape (n, k).
         bounds: first row of each piece of the smoother, and the number of rows, shape (n_pieces + 1,).
+        crossing: rows with crossing blocks, whose columns are in an earlier piece; shape (n_crossing,).
+        crossing_ends: index of the block after the last crossing one of each of these rows, shape (n_crossing,).
     """
 
     starts: ShortInts
@@ -56,6 +58,8 @@ class Level:
     inverse: Real
     added: Real
     bounds: ShortInts
+    crossing: ShortInts
+    crossing_ends: ShortInts
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -75,8 +79,9 @@ class Level:
         run(function, len(self.bounds) - 1, *known, *arguments, (0.0,) * self.shape[1], smallest=1)
 
     def across(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call function(bounds, starts, columns, lower, *arguments, zero), for the blocks between pieces."""
-        function(self.bounds, self.starts, self.columns, self.lower, *arguments, (0.0,) * self.shape[1])
+        """Call function(rows, ends, starts, columns, lower, *arguments, zero), for the blocks between pieces."""
+        rows = (self.crossing, self.crossing_ends, self.starts, self.columns)
+        function(*rows, self.lower, *arguments, (0.0,) * self.shape[1])
 
     def product(self, x: Floats, result: Floats) -> float:
         """Write A x to `result` and return x . A x; `x` and `result` have shape (n, k)."""
@@ -114,7 +119,19 @@ def empty_level(starts: ShortInts, columns: ShortInts, size: int, precision: typ
     most = max(_PIECES, lower.size // _LARGE_PIECE)
     n_pieces = max(1, min(most, lower.size // _SMALLEST_PIECE))
     bounds = (n * np.arange(n_pieces + 1, dtype=np.int64) // n_pieces).astype(np.int32)
-    return Level(lower_starts, lower_columns, lower, rest, inverse, added, bounds)
+    crossing = _crossing(lower_starts, lower_columns, bounds)
+    return Level(lower_starts, lower_columns, lower, rest, inverse, added, bounds, *crossing)
+
+
+def _crossing(starts: ShortInts, columns: ShortInts, bounds: ShortInts) -> tuple[ShortInts, ShortInts]:
+    """Return the rows with crossing blocks, and the index of the block after the last of them, see `Level`."""
+    from truespring.kernels import blocks
+    from truespring.kernels.threads import run
+
+    counts = np.empty(len(starts) - 1, np.int32)
+    run(blocks.count_crossing, len(bounds) - 1, bounds, starts, columns, counts, smallest=1)
+    rows = np.flatnonzero(counts).astype(np.int32)
+    return rows, starts[rows] + counts[rows]
 
 
 def condense(level: Level, matrix: Matrix, scale: float) -> bool:

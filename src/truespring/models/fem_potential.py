@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol, runtime_checkable
+from itertools import chain
+from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from truespring.problem import Problem
 _SLICE_POINTS = 4096
 # Smallest number of blocks of elements for which threads share a slice.
 _SMALLEST_PIECE = 4
+
+_Result = TypeVar("_Result")
 
 
 @runtime_checkable
@@ -153,17 +156,16 @@ class FemPotential:
 
     def energy(self, positions: Floats) -> float:
         """Return the stored energy [J]; infinite if an element is inverted and the law has a barrier."""
-        total = 0.0
+
+        def stored(first: int, last: int) -> float:
+            at = self._points(positions, first, last)
+            if self._inverted(at):
+                return float("inf")
+            density = self._respond(at).energy
+            return float(at.own(density * at.volumes).sum()) if np.isfinite(density).all() else float("inf")
+
         with np.errstate(all="ignore"):
-            for first, last in self.slices():
-                at = self._points(positions, first, last)
-                if self._inverted(at):
-                    return float("inf")
-                density = self._respond(at).energy
-                if not np.isfinite(density).all():
-                    return float("inf")
-                total += float(at.own(density * at.volumes).sum())
-        return total
+            return sum(self._by_slice(stored), 0.0)
 
     def _inverted(self, at: Points) -> bool:
         """Return whether an element is inverted and the law has a barrier."""
@@ -219,10 +221,24 @@ class FemPotential:
         """Return the results of `stress` for all slices [Pa], axes (component, point, element)."""
         n_components, n_points = len(voigt_pairs(self.mesh.dim)), len(self._reference.weights)
         result = np.empty((n_components, n_points, len(self.elements)))
-        for first, last in self.slices():
+
+        def write(first: int, last: int) -> None:
             at = self._points(positions, first, last)
             result[..., first:last] = at.own(stress(at, (first, last)))
+
+        self._by_slice(write)
         return result
+
+    def _by_slice(self, function: Callable[[int, int], _Result]) -> list[_Result]:
+        """Return function(first, last) of all slices in order; several threads share the slices."""
+        from truespring.kernels.threads import run
+
+        slices = list(self.slices())
+
+        def some(begin: int, end: int) -> list[_Result]:
+            return [function(*ends) for ends in slices[begin:end]]
+
+        return list(chain.from_iterable(run(some, len(slices), smallest=1)))
 
     def _strain_change(self, at: Points, step: Floats) -> Floats:
         """Return the linear change of the strain of the law for a step, axes (component, point, element)."""
@@ -231,9 +247,12 @@ class FemPotential:
     def gradient(self, positions: Floats) -> Floats:
         """Return the internal force [N], shape (n_nodes, dim)."""
         forces = np.empty((len(self.elements), self.elements.shape[1] * self.mesh.dim))
-        for first, last in self.slices():
+
+        def write(first: int, last: int) -> None:
             at = self._points(positions, first, last)
             forces[first:last] = at.own(at.forces(self._working_stress(at))).T
+
+        self._by_slice(write)
         return self._pattern.vector(forces)
 
     def _working_stress(self, at: Points) -> Floats:
