@@ -25,7 +25,7 @@ ROOT = HERE.parent
 CACHE = HERE / ".cache"
 
 #: Time limit of a solution [s]; beyond it the program does not solve larger meshes of that load.
-LIMIT = 90.0
+LIMIT = 120.0
 
 #: Time limit of all measurements [s]; a run that would start later is left out.
 WHOLE_LIMIT = 90 * 60.0
