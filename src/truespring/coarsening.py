@@ -126,7 +126,7 @@ def _stresses() -> set[str]:
 
 
 def restated(loading: Loading, nodes: Floats, coarse_nodes: Floats, weights: "sparse.csr_array[Any]") -> Loading:
-    """Return a loading of fine nodes on coarse ones, which interpolate them.
+    """Return a loading of fine nodes, without interactions, on coarse ones, which interpolate them.
 
     A coarse direction is held where a held fine one depends on it the most, and moves as the nearest of these do.
 
@@ -136,15 +136,21 @@ def restated(loading: Loading, nodes: Floats, coarse_nodes: Floats, weights: "sp
         coarse_nodes: coarse nodes [m], shape (n_coarse, dim).
         weights: interpolation, sparse, shape (n_fine, n_coarse).
     """
-    held = np.zeros(coarse_nodes.shape, dtype=bool)
-    displacement = np.zeros(coarse_nodes.shape)
-    for axis in range(coarse_nodes.shape[1]):
-        means = _means(weights, loading.held[:, axis])
-        held[:, axis] = np.diff(means.indptr) > 0
-        displacement[:, axis] = means @ loading.displacement[:, axis]
-    following = tuple(Interpolated(load, nodes, coarse_nodes, weights) for load in loading.following)
-    turns = tuple(_turn(turn, weights) for turn in loading.turns)
-    return Loading(weights.T @ loading.external_force, held, displacement, turns, following)
+    by_axis = [_means(weights, held) for held in loading.held.T]
+    held = np.stack([np.diff(means.indptr) > 0 for means in by_axis], axis=1)
+
+    def coarse(part: Loading) -> Loading:
+        displacement = [means @ moved for means, moved in zip(by_axis, part.displacement.T, strict=True)]
+        return replace(
+            part,
+            external_force=weights.T @ part.external_force,
+            held=held,
+            displacement=np.stack(displacement, axis=1),
+            turns=tuple(_turn(turn, weights) for turn in part.turns),
+            following=tuple(Interpolated(load, nodes, coarse_nodes, weights) for load in part.following),
+        )
+
+    return loading.mapped(coarse)
 
 
 def _turn(turn: Turn, weights: "sparse.csr_array[Any]") -> Turn:

@@ -1,5 +1,6 @@
 """Boundary conditions of a potential: forces, prescribed motion, and loads that follow the body."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -36,15 +37,112 @@ class Turn(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Loading:
-    """Loads and prescribed motion of a potential at load factor 1; all scale with the load factor.
+class Amplitude:
+    """Share of a load or of a prescribed motion that acts along the way: linear between points, constant outside.
+
+    Without points, the share is the level itself.
 
     Attributes:
-        external_force: dead load [N], shape (n_nodes, dim).
+        places: ascending, as shares of the way [-] at rest, as times [s] in motion, shape (n,).
+        shares: share of the full load or motion at these places [-], shape (n,).
+        span: place at the end of the way: 1 at rest, the duration in motion [s].
+    """
+
+    places: tuple[float, ...] = ()
+    shares: tuple[float, ...] = ()
+    span: float = 1.0
+
+    def at(self, level: float) -> float:
+        """Return the share at a level, from 0 to 1 on the way [-]."""
+        return level if not self.places else float(np.interp(level * self.span, self.places, self.shares))
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """The levels between 0 and 1 at which the slope changes [-]."""
+        return tuple(place / self.span for place in self.places if 0 < place < self.span)
+
+
+#: The amplitude of loads at rest by default: the level itself.
+PROPORTIONAL = Amplitude()
+
+
+class Touch(NamedTuple):
+    """What a tool or a grasp does at one state.
+
+    Attributes:
+        place: position of the tool [m], shape (dim,).
+        force: force of the body on it [N], shape (dim,).
+        depth: largest depth to which it enters the body, or largest extension of a grasp [m].
+    """
+
+    place: Floats
+    force: Floats
+    depth: float
+
+
+@runtime_checkable
+class Interaction(Protocol):
+    """An action on single nodes that depends on the level: contact with a tool, or a grasp; frozen.
+
+    Friction depends on the path: `since` begins a step, `lagged` updates the normal forces that it uses.
+    """
+
+    @property
+    def name(self) -> str:
+        """The name, for tables."""
+        ...
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """The levels between 0 and 1 at which the path has a corner [-]."""
+        ...
+
+    def energy(self, positions: Floats, level: float) -> float:
+        """Return the stored energy plus the dissipation since the begin of the step [J]; infinite where not allowed."""
+        ...
+
+    def stored(self, positions: Floats, level: float) -> float:
+        """Return the stored energy alone [J]."""
+        ...
+
+    def gradient(self, positions: Floats, level: float) -> Floats:
+        """Return minus the force on the nodes [N], shape (n_nodes, dim)."""
+        ...
+
+    def blocks(self, positions: Floats, level: float) -> tuple[Ints, Floats]:
+        """Return nodes, shape (n,), and their second derivatives [N/m], shape (n, dim, dim), symmetric."""
+        ...
+
+    def since(self, positions: Floats, level: float, creep: float) -> "Interaction":
+        """Return the action in a step that begins at a state; friction is full from a slip of `creep` [m] on."""
+        ...
+
+    def lagged(self, positions: Floats, level: float) -> "Interaction":
+        """Return the action with the normal forces of a state, for friction; the step begins where it did."""
+        ...
+
+    def touch(self, positions: Floats, level: float) -> Touch:
+        """Return place, force and depth at a state."""
+        ...
+
+    def largest_stiffness(self) -> Floats:
+        """Return an upper bound of the stiffness of each node [N/m], shape (n_nodes,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Loading:
+    """Loads and prescribed motion of a potential.
+
+    Attributes:
+        external_force: dead load at share 1 [N], shape (n_nodes, dim).
         held: true for prescribed directions, shape (n_nodes, dim).
-        displacement: prescribed displacement [m], zero in free directions, shape (n_nodes, dim).
+        displacement: prescribed displacement at share 1 [m], zero in free directions, shape (n_nodes, dim).
         turns: prescribed rotations, added to the displacement.
         following: loads that follow the body, as potentials whose energy is minus the work of the load [J].
+        amplitude: share of all of these along the way.
+        further: loads and motion with other amplitudes, each with the same `held`.
+        interactions: contacts with tools and grasps.
     """
 
     external_force: Floats
@@ -52,33 +150,118 @@ class Loading:
     displacement: Floats
     turns: tuple[Turn, ...] = ()
     following: tuple[Potential, ...] = ()
+    amplitude: Amplitude = PROPORTIONAL
+    further: tuple["Loading", ...] = ()
+    interactions: tuple[Interaction, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.external_force, self.held, self.displacement):
             array.setflags(write=False)
 
-    def motion(self, load_factor: float = 1.0) -> Floats:
-        """Return the prescribed displacement at a load factor [m], zero in free directions, shape (n_nodes, dim)."""
-        motion = load_factor * self.displacement
-        for turn in self.turns:
-            motion[turn.nodes] += turn.motion(load_factor)
-        return np.asarray(motion)
+    @property
+    def parts(self) -> tuple["Loading", ...]:
+        """This and the further loads."""
+        return (self, *self.further)
 
-    def force(self, positions: Floats, load_factor: float = 1.0) -> Floats:
-        """Return the external force on the nodes at these positions [N], shape (n_nodes, dim)."""
-        force = load_factor * self.external_force
-        for load in self.following:
-            force -= load_factor * load.gradient(positions)
+    def mapped(self, change: Callable[["Loading"], "Loading"]) -> "Loading":
+        """Return the loading with a function applied to each of its parts; `change` leaves `further` as it is."""
+        return replace(change(self), further=tuple(change(one) for one in self.further))
+
+    @property
+    def proportional(self) -> bool:
+        """Whether all loads and motion grow in proportion to the level."""
+        return not self.interactions and all(one.amplitude == PROPORTIONAL for one in self.parts)
+
+    @property
+    def full(self) -> "Loading":
+        """The loading with all loads and motion in proportion to the level, without tools and grasps."""
+        return replace(self.mapped(lambda part: replace(part, amplitude=PROPORTIONAL)), interactions=())
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """The levels between 0 and 1 at which an amplitude or the path of a tool has a corner [-], ascending."""
+        found = {corner for part in self.parts for corner in part.amplitude.corners}
+        return tuple(sorted(found.union(*(one.corners for one in self.interactions))))
+
+    def vanishes(self, level: float) -> bool:
+        """Return whether no load acts at a level, and no prescribed motion."""
+        return not self.interactions and all(one.amplitude.at(level) == 0 for one in self.parts)
+
+    def motion(self, level: float = 1.0) -> Floats:
+        """Return the prescribed displacement at a level [m], zero in free directions, shape (n_nodes, dim)."""
+        motion = np.zeros(self.displacement.shape)
+        for part in self.parts:
+            share = part.amplitude.at(level)
+            motion += share * part.displacement
+            for turn in part.turns:
+                motion[turn.nodes] += turn.motion(share)
+        return motion
+
+    def dead_force(self, level: float = 1.0) -> Floats:
+        """Return the dead loads at a level [N], shape (n_nodes, dim)."""
+        force = self.amplitude.at(level) * self.external_force
+        for part in self.further:
+            force += part.amplitude.at(level) * part.external_force
         return np.asarray(force)
+
+    def followers(self, level: float) -> Iterator[tuple[float, Potential]]:
+        """Yield the loads that follow the body with their share at a level, unless that is zero."""
+        for part in self.parts:
+            share = part.amplitude.at(level)
+            if share:
+                yield from ((share, load) for load in part.following)
+
+    @property
+    def follows(self) -> bool:
+        """Whether a load follows the body."""
+        return any(part.following for part in self.parts)
+
+    def loads(self, positions: Floats, level: float = 1.0) -> Floats:
+        """Return the force of the loads on the nodes at these positions [N], shape (n_nodes, dim)."""
+        force = self.dead_force(level)
+        for share, load in self.followers(level):
+            force -= share * load.gradient(positions)
+        return force
+
+    def force(self, positions: Floats, level: float = 1.0) -> Floats:
+        """Return the force of loads, tools and grasps at these positions [N], shape (n_nodes, dim)."""
+        force = self.loads(positions, level)
+        for one in self.interactions:
+            force -= one.gradient(positions, level)
+        return force
+
+    def energies(self, positions: Floats, level: float) -> Iterator[float]:
+        """Yield the energies of the loads that follow the body, of tools and of grasps [J]."""
+        for share, load in self.followers(level):
+            yield share * load.energy(positions)
+        for one in self.interactions:
+            yield one.energy(positions, level)
+
+    def since(self, positions: Floats, level: float, creep: float) -> "Loading":
+        """Return the loading in a step that begins at a state, see Interaction."""
+        if not self.interactions:
+            return self
+        return replace(self, interactions=tuple(one.since(positions, level, creep) for one in self.interactions))
+
+    def lagged(self, positions: Floats, level: float) -> "Loading":
+        """Return the loading with the normal forces of a state, see Interaction."""
+        if not self.interactions:
+            return self
+        return replace(self, interactions=tuple(one.lagged(positions, level) for one in self.interactions))
 
     def at_rest(self, nodes: Floats) -> "Loading":
         """Return the loading of a linear theory: following loads become dead loads with their undeformed forces."""
-        return replace(self, external_force=self.force(nodes), following=()) if self.following else self
+
+        def dead(part: Loading) -> Loading:
+            force = part.external_force - sum(load.gradient(nodes) for load in part.following)
+            return replace(part, external_force=force, following=())
+
+        return self.mapped(dead) if self.follows else self
 
     @property
     def driven_by_motion(self) -> bool:
-        """Whether there are no loads but prescribed displacements."""
-        return not self.external_force.any() and not self.following
+        """Whether there are no loads but prescribed displacements, tools and grasps."""
+        return not any(part.external_force.any() or part.following for part in self.parts)
 
 
 @runtime_checkable

@@ -193,7 +193,7 @@ def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[li
     """
     found: list[Equilibrium] = []
     for one in follow:
-        unbalanced = one.converged and one.load_factor != 0 and one.residual > UNBALANCED
+        unbalanced = one.converged and one.residual > UNBALANCED and not problem.loading.vanishes(one.load_factor)
         if unbalanced and not _moved_by_more_than_rounding(problem, one.load_factor):
             return [*found, replace(one, converged=False)], True
         found.append(one)

@@ -212,4 +212,6 @@ class _OwnRows:
 
 def own_rows(loading: Loading, layout: Layout) -> Loading:
     """Return a loading whose following loads have the rows of the own nodes of their tangents."""
-    return replace(loading, following=tuple(_OwnRows(load, layout) for load in loading.following))
+    return loading.mapped(
+        lambda part: replace(part, following=tuple(_OwnRows(load, layout) for load in part.following))
+    )

@@ -7,12 +7,27 @@ elements or meshes.
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats, Ints, ShortInts
 
 #: Blocks of shape (dim, dim), one for each pair of nodes that share an element.
 SparseMatrix = sparse.bsr_array[Any]
+
+
+def with_diagonal(matrix: SparseMatrix, blocks: Floats, nodes: Ints | None = None) -> SparseMatrix:
+    """Return a matrix plus blocks on its diagonal, of the sparsity of the matrix, which has all diagonal blocks.
+
+    `blocks` has shape (n, dim, dim), `nodes` (n,), in any order, each once; None for all nodes.
+    """
+    if not len(blocks):
+        return matrix
+    rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+    diagonal = np.flatnonzero(matrix.indices == rows)
+    data = matrix.data.copy()  # the matrix may belong to the potential
+    data[diagonal if nodes is None else diagonal[nodes]] += blocks
+    return sparse.bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 @runtime_checkable

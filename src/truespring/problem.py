@@ -8,18 +8,32 @@ from typing import Any, TypeVar
 import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.conditions import Loading
+from truespring.conditions import Amplitude, Loading, Turn
+from truespring.dynamics import Dynamics
 from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
 from truespring.fibres import Families, families
-from truespring.loading import LOADS, Body, Fixed, Held, Load, Spread, held_by, nodal_force
+from truespring.loading import (
+    LOADS,
+    Body,
+    Fixed,
+    Held,
+    Load,
+    amplitude_of,
+    components,
+    held_by,
+    nodal_force,
+    nodal_mass,
+)
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
 from truespring.modes import centred, modes_at, n_modes
-from truespring.potential import Potential
+from truespring.tools import TOOLS, Grasp, Tool
 
 _Found = TypeVar("_Found")
+
+Rows = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -45,6 +59,9 @@ class Problem:
         loads: loads, one or several.
         regions: elements of other materials; where regions overlap, the last one applies.
         stated: False for a result of another program, of which only the mesh is known; it cannot be solved.
+        dynamics: the motion in time; None for equilibrium.
+        tools: rigid bodies that touch the body.
+        grasps: patches that are held by springs to a place that moves.
 
     Raises ProblemError or MeshError if the parts do not fit together, if there is no load, or if the body or a
     disconnected part of it can move as a rigid body.
@@ -57,11 +74,16 @@ class Problem:
     loads: Sequence[Load] = field(default=())
     regions: Sequence[Region] = field(default=())
     stated: bool = True
+    dynamics: Dynamics | None = None
+    tools: Sequence[Tool] = field(default=())
+    grasps: Sequence[Grasp] = field(default=())
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "regions", _several(self.regions, Region, "regions", "Region"))
         object.__setattr__(self, "supports", _several(self.supports, Fixed, "supports", "Fixed"))
         object.__setattr__(self, "loads", _several(self.loads, Load, "loads", _LOADS))
+        object.__setattr__(self, "tools", _several(self.tools, Tool, "tools", _TOOLS))
+        object.__setattr__(self, "grasps", _several(self.grasps, Grasp, "grasps", "Grasp"))
         if self.material is not None and self.mesh.element_dim == 2 and self.section is None:
             raise ProblemError("a plane body needs a section: PlaneStress(thickness) or PlaneStrain(thickness)")
         if self.mesh.element_dim == 3 and self.section is None:
@@ -74,12 +96,43 @@ class Problem:
         _ = self.fibres  # raises FibreError
         if not self.stated:
             return
-        loading = self.loading
-        acting = loading.external_force[~loading.held].any() or loading.following
-        if not acting and not loading.motion().any():
-            held = " in a direction that is free" if loading.external_force.any() else ""
-            raise NoLoadError(f"nothing loads the body{held}: add a load, or a support with a nonzero displacement")
+        if self.dynamics is not None:
+            self._check_motion(self.dynamics)
+            return
+        self._check_loaded()
         self._check_rigid_motion()
+
+    def _check_loaded(self) -> None:
+        """Raise NoLoadError if no load, motion, tool or grasp acts on free directions."""
+        loading, free = self.loading, ~self.loading.held
+        forced = any(part.external_force.any() for part in loading.parts)
+        acting = any(part.external_force[free].any() or part.following for part in loading.parts)
+        moved = any(part.displacement.any() or part.turns for part in loading.parts)
+        if not acting and not moved and not loading.interactions:
+            held = " in a direction that is free" if forced else ""
+            raise NoLoadError(f"nothing loads the body{held}: add a load, or a support with a nonzero displacement")
+
+    def _check_motion(self, dynamics: Dynamics) -> None:
+        """Raise ProblemError if a motion has no mass, or its velocity does not fit the body."""
+        if self.body.density is None:
+            raise ProblemError("a motion needs a density [kg/m^3] of the material and of each region")
+        if dynamics.velocity is not None:
+            components(dynamics.velocity, self.mesh.dim, "velocity", "m/s")
+        _ = self.loading
+
+    @property
+    def mass(self) -> Floats:
+        """The lumped mass of the nodes [kg], shape (n_nodes,): each has its share of the elements around it.
+
+        Raises ProblemError without a density.
+        """
+        return self.mass_on(self.body)
+
+    def mass_on(self, body: Body) -> Floats:
+        """Return the lumped mass of the nodes of `body`, which may have mid-edge nodes [kg], shape (n_nodes,)."""
+        if body.density is None:
+            raise ProblemError("a mass needs a density [kg/m^3] of the material and of each region")
+        return nodal_mass(body, body.density)
 
     @cached_property
     def materials(self) -> tuple[Material, ...]:
@@ -148,21 +201,69 @@ class Problem:
 
     @cached_property
     def loading(self) -> Loading:
-        """Forces, held directions and prescribed displacements at load factor 1."""
-        held, displacement = np.zeros(self.mesh.nodes.shape, dtype=bool), np.zeros(self.mesh.nodes.shape)
-        moved = np.zeros(self.mesh.nodes.shape)
-        for support in self.held:
+        """Forces, held directions and prescribed displacements."""
+        shape = self.mesh.nodes.shape
+        held, moved, histories = np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+        displacements = np.zeros((len(self._histories), *shape))
+        for support, stated in zip(self.held, self.supports, strict=True):
             motion = np.tile(support.motion, (len(support.nodes), 1))
             if support.turn is not None:
                 motion = motion + support.turn.motion(1.0)
+            number = self._histories.index(_history(stated))
             for axis in support.directions:
-                self._check_one_motion(support.nodes, axis, held, moved, motion[:, axis])
-                held[support.nodes, axis] = True
-                displacement[support.nodes, axis] = support.motion[axis]
-                moved[support.nodes, axis] = motion[:, axis]
-        turns = tuple(support.turn for support in self.held if support.turn is not None)
-        force = nodal_force(self.spreads(self.body), self.mesh.nodes.shape)
-        return Loading(force, held, displacement, turns, self.following(self.body, held))
+                there = (support.nodes, axis)
+                self._check_one_motion(*there, held, moved, motion[:, axis], histories != number)
+                held[there], moved[there], histories[there] = True, motion[:, axis], number
+                displacements[:, support.nodes, axis] = 0.0
+                displacements[number, support.nodes, axis] = support.motion[axis]
+        turns = [
+            tuple(
+                one.turn
+                for one, stated in zip(self.held, self.supports, strict=True)
+                if one.turn is not None and _history(stated) == history
+            )
+            for history in self._histories
+        ]
+        return self.loading_on(self.body, held, displacements, turns)
+
+    def loading_on(self, body: Body, held: Bools, displacements: Floats, turns: Sequence[tuple[Turn, ...]]) -> Loading:
+        """Return the loads on `body`, which may have mid-edge nodes, with prescribed motion.
+
+        Args:
+            body: the body.
+            held: true where a displacement is prescribed, shape (n_nodes, dim).
+            displacements: prescribed displacement of each part of the loading [m], shape (n_parts, n_nodes, dim).
+            turns: prescribed rotations of each part of the loading.
+        """
+        parts = []
+        for history, displacement, turned in zip(self._histories, displacements, turns, strict=True):
+            loads = [number for number, load in enumerate(self.loads) if _history(load) == history]
+            amplitude = self._amplitude(history)
+            force = nodal_force(self._of_each_load(lambda load: load.spread(body), loads), held.shape)
+            following = tuple(self._of_each_load(lambda load: load.following(body, held), loads))
+            parts.append(Loading(force, held, displacement, turned, following, amplitude))
+        several: tuple[Tool | Grasp, ...] = (*self.tools, *self.grasps)
+        acting = tuple(one.acting_on(body, self._young, self.duration or 1.0) for one in several)
+        return replace(parts[0], further=tuple(parts[1:]), interactions=acting)
+
+    @cached_property
+    def _histories(self) -> tuple[Rows | None, ...]:
+        """The distinct histories of loads and supports; that without a table first."""
+        return tuple(dict.fromkeys([None, *map(_history, self.loads), *map(_history, self.supports)]))
+
+    def share_of_support(self, number: int, level: float) -> float:
+        """Return the share of the prescribed motion of a support, counted from 0, at a level [-]."""
+        return self._amplitude(_history(self.supports[number])).at(level)
+
+    @property
+    def duration(self) -> float | None:
+        """The duration of the motion [s], None at rest."""
+        return None if self.dynamics is None else self.dynamics.duration
+
+    @property
+    def _young(self) -> float | None:
+        """The largest Young's modulus of the materials [Pa], None without a material."""
+        return max((material.young for material in self.materials), default=None)
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
@@ -177,22 +278,21 @@ class Problem:
         along = None if self.fibres is None else self.fibres.directions
         return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density, along)
 
-    def spreads(self, body: Body) -> tuple[Spread, ...]:
-        """Return the dead loads over the cells of `body`, which may have mid-edge nodes."""
-        return tuple(self._of_each_load(lambda load: load.spread(body)))
+    def _amplitude(self, history: Rows | None) -> Amplitude:
+        """Return the amplitude of a history; raise LoadError with the number of the first load that has it."""
+        try:
+            return amplitude_of(history, self.duration)
+        except ProblemError as error:
+            number = next((number for number, load in enumerate(self.loads) if _history(load) == history), None)
+            if number is None:
+                raise
+            raise LoadError(number, str(error)) from None
 
-    def following(self, body: Body, held: Bools) -> tuple[Potential, ...]:
-        """Return the potentials of the loads that follow `body`.
-
-        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim).
-        """
-        return tuple(self._of_each_load(lambda load: load.following(body, held)))
-
-    def _of_each_load(self, ask: Callable[[Load], _Found | None]) -> Iterator[_Found]:
-        """Yield `ask(load)` for each load, except None; raise LoadError with the number of a load that raises."""
-        for number, load in enumerate(self.loads):
+    def _of_each_load(self, ask: Callable[[Load], _Found | None], numbers: Sequence[int]) -> Iterator[_Found]:
+        """Yield `ask(load)` for loads, except None; raise LoadError with the number of a load that raises."""
+        for number in numbers:
             try:
-                found = ask(load)
+                found = ask(self.loads[number])
             except TruespringError as error:
                 raise LoadError(number, str(error)) from None
             if found is not None:
@@ -208,9 +308,15 @@ class Problem:
         loads = [load.scaled(factor) for load in self.loads]
         return replace(self, loads=loads, supports=[support.scaled(factor) for support in self.supports])
 
-    def _check_one_motion(self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats) -> None:
-        """Raise ProblemError if an earlier support prescribes another motion [m] of the nodes along an axis."""
-        clash = np.flatnonzero(held[nodes, axis] & (moved[nodes, axis] != motion))
+    def _check_one_motion(
+        self, nodes: Ints, axis: int, held: Bools, moved: Floats, motion: Floats, otherwise: Bools
+    ) -> None:
+        """Raise ProblemError if an earlier support prescribes another motion [m] of the nodes along an axis.
+
+        `otherwise` is true where the earlier support has another history, shape (n_nodes, dim).
+        """
+        another = (moved[nodes, axis] != motion) | (otherwise[nodes, axis] & (motion != 0))
+        clash = np.flatnonzero(held[nodes, axis] & another)
         if clash.size:
             first = int(clash[0])
             raise ProblemError(
@@ -298,4 +404,10 @@ def _several(value: object, kind: type, name: str, allowed: str) -> tuple[Any, .
     return tuple(several)
 
 
+def _history(one: Load | Fixed) -> Rows | None:
+    """Return the history of a load or support as tuples, None without one."""
+    return None if one.over is None else tuple(tuple(map(float, row)) for row in one.over)
+
+
+_TOOLS = " or ".join(tool.__name__ for tool in TOOLS.values())
 _LOADS = " or ".join(kind.load.__name__ for kind in LOADS.values())

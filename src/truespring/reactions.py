@@ -123,7 +123,7 @@ def point_of_torque(problem: Problem, support: int, positions: Floats, load_fact
     if held.turn is None:
         return np.asarray(positions[held.nodes].mean(axis=0))
     about = problem.mesh.nodes[held.nodes[0]] - held.turn.arms[0]
-    return np.asarray(about + load_factor * held.motion)
+    return np.asarray(about + problem.share_of_support(support, load_factor) * held.motion)
 
 
 def _resultant(problem: Problem, number: int, positions: Floats, shared: Floats, load_factor: float) -> SupportForce:

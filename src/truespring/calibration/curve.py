@@ -104,7 +104,7 @@ def _largest(problem: Problem) -> Floats:
     loading = problem.loading
     if not loading.driven_by_motion:
         return np.asarray(loading.force(problem.mesh.nodes).sum(axis=0))
-    motion = loading.motion()
+    motion = loading.full.motion()
     return np.asarray(motion[np.linalg.norm(motion, axis=1).argmax()])
 
 

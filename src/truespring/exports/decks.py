@@ -175,7 +175,7 @@ def _led_aside(twin: Twin) -> Iterator[str]:
 
 def _acting(twin: Twin, level: float, force_unit: float, anew: bool) -> Iterator[str]:
     """Yield the supports and loads at a level, as totals; with `anew`, boundary conditions of earlier steps end."""
-    motion, force = twin.loading.motion(level), level * twin.loading.external_force / force_unit
+    motion, force = twin.loading.motion(level), twin.loading.dead_force(level) / force_unit
     yield "*BOUNDARY, OP=NEW" if anew else "*BOUNDARY"
     yield from twin.for_good if anew else []
     for node, axis in np.argwhere(twin.loading.held).tolist():

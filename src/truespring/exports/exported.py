@@ -66,7 +66,7 @@ class Exported:
     @cached_property
     def motion(self) -> Floats:
         """The prescribed displacement at full load [m], zero where free, shape (n_nodes, dim)."""
-        return self.problem.loading.motion()
+        return self.problem.loading.full.motion()
 
     @cached_property
     def external_force(self) -> Floats:
@@ -79,14 +79,14 @@ class Exported:
 
     def force_of(self, loading: Loading) -> Floats:
         """Return the nodal forces of a loading at full load, as `external_force` [N], shape (n, dim)."""
-        if not loading.following:
-            return loading.external_force
+        if not loading.follows:
+            return loading.dead_force()
         if self.state is None:
             raise ExportError(
                 "a load that follows the body is exported as its forces at full load, which was not reached "
                 f"(load factor {self.path.load_factor:.6g}): reduce the load or use more load_steps"
             )
-        return loading.force(self.state.all_positions[: len(loading.held)])
+        return loading.loads(self.state.all_positions[: len(loading.held)])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -94,12 +94,12 @@ class Exported:
         return (*self.remarks, *self._notes())
 
     def _notes(self) -> Iterator[str]:
-        if self.problem.loading.following:
+        if self.problem.loading.follows:
             yield (
                 "A load that follows the body is exported as the dead forces that act at the equilibrium at full load: "
                 "the equilibrium is the same, its stability and the path to it are not."
             )
-        if self.problem.loading.turns:
+        if any(part.turns for part in self.problem.loading.parts):
             yield "Nodes that a support rotates are at their rotated positions."
 
     @cached_property

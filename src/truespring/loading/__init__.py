@@ -4,9 +4,12 @@ from truespring.loading.active import ActiveTension as ActiveTension
 from truespring.loading.body import Body as Body
 from truespring.loading.body import Spread as Spread
 from truespring.loading.body import nodal_force as nodal_force
+from truespring.loading.body import nodal_mass as nodal_mass
 from truespring.loading.dead import Force as Force
 from truespring.loading.dead import Gravity as Gravity
 from truespring.loading.dead import Traction as Traction
+from truespring.loading.history import History as History
+from truespring.loading.history import amplitude_of as amplitude_of
 from truespring.loading.load import BodyForce as BodyForce
 from truespring.loading.load import DeadLoad as DeadLoad
 from truespring.loading.load import FacePressure as FacePressure
@@ -21,5 +24,6 @@ from truespring.loading.supports import held_by as held_by
 from truespring.loading.table import LOADS as LOADS
 from truespring.loading.table import LoadKind as LoadKind
 from truespring.loading.table import Quantity as Quantity
+from truespring.loading.values import components as components
 from truespring.loading.words import selection_words as selection_words
 from truespring.loading.words import vector_words as vector_words

@@ -1,7 +1,7 @@
 """Active tension along fibres, as of muscles: a load that follows the fibres as the body deforms."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from operator import add
 from typing import Self
@@ -12,6 +12,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
 from truespring.errors import ProblemError
 from truespring.loading.body import Body
+from truespring.loading.history import History
 from truespring.loading.load import FollowingLoad, Mark
 from truespring.loading.values import number
 from truespring.loading.words import element_words
@@ -32,6 +33,7 @@ class ActiveTension(FollowingLoad):
 
     tension: float
     on: Selection | None = None
+    over: History | None = field(default=None, kw_only=True)
     on_elements = True
     instead = "forces on both ends of the fibres, which are dead"
 

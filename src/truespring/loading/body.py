@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.mesh import Mesh, SecondOrder, Selection, covering, shares
+from truespring.mesh import Mesh, SecondOrder, Selection, covering, element_corner_measures, shares
 
 
 class Body(NamedTuple):
@@ -78,3 +78,30 @@ def nodal_force(spreads: Iterable[Spread], shape: tuple[int, ...]) -> Floats:
     for cells, measures, density in spreads:
         np.add.at(force, cells, measures[:, :, None] * density[:, None, :])
     return force
+
+
+def nodal_mass(body: Body, density: Floats) -> Floats:
+    """Return the lumped mass of the nodes of a body [kg], shape (n_nodes,).
+
+    Corners have the integrals of their shape functions. Nodes of second-order elements share the mass in proportion to
+    the diagonal of the consistent mass matrix, which is positive (Hinton, Rock and Zienkiewicz 1976).
+
+    Args:
+        body: the body.
+        density: density of each element [kg/m^3], shape (n_elements,).
+    """
+    mesh = body.mesh
+    shares = body.thickness * element_corner_measures(mesh) * density[:, None]
+    cells = mesh.elements
+    if body.second_order is not None:
+        cells = body.whole(cells)
+        shares = shares.sum(axis=1)[:, None] * _diagonal_shares(mesh.elements.shape[1], cells.shape[1])
+    mass = np.zeros(len(body.nodes))
+    np.add.at(mass, cells, shares)
+    return mass
+
+
+def _diagonal_shares(corners: int, nodes: int) -> Floats:
+    """Return the share of each node of a quadratic simplex in its mass, shape (nodes,): corners first."""
+    corner, middle = {3: (3 / 57, 16 / 57), 4: (1 / 36, 4 / 27)}[corners]
+    return np.where(np.arange(nodes) < corners, corner, middle)

@@ -9,6 +9,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError
 from truespring.loading.body import Body, Spread
+from truespring.loading.history import History
 from truespring.loading.load import BodyForce, DeadLoad, Mark
 from truespring.loading.values import components, rotated, times
 from truespring.loading.words import selection_words, vector_words
@@ -34,6 +35,7 @@ class Force(DeadLoad):
 
     on: Selection
     total: Sequence[float]
+    over: History | None = field(default=None, kw_only=True)
 
     def spread(self, body: Body) -> Spread:
         """Return the load over the cells that cover the selected nodes, or over single nodes if none do."""
@@ -74,6 +76,7 @@ class Traction(DeadLoad):
 
     on: Selection
     traction: Sequence[float]
+    over: History | None = field(default=None, kw_only=True)
 
     def spread(self, body: Body) -> Spread:
         """Return the load over the facets."""
@@ -110,6 +113,7 @@ class Gravity(DeadLoad):
 
     acceleration: Sequence[float]
     on: None = field(default=None, init=False, repr=False)
+    over: History | None = field(default=None, kw_only=True)
 
     def spread(self, body: Body) -> Spread:
         """Return the load over all elements."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.loading.body import Body, Spread
+from truespring.loading.history import History
 from truespring.mesh import Mesh, Selection, loaded
 from truespring.potential import Potential
 
@@ -59,12 +60,15 @@ class Load(ABC):
 
     Attributes:
         on: the loaded selection; None for the whole body.
+        over: share of the load along the way or over time, see History; None for a load in proportion to the way at
+            rest, and for a constant load in motion.
         on_elements: whether `on` selects elements, as for regions, instead of nodes or facets.
         follows: whether the forces depend on the positions of the nodes.
         instead: alternative for programs without loads that follow the body, for error messages.
     """
 
     on: Selection | None
+    over: History | None = None
     on_elements: ClassVar[bool] = False
     follows: ClassVar[bool]
     instead: ClassVar[str] = ""

@@ -1,6 +1,6 @@
 """A moment that rotates with a face of a plane body; its potential is minus moment times rotation."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Self
 
@@ -11,6 +11,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
 from truespring.errors import ProblemError
 from truespring.loading.body import Body
+from truespring.loading.history import History
 from truespring.loading.load import FollowingLoad, Mark
 from truespring.loading.values import number
 from truespring.loading.words import selection_words
@@ -27,6 +28,7 @@ class Moment(FollowingLoad):
 
     on: Selection
     moment: float
+    over: History | None = field(default=None, kw_only=True)
     instead = "the rotation of a support"
 
     def following(self, body: Body, held: Bools) -> "FaceMoment":

@@ -4,7 +4,7 @@ A potential exists if the edge of the surface is held or slides in a plane, or i
 pressure does work that depends on the path and is an error.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
 from truespring.errors import ProblemError
 from truespring.loading.body import Body
+from truespring.loading.history import History
 from truespring.loading.load import FacePressure, FollowingLoad, Mark
 from truespring.loading.values import number
 from truespring.loading.words import selection_words
@@ -40,6 +41,7 @@ class Pressure(FollowingLoad):
 
     on: Selection
     pressure: float
+    over: History | None = field(default=None, kw_only=True)
     instead = "a traction, which is dead"
 
     def following(self, body: Body, held: Bools) -> "SurfacePressure":

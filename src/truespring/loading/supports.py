@@ -1,7 +1,7 @@
 """Supports: nodes that are fixed, or moved and rotated as prescribed."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Turn
 from truespring.errors import ProblemError
+from truespring.loading.history import History
 from truespring.loading.load import Mark
 from truespring.loading.values import components, number, rotated, times
 from truespring.loading.words import selection_words, vector_words
@@ -23,7 +24,7 @@ _SMALL = 1e-3
 class Fixed:
     """A support that holds the nodes `on`, or moves them as prescribed.
 
-    Prescribed motion is multiplied by the load factor.
+    Prescribed motion is multiplied by the load factor, or follows a history.
 
     Attributes:
         on: a group of the mesh, a side ("left", "right", "bottom", "top", "back", "front"), a point ("right-middle"), a
@@ -33,6 +34,8 @@ class Fixed:
         rotation: prescribed rotation [rad] of the nodes as a rigid body, anticlockwise in 2D, about `axis` in 3D.
         about: centre of the rotation [m]; None for the centre of the nodes.
         axis: direction of the axis of rotation in 3D.
+        over: share of the prescribed motion along the way or over time, see History; None in proportion to the way at
+            rest, and in motion for the whole motion at once.
     """
 
     on: Selection
@@ -41,6 +44,7 @@ class Fixed:
     rotation: float = 0.0
     about: Sequence[float] | None = None
     axis: Sequence[float] | None = None
+    over: History | None = field(default=None, kw_only=True)
 
     def scaled(self, factor: float) -> Self:
         """Return the support with its prescribed motion multiplied by a factor."""

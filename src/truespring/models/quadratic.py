@@ -6,7 +6,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.conditions import Loading, Turn
-from truespring.loading import Body, nodal_force
+from truespring.loading import Body
 from truespring.mesh import Grid, SecondOrder, edge_numbers
 from truespring.models.fem_potential import FemPotential
 from truespring.models.reference_element import Reference, reference_element
@@ -76,10 +76,13 @@ class QuadraticPotential(FemPotential):
             edges = self._held_alike(cells)
             by_edge[edges] |= linear.held[ends[edges, 0]]
         held = np.concatenate([linear.held, by_edge])
-        displacement = np.concatenate([linear.displacement, linear.displacement[ends].mean(axis=1)])
-        turns = tuple(self._turn(turn, np.asarray(by_edge.all(axis=1))) for turn in linear.turns)
-        force = nodal_force(self.problem.spreads(self.body), self.nodes.shape)
-        return Loading(force, held, np.where(held, displacement, 0.0), turns, self.problem.following(self.body, held))
+        whole = np.asarray(by_edge.all(axis=1))
+        displacements = [
+            np.where(held, np.concatenate([part.displacement, part.displacement[ends].mean(axis=1)]), 0.0)
+            for part in linear.parts
+        ]
+        turns = [tuple(self._turn(turn, whole) for turn in part.turns) for part in linear.parts]
+        return self.problem.loading_on(self.body, held, np.array(displacements), turns)
 
     @property
     def body(self) -> Body:
@@ -91,7 +94,7 @@ class QuadraticPotential(FemPotential):
 
         `cells` are the corners of each cell, shape (n_cells, corners).
         """
-        loading = self.problem.loading
+        loading = self.problem.loading.full
         motion = loading.motion()
         alike = (loading.held[cells] == loading.held[cells[:, :1]]).all(axis=(1, 2))
         alike &= (motion[cells] == motion[cells[:, :1]]).all(axis=(1, 2))

@@ -262,11 +262,12 @@ def _unit_warnings(mesh: Mesh, surface: Surface, unit: str) -> list[str]:
 
 
 def _state_warnings(problem: Problem, rest: Surface, state: State, file: Path) -> list[str]:
-    mesh, loading = problem.mesh, problem.loading
+    mesh, loading = problem.mesh, problem.loading.full
     warnings = []
     if max(np.abs(rest.lower - mesh.lower).max(), np.abs(rest.upper - mesh.upper).max()) > _SAME_BODY * mesh.diameter:
         warnings.append(f"{file.name} {_boxes(rest, mesh)}: are these the same body?")
-    off = np.abs(state.displacement - state.load_factor * loading.displacement) * loading.held
+    prescribed = sum(state.load_factor * part.displacement for part in loading.parts)
+    off = np.abs(state.displacement - prescribed) * loading.held
     if off.max() > _SAME_BODY * np.abs(state.displacement).max() + _SAME_POINT * mesh.diameter:
         node = int(off.max(axis=1).argmax())
         warnings.append(

@@ -249,7 +249,7 @@ def undeformed_figure(body: Undeformed) -> Sheet:
 
 def _supports(area: Area, problem: Problem, scale: Scale, size: float) -> None:
     """Draw supports: hatching at clamped edges, rollers at edges held in one direction, pins at single nodes."""
-    mesh, loading = problem.mesh, problem.loading
+    mesh, loading = problem.mesh, problem.loading.full
     still = loading.held & (loading.motion() == 0)
     clamped = loading.held.all(axis=1) & still.all(axis=1)
     hatched = np.zeros(mesh.n_nodes, dtype=bool)

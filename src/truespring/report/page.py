@@ -174,12 +174,13 @@ def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
         return [("loads and supports", "not in the file")]
     facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
     facts += [("load", load.words()) for load in problem.loads]
-    forces = problem.loading.force(problem.mesh.nodes)
+    loading = problem.loading.full
+    forces = loading.force(problem.mesh.nodes)
     total = forces.sum(axis=0)
     total = np.where(np.abs(total) > _ROUNDING * np.abs(forces).sum(), total, 0.0)
-    if not problem.loading.driven_by_motion:
+    if not loading.driven_by_motion:
         facts.append(("total force", f"({', '.join(input_quantity(float(value), 'N') for value in total)})"))
-    motion = problem.loading.motion()
+    motion = loading.motion()
     if motion.any():
         moved = int(motion.any(axis=1).sum())
         largest = input_quantity(float(np.linalg.norm(motion, axis=1).max()), "m")

@@ -13,7 +13,7 @@ from truespring.errors import ProblemError
 from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
-from truespring.potential import Potential, SparseMatrix, Unstressed
+from truespring.potential import Potential, SparseMatrix, Unstressed, with_diagonal
 from truespring.ranks import ranks_of
 from truespring.solvers.cost import Cost
 
@@ -117,8 +117,8 @@ class Balance:
         """Return stored energy minus the work of the loads, and the sum of their sizes [J]."""
         with np.errstate(over="ignore", invalid="ignore"):
             stored = self.potential.energy(positions)
-        work = load_factor * self.loading.external_force * (positions - self.potential.nodes)
-        following = [load_factor * load.energy(positions) for load in self.loading.following]
+        work = self.loading.dead_force(load_factor) * (positions - self.potential.nodes)
+        following = list(self.loading.energies(positions, load_factor))
         total = stored - float(work.sum()) + sum(following)
         size = abs(stored) + float(np.abs(work).sum()) + sum(map(abs, following))
         return self.ranks.first(total), self.ranks.first(size)
@@ -142,13 +142,18 @@ class Balance:
         return self.ranks.first(float((one * other).sum()))
 
     def hessian(self, positions: Floats, load_factor: float, *stress: Floats) -> SparseMatrix:
-        """Return the tangent [N/m] with that of following loads, shape (n_dof, n_dof), in blocks of shape (dim, dim).
+        """Return the tangent [N/m] with that of following loads, tools and grasps, in blocks of shape (dim, dim).
+
+        Shape (n_dof, n_dof).
 
         `stress` is passed on to the potential, see Stressed.hessian.
         """
         tangent = self.in_blocks(self.potential.hessian(positions, *stress))
-        for load in self.loading.following if load_factor else ():
-            tangent = self.in_blocks(tangent + load_factor * load.hessian(positions))
+        for share, load in self.loading.followers(load_factor):
+            tangent = self.in_blocks(tangent + share * load.hessian(positions))
+        for one in self.loading.interactions:
+            nodes, blocks = one.blocks(positions, load_factor)
+            tangent = with_diagonal(tangent, blocks, nodes)
         return tangent
 
     def in_blocks(self, matrix: SparseMatrix) -> SparseMatrix:
@@ -208,7 +213,7 @@ class Balance:
 
     def _stable_at_rest(self, state: Equilibrium) -> bool:
         """Return whether a state is the undeformed one without load, and the potential knows that it is stable."""
-        at_rest = state.load_factor == 0 and state.positions is self.potential.nodes
+        at_rest = self.loading.vanishes(state.load_factor) and state.positions is self.potential.nodes
         return at_rest and isinstance(self.potential, Unstressed) and self.potential.semidefinite_at_rest
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
@@ -321,7 +326,8 @@ class Watch:
         """
         below = self._size <= self._balance.rounding(tangent, positions)
         self.below_rounding = below and self.residual <= _NEAR_BEST * self.best.residual
-        noise = self.below_rounding and (self.load_factor == 0 or self._size > self._size_before / 2)
+        unloaded = self._balance.loading.vanishes(self.load_factor)
+        noise = self.below_rounding and (unloaded or self._size > self._size_before / 2)
         self._size_before = self._size if self.below_rounding else np.inf
         return noise or self._size <= self._balance.tolerance * self._scale
 

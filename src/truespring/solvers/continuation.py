@@ -83,6 +83,7 @@ class DisplacementControl(Solver):
 
     def check(self, loading: Loading, geometry: Geometry) -> None:
         """Raise ProblemError if a support holds the controlled displacement, or the body has no such direction."""
+        _check_proportional(loading)
         axes = _AXES[: loading.held.shape[1]]
         if self.direction not in axes:
             raise ProblemError(f"direction = {self.direction!r}: allowed: {', '.join(axes)}")
@@ -128,6 +129,10 @@ class ArcLength(Solver):
     follows_load = False
     keeps_to_stable_states = False
 
+    def check(self, loading: Loading, geometry: Geometry) -> None:
+        """Raise ProblemError for loads that do not grow in proportion."""
+        _check_proportional(loading)
+
     def __post_init__(self) -> None:
         _check(self.load_steps, self.max_iterations, self.tolerance, self.linear)
         if self.max_steps < 1 or not self.longest >= 1:
@@ -140,8 +145,18 @@ class ArcLength(Solver):
 
         If a state cannot be reached, the last one yielded is that of least residual there, not converged.
         """
+        _check_proportional(loading)
         balance = _balance(potential, loading, self, report)
         yield from _along(balance, 1.0 / self.load_steps, self.max_steps, self.longest)
+
+
+def _check_proportional(loading: Loading) -> None:
+    """Raise ProblemError for loads that do not grow in proportion, and for tools and grasps."""
+    if not loading.proportional:
+        raise ProblemError(
+            "a path with the load factor as an unknown needs loads in proportion, without histories (over), tools and "
+            "grasps: use control by load"
+        )
 
 
 def _check(steps: int, max_iterations: int, tolerance: float, linear: str) -> None:

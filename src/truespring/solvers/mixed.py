@@ -74,7 +74,7 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
         del tangent
         if step is None:
             break
-        moved = _moved(balance, positions, step, 0 if motion is not None else _MAX_HALVINGS)
+        moved = _moved(balance, positions, load_factor, step, 0 if motion is not None else _MAX_HALVINGS)
         if moved is None:
             break
         (positions, stress), motion = moved, None
@@ -102,7 +102,9 @@ def _step(
     return None
 
 
-def _moved(balance: Balance, positions: Floats, step: Floats, max_halvings: int) -> tuple[Floats, Floats] | None:
+def _moved(
+    balance: Balance, positions: Floats, load_factor: float, step: Floats, max_halvings: int
+) -> tuple[Floats, Floats] | None:
     """Return positions after a step, and the stress extrapolated along it; None if the energy is not finite.
 
     A step to a state without finite energy is halved up to `max_halvings` times.
@@ -110,7 +112,7 @@ def _moved(balance: Balance, positions: Floats, step: Floats, max_halvings: int)
     potential = balance.potential
     assert isinstance(potential, Stressed)
     for _ in range(max_halvings + 1):
-        if np.isfinite(potential.energy(positions + step)):
+        if np.isfinite(balance.total_energy(positions + step, load_factor)[0]):
             return positions + step, potential.extrapolated_stress(positions, step)
         step = step / 2
     return None

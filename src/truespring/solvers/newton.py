@@ -1,6 +1,6 @@
 """Newton's method with load steps of adaptive size, from no load to the full load."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,10 @@ from truespring.solvers.solver import Geometry, Solver
 
 #: Allowed values of `method`.
 METHODS = ("auto", "mixed", "line-search")
+# Levels nearer than this are equal.
+_SAME = 1e-9
+# Slip in a load step at which regularised friction is full, as a share of the body's size.
+_CREEP = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +88,10 @@ class Newton(Solver):
         step, spent = 1.0 / self.load_steps, 0
         smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
-            level = self._next_level(last.state.load_factor, step)
+            level = self._next_level(last.state.load_factor, step, loading.corners)
+            if previous is not None and any(previous.load_factor < one < level - _SAME for one in loading.corners):
+                previous = None  # the motion before a corner of a history says nothing about that after it
+            balance.loading = loading.since(last.state.positions, last.state.load_factor, _CREEP * balance.size)
             reached = self._find(balance, level, last, previous, admissible, jump)
             spent += reached.state.iterations
             refused = reached.state.converged and strict and not admissible(reached.state.positions)
@@ -117,7 +124,7 @@ class Newton(Solver):
 
     def _jump(self, balance: Balance, geometry: Geometry, rest: Equilibrium) -> Jump | None:
         """Return starts from coarser meshes; None without any, or if the body deforms without load."""
-        if not self.coarse_start or self._searches(balance):
+        if not self.coarse_start or self._searches(balance) or not balance.loading.proportional:
             return None
         if not np.array_equal(rest.positions, balance.potential.nodes):
             return None
@@ -166,10 +173,11 @@ class Newton(Solver):
         assert start is not None  # the potential has a stress
         return mixed.converge(balance, level, start)
 
-    def _next_level(self, load_factor: float, step: float) -> float:
-        """Return the load factor plus a step, at most the next of k / load_steps."""
-        requested = (np.floor(load_factor * self.load_steps + 1e-9) + 1) / self.load_steps
-        return float(requested if load_factor + step > requested - 1e-9 else load_factor + step)
+    def _next_level(self, load_factor: float, step: float, corners: Sequence[float]) -> float:
+        """Return the load factor plus a step, at most the next of k / load_steps and of the corners of histories."""
+        requested = (np.floor(load_factor * self.load_steps + _SAME) + 1) / self.load_steps
+        requested = min([requested, *(one for one in corners if one > load_factor + _SAME)])
+        return float(requested if load_factor + step > requested - _SAME else load_factor + step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -240,7 +248,7 @@ def _predictions(balance: Balance, level: float, last: Found, previous: Equilibr
     motion = loading.motion(level) - loading.motion(state.load_factor)
     yield state.positions + motion
     if last.tangent is not None:
-        push = advance * loading.force(state.positions)
+        push = loading.force(state.positions, level) - loading.force(state.positions, state.load_factor)
         if motion.any():
             push = push - balance.product(balance.hessian(state.positions, state.load_factor), motion)
         push = np.where(balance.free, push, 0.0)

@@ -143,7 +143,7 @@ def _by_rotation(course: Course) -> Floats:
 
 def _by_work(course: Course) -> Floats:
     """Return the mean displacement along the force over the length, shape (n_levels,)."""
-    force = course.problem.loading.external_force
+    force = course.problem.loading.full.dead_force()
     work = np.einsum("ni,lni->l", force, course.displacements)
     return np.asarray(work / np.abs(force).sum() / course.extent[0])
 

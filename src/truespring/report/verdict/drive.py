@@ -35,7 +35,7 @@ def drive(result: Result) -> Drive:
     """
     if not result.problem.stated:
         return _of_probe(result)
-    loading = result.problem.loading
+    loading = result.problem.loading.full
     leading = leading_support(result.problem)
     if driven_by_motion(result) and leading is not None:
         held = result.problem.held[leading]

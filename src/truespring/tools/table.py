@@ -1,0 +1,9 @@
+"""The shapes of tools in study files."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from truespring.tools.tool import Tool
+
+#: The classes of tools by the value of the key `shape` of `[[tool]]`.
+TOOLS: Mapping[str, type[Tool]] = MappingProxyType({})
