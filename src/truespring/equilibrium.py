@@ -106,7 +106,7 @@ def geometry_of(problem: Problem, finite: bool = True) -> Geometry:
     return Geometry(upright, partial(select, problem.mesh))
 
 
-def _interpolations(problem: Problem, potential: Potential) -> "Sequence[sparse.csr_array[Any]]":
+def coarse_weights(problem: Problem, potential: Potential) -> "Sequence[sparse.csr_array[Any]]":
     """Return weights of the nodes of a potential from those of coarser meshes, empty unless the mesh is a lattice."""
     weights = interpolations(problem.mesh, _COARSEST)
     if not weights or not isinstance(potential, Refined):
@@ -132,7 +132,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     geometry = replace(
         upright,
         admissible=lambda positions: bool(ranks.first(float(upright.admissible(positions)))),
-        interpolations=partial(_interpolations, problem, potential),
+        interpolations=partial(coarse_weights, problem, potential),
     )
     if model.finite and model.any_mesh and alone:
         geometry = replace(geometry, coarse_body=partial(_coarse_body, model, CoarseBody.finest(problem, loading)))
@@ -180,7 +180,7 @@ def _coarse_body(model: Model, body: CoarseBody) -> Coarse | None:
         return None
     geometry = replace(
         geometry_of(coarse.problem),
-        interpolations=partial(_interpolations, coarse.problem, potential),
+        interpolations=partial(coarse_weights, coarse.problem, potential),
         coarse_body=partial(_coarse_body, model, coarse),
     )
     return Coarse(potential, coarse.loading, geometry, coarse.weights)

@@ -28,7 +28,7 @@ from truespring.material import Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, select_elements
 from truespring.mesh.selections import AXES
-from truespring.modes import centred, modes_at, n_modes
+from truespring.rigid_modes import centred, modes_at, n_modes
 from truespring.tools import TOOLS, Grasp, Tool
 
 _Found = TypeVar("_Found")

@@ -14,7 +14,7 @@ from truespring.arrays import Bools, Floats, ShortInts, Singles
 from truespring.linear.gradients import norm
 from truespring.linear.levels import Level, Matrix, condense, empty_level, inverse_of, product_pattern, worth
 from truespring.linear.multigrid import Coarsening, Hierarchy, Transfer
-from truespring.modes import rigid_body_modes
+from truespring.rigid_modes import rigid_body_modes
 
 # Largest number of unknowns of the coarsest level, which is inverted.
 _COARSEST = 200

@@ -15,7 +15,7 @@ from truespring.arrays import Bools, Floats, ShortInts, Singles
 from truespring.linear.aggregates import Aggregates, build
 from truespring.linear.levels import Level, Matrix, condense, empty_level, inverse_of, product_pattern, worth
 from truespring.linear.multigrid import Coarsening, Hierarchy
-from truespring.modes import rigid_body_modes
+from truespring.rigid_modes import rigid_body_modes
 
 # Largest number of unknowns of the coarsest level, which is inverted; aggregates follow if it has more.
 _COARSEST = 200

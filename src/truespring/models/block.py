@@ -12,7 +12,7 @@ from truespring.mesh import Mesh
 from truespring.models.boundary import Influence, Kelvin
 from truespring.models.panels import Panels
 from truespring.models.rules import require_body
-from truespring.modes import rigid_body_modes
+from truespring.rigid_modes import rigid_body_modes
 from truespring.problem import Problem
 
 

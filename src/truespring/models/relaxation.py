@@ -12,7 +12,7 @@ from truespring.models.by_rule import SpringsByRule
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
 from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.modes import rigid_body_modes
+from truespring.rigid_modes import rigid_body_modes
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
