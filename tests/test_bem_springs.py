@@ -17,8 +17,8 @@ from truespring.models.boundary import Influence, Kelvin
 from truespring.models.elasticity import hooke
 from truespring.models.frames import Turning
 from truespring.models.panels import Panels
-from truespring.rigid_modes import rigid_body_modes
 from truespring.report.bodies import path_lines
+from truespring.rigid_modes import rigid_body_modes
 from truespring.study import read_study, run
 from truespring.study.plan import plan
 from truespring.study.writing import write

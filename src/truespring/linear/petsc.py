@@ -16,9 +16,9 @@ from truespring.errors import OneProcessError, one_line
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import SlowError, conjugate_gradients, lowest_eigenvalue, scalar_product
 from truespring.memory import slices
-from truespring.rigid_modes import centred, modes_at
 from truespring.potential import SparseMatrix
 from truespring.ranks import Layout
+from truespring.rigid_modes import centred, modes_at
 
 #: Python modules that the solver needs, and how to install them.
 MODULES = ("mpi4py", "petsc4py")

@@ -12,8 +12,8 @@ from truespring.mesh import Mesh
 from truespring.models.boundary import Influence, Kelvin
 from truespring.models.panels import Panels
 from truespring.models.rules import require_body
-from truespring.rigid_modes import rigid_body_modes
 from truespring.problem import Problem
+from truespring.rigid_modes import rigid_body_modes
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from truespring.models.moduli import moduli
 from truespring.models.relaxation import pinned, relaxed
 from truespring.models.rules import require_body
 from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.rigid_modes import rigid_body_modes
 from truespring.problem import Problem
 from truespring.remembering import remembered
+from truespring.rigid_modes import rigid_body_modes
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from truespring.models.by_rule import SpringsByRule
 from truespring.models.links import link_vectors
 from truespring.models.rules import require_body
 from truespring.models.strain import uniform_strain, voigt_pairs
-from truespring.rigid_modes import rigid_body_modes
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
+from truespring.rigid_modes import rigid_body_modes
 
 # Unbalanced force below which a uniform strain is an equilibrium, relative to E h^(d-1): rounding.
 _BALANCED = 1e-8
