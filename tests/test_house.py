@@ -130,6 +130,7 @@ ALLOWED = {
         "units",
         "potential",
         "program",
+        "tools",
     },
     "report": {
         "comparison",

@@ -62,4 +62,9 @@ from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
 from .study import read_network as read_network
 from .sweeping import sweep as sweep
+from .tools import Block as Block
+from .tools import Capsule as Capsule
+from .tools import Grasp as Grasp
+from .tools import HalfSpace as HalfSpace
+from .tools import Sphere as Sphere
 from .validity import map_validity as map_validity

@@ -80,6 +80,22 @@ class Touch(NamedTuple):
     depth: float
 
 
+class Slide(NamedTuple):
+    """Coulomb friction at one state, for schemes that apply it node by node.
+
+    Attributes:
+        nodes: numbers of the nodes that touch the tool, shape (n,).
+        normals: unit normals that point away from the tool, shape (n, dim).
+        limit: coefficient of friction times normal force [N], shape (n,).
+        velocity: velocity of the tool [m/s], shape (dim,).
+    """
+
+    nodes: Ints
+    normals: Floats
+    limit: Floats
+    velocity: Floats
+
+
 @runtime_checkable
 class Interaction(Protocol):
     """An action on single nodes that depends on the level: contact with a tool, or a grasp; frozen.
@@ -119,6 +135,14 @@ class Interaction(Protocol):
 
     def lagged(self, positions: Floats, level: float) -> "Interaction":
         """Return the action with the normal forces of a state, for friction; the step begins where it did."""
+        ...
+
+    def slide(self, positions: Floats, level: float) -> Slide:
+        """Return the largest friction at a state; without nodes if there is none."""
+        ...
+
+    def cleared(self, positions: Floats, level: float) -> Floats:
+        """Return positions of finite energy near others [m], shape (n_nodes, dim): the start of a solver."""
         ...
 
     def touch(self, positions: Floats, level: float) -> Touch:
@@ -248,6 +272,13 @@ class Loading:
         if not self.interactions:
             return self
         return replace(self, interactions=tuple(one.lagged(positions, level) for one in self.interactions))
+
+    def cleared(self, positions: Floats, level: float) -> Floats:
+        """Return positions with the free nodes inside of barriers moved out of them [m], shape (n_nodes, dim)."""
+        moved = positions
+        for one in self.interactions:
+            moved = one.cleared(moved, level)
+        return positions if moved is positions else np.where(self.held, positions, moved)
 
     def at_rest(self, nodes: Floats) -> "Loading":
         """Return the loading of a linear theory: following loads become dead loads with their undeformed forces."""

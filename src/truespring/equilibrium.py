@@ -201,15 +201,15 @@ def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[li
 
 
 def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
-    """Return whether motion alone drives the body, and exceeds the rounding errors of the coordinates.
+    """Return whether only tools, grasps or motion drive the body, motion by more than the coordinates' rounding errors.
 
-    Such a state is an equilibrium whatever its residual: of a body moved as a whole all forces are rounding errors,
-    and so is their ratio.
+    Such a state is an equilibrium whatever its residual: of a body moved as a whole, and of one that no tool touches,
+    all forces are rounding errors, and so is their ratio.
     """
     loading, nodes = problem.loading, problem.mesh.nodes
     rounding = float(np.finfo(float).eps * np.abs(nodes).max())
     moved = float(np.abs(loading.motion(load_factor)).max())
-    return loading.driven_by_motion and UNBALANCED * moved > rounding
+    return loading.driven_by_motion and (bool(loading.interactions) or UNBALANCED * moved > rounding)
 
 
 def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list[Equilibrium], tuple[str, ...]]:

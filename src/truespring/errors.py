@@ -32,6 +32,14 @@ class LoadError(ProblemError):
         self.number, self.text = number, text
 
 
+class ToolError(ProblemError):
+    """A tool or grasp does not fit the body; `name` is its name, `key` the wrong argument or empty."""
+
+    def __init__(self, name: str, text: str, key: str = "") -> None:
+        super().__init__(f"'{name}': {key}{': ' * bool(key)}{text}")
+        self.name, self.text, self.key = name, text, key
+
+
 class FibreError(ProblemError):
     """The fibres of a material have a wrong direction in a body; `fibres` are these fibres."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.conditions import Amplitude, Loading, Turn
 from truespring.dynamics import Dynamics
-from truespring.errors import LoadError, NoLoadError, ProblemError, TruespringError
+from truespring.errors import LoadError, NoLoadError, ProblemError, ToolError, TruespringError
 from truespring.fibres import Families, families
 from truespring.loading import (
     LOADS,
@@ -243,6 +243,7 @@ class Problem:
             following = tuple(self._of_each_load(lambda load: load.following(body, held), loads))
             parts.append(Loading(force, held, displacement, turned, following, amplitude))
         several: tuple[Tool | Grasp, ...] = (*self.tools, *self.grasps)
+        _check_names(several)
         acting = tuple(one.acting_on(body, self._young, self.duration or 1.0) for one in several)
         return replace(parts[0], further=tuple(parts[1:]), interactions=acting)
 
@@ -357,6 +358,9 @@ def sample(problem: Problem, elements: Ints) -> Problem:
         ),
         supports=[Fixed(on=nodes, displacement=(1.0,) * mesh.dim)],  # type: ignore[arg-type]
         loads=(),
+        tools=(),
+        grasps=(),
+        dynamics=None,
         regions=_regions_of(problem, numbers),
     )
 
@@ -402,6 +406,15 @@ def _several(value: object, kind: type, name: str, allowed: str) -> tuple[Any, .
     if not isinstance(several, Sequence) or not all(isinstance(one, kind) for one in several):
         raise ProblemError(f"{name} = {value!r}: must be a list of {allowed}")
     return tuple(several)
+
+
+def _check_names(several: Sequence[Tool | Grasp]) -> None:
+    """Raise ToolError if two tools or grasps have one name."""
+    seen: set[str] = set()
+    for one in several:
+        if one.name in seen:
+            raise ToolError(one.name, "is the name of two tools or grasps, which tables list by name", "name")
+        seen.add(one.name)
 
 
 def _history(one: Load | Fixed) -> Rows | None:

@@ -57,7 +57,7 @@ class State:
         all_positions: of all nodes of the potential, the mesh's first [m], shape (n_all, dim); quadratic elements have
             more nodes than the mesh.
         reaction: force of the supports [N], shape (n_nodes, dim), zero in free directions.
-        applied_force: total of the loads [N], shape (dim,).
+        applied_force: total of loads, tools and grasps [N], shape (dim,).
         energy: stored elastic energy [J].
         iterations: Newton iterations.
         residual: relative unbalanced force [-].
@@ -230,11 +230,13 @@ class Solution:
         return leading_support(self.problem)
 
     def applied_force(self, state: State) -> Floats:
-        """Return the total applied force [N], shape (dim,); without loads, the force of the support that moves most.
+        """Return the total force of loads, tools and grasps [N], shape (dim,).
 
-        Of supports that move equally far, the first one counts. NaN if it is not known.
+        Without any, it is the force of the support that moves most; of supports that move equally far, the first one
+        counts. NaN if it is not known.
         """
-        if not self.problem.stated or not self.problem.loading.driven_by_motion:
+        loading = self.problem.loading if self.problem.stated else None
+        if loading is None or loading.interactions or not loading.driven_by_motion:
             return state.applied_force
         of_leading = [one.force for one in self.support_forces(state) if one.support == self._leading]
         return of_leading[0] if of_leading else np.full(self.problem.mesh.dim, math.nan)

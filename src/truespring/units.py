@@ -10,7 +10,9 @@ from truespring.errors import TruespringError, shown
 if TYPE_CHECKING:
     import pint
 
-Dimension = Literal["length", "stress", "force", "density", "acceleration", "moment", "angle", "stiffness"]
+Dimension = Literal[
+    "length", "stress", "force", "density", "acceleration", "moment", "angle", "stiffness", "stiffness per area", "time"
+]
 
 #: The SI unit of each dimension, and an example for error messages.
 SI_UNITS: dict[Dimension, tuple[str, str]] = {
@@ -22,6 +24,8 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "moment": ("N m", '"20 N mm"'),
     "angle": ("rad", '"30 deg"'),
     "stiffness": ("N/m", '"5 N/mm"'),
+    "stiffness per area": ("N/m^3", '"5 N/mm^3"'),
+    "time": ("s", '"0.2 s"'),
 }
 
 #: Limits on the magnitude of nonzero quantities in SI units; their fourth powers do not overflow.

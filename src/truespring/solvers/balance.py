@@ -13,7 +13,7 @@ from truespring.errors import ProblemError
 from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
-from truespring.potential import Potential, SparseMatrix, Unstressed, with_diagonal
+from truespring.potential import Potential, Projectable, SparseMatrix, Unstressed, with_diagonal
 from truespring.ranks import ranks_of
 from truespring.solvers.cost import Cost
 
@@ -154,6 +154,20 @@ class Balance:
         for one in self.loading.interactions:
             nodes, blocks = one.blocks(positions, load_factor)
             tangent = with_diagonal(tangent, blocks, nodes)
+        return tangent
+
+    def projected(self, positions: Floats, load_factor: float) -> SparseMatrix | None:
+        """Return the projected Hessian of the potential plus the positive part of that of tools and grasps [N/m].
+
+        None if the potential has none.
+        """
+        if not isinstance(self.potential, Projectable):
+            return None
+        tangent = self.in_blocks(self.potential.projected_hessian(positions))
+        for one in self.loading.interactions:
+            nodes, blocks = one.blocks(positions, load_factor)
+            values, axes = np.linalg.eigh(blocks)
+            tangent = with_diagonal(tangent, axes * np.maximum(values, 0.0)[:, None] @ axes.swapaxes(1, 2), nodes)
         return tangent
 
     def in_blocks(self, matrix: SparseMatrix) -> SparseMatrix:

@@ -9,7 +9,7 @@ from scipy import sparse
 from truespring.arrays import Floats
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError
-from truespring.potential import Projectable, SparseMatrix
+from truespring.potential import SparseMatrix
 from truespring.solvers.balance import Balance, Found, Watch, stepped
 
 # Relative differences of energy below this are rounding errors; see `_search`.
@@ -56,7 +56,7 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
         if undamped_iterations or watch.below_rounding:
             moved = _full_step(balance, positions, tangent, watch.force)
         else:
-            step = _step(balance, positions, tangent, watch.force, watch.residual)
+            step = _step(balance, positions, tangent, watch)
             moved = step and _search(balance, load_factor, positions, step)
         del tangent
         if moved is None:
@@ -80,26 +80,29 @@ def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, force
     return moved if np.isfinite(balance.total_energy(moved, 0.0)[0]) else None
 
 
-def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats, residual: float) -> Step | None:
+def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, watch: Watch) -> Step | None:
     """Return a descent direction by the tangent if it is positive definite, else by an approximation that is."""
     if not balance.is_finite(tangent):
         return None
-    for candidate in _candidates(balance, positions, tangent):
-        direction = stepped(balance, candidate, positions, -force, balance.accuracy(residual))
+    for candidate in _candidates(balance, positions, tangent, watch.load_factor):
+        direction = stepped(balance, candidate, positions, -watch.force, balance.accuracy(watch.residual))
         if direction is None:
             continue
-        slope = balance.scalar_product(direction, force)
+        slope = balance.scalar_product(direction, watch.force)
         if slope < 0:
             return Step(direction, slope, candidate is tangent)
     return None
 
 
-def _candidates(balance: Balance, positions: Floats, tangent: SparseMatrix) -> Iterator[SparseMatrix]:
+def _candidates(
+    balance: Balance, positions: Floats, tangent: SparseMatrix, load_factor: float
+) -> Iterator[SparseMatrix]:
     """Yield the tangent, its projection, then the projection plus a growing share of its diagonal."""
     yield tangent
-    projected = tangent
-    if isinstance(balance.potential, Projectable):
-        projected = balance.in_blocks(balance.potential.projected_hessian(positions))
+    projected = balance.projected(positions, load_factor)
+    if projected is None:
+        projected = tangent
+    else:
         yield projected
     diagonal = np.abs(balance.diagonal(projected)).ravel()
     for share in (1e-6, 1e-4, 1e-2, 1.0, 10.0):

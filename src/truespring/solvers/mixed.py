@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.potential import Projectable, SparseMatrix, Stressed
+from truespring.potential import SparseMatrix, Stressed
 from truespring.solvers.balance import Balance, Equilibrium, Found, Watch, stepped
 
 # Largest number of iterations: it converges in less than ten, or hardly ever.
@@ -44,11 +44,11 @@ def start_from(balance: Balance, level: float, last: Equilibrium, previous: Equi
     if previous is not None and not last.branched:
         ratio = advance / (last.load_factor - previous.load_factor)
         ahead = last.positions + ratio * (last.positions - previous.positions)
-        ahead = np.where(loading.held, potential.nodes + loading.motion(level), ahead)
+        ahead = loading.cleared(np.where(loading.held, potential.nodes + loading.motion(level), ahead), level)
         if np.isfinite(balance.total_energy(ahead, level)[0]):
             return Start(ahead, stress + ratio * (stress - potential.stress(previous.positions)))
     motion = loading.motion(level) - loading.motion(last.load_factor)
-    return Start(last.positions, stress, motion if motion.any() else None)
+    return Start(loading.cleared(last.positions, level), stress, motion if motion.any() else None)
 
 
 def converge(balance: Balance, load_factor: float, start: Start) -> Found:
@@ -90,9 +90,9 @@ def _step(
     """
     for candidate in (tangent, None):
         if candidate is None:
-            if not isinstance(balance.potential, Projectable):
+            candidate = balance.projected(positions, watch.load_factor)
+            if candidate is None:
                 return None
-            candidate = balance.in_blocks(balance.potential.projected_hessian(positions))
         right = -watch.force
         if motion is not None:
             right = np.where(balance.free, right - balance.product(candidate, motion), 0.0)

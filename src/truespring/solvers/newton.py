@@ -229,11 +229,8 @@ def linear_of(name: str, potential: Potential, loading: Loading, geometry: Geome
 
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
     """Return the equilibrium at `level` by line search, from the prediction of least unbalanced force."""
-    guesses = [
-        guess
-        for guess in _predictions(balance, level, last, previous)
-        if np.isfinite(balance.total_energy(guess, 0)[0])
-    ]
+    starts = (balance.loading.cleared(guess, level) for guess in _predictions(balance, level, last, previous))
+    guesses = [start for start in starts if np.isfinite(balance.total_energy(start, level)[0])]
     if not guesses:
         state = last.state
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))

@@ -47,7 +47,7 @@ def plan(study: Study) -> dict[str, Any]:
         "supports": [support.words(mesh.dim) for support in problem.supports],
         "loads": [load.words() for load in problem.loads],
         "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
-        "total_force": loading.force(mesh.nodes).sum(axis=0).tolist(),
+        "total_force": loading.loads(mesh.nodes).sum(axis=0).tolist(),
         "largest_motion": float(np.linalg.norm(loading.motion(), axis=1).max()),
         "load_steps": study.solver.load_steps,
         "models": {name: _model_plan(study, name) for name in study.entries},

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.errors import FibreError, LoadError, NoLoadError, StudyError, TruespringError
+from truespring.errors import FibreError, LoadError, NoLoadError, StudyError, ToolError, TruespringError
 from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
 from truespring.models import Model, SpringNetwork, check_fibres
@@ -18,7 +18,7 @@ from truespring.study.changes import changed
 from truespring.study.faults import fault_lines
 from truespring.study.parsing import parse
 from truespring.study.places import Places
-from truespring.study.schema import Scope, StudyKeys
+from truespring.study.schema import Scope, StudyKeys, key_of_tool
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,14 +177,19 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
             regions.append(region.region(mesh))
     supports = [support.build(places, number, mesh) for number, support in enumerate(keys.support)]
     loads = [load.build(places, number, mesh) for number, load in enumerate(keys.load)]
+    tools = [tool.build(places, number, mesh) for number, tool in enumerate(keys.tool)]
+    grasps = [grasp.build(places, number, mesh) for number, grasp in enumerate(keys.grasp)]
     try:
-        return Problem(mesh, material, section, supports, loads, regions), network
+        return Problem(mesh, material, section, supports, loads, regions, tools=tools, grasps=grasps), network
     except FibreError as error:
         own = [number for number, region in enumerate(regions) if region.material.fibres == error.fibres]
         with places.at("region", own[0]) if own else places.at("material"):
             raise
     except LoadError as error:
         with places.at("load", error.number):
+            raise StudyError(error.text) from None
+    except ToolError as error:
+        with places.at(*key_of_tool(error.name, error.key, {"tool": tools, "grasp": grasps})):
             raise StudyError(error.text) from None
     except TruespringError as error:
         with places.at("load" if isinstance(error, NoLoadError) else "support"):

@@ -13,7 +13,7 @@ from truespring.models import ELEMENTS, LAWS, PAIR_LAWS, RULES
 from truespring.units import LARGEST, SI_UNITS, SIZES, SMALLEST, Dimension, to_si
 
 
-def _as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a conversion that raises ValueError, which pydantic collects, instead of TruespringError."""
 
     def converted(value: Any) -> Any:
@@ -26,7 +26,7 @@ def _as_value_error(convert: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _si(dimension: Dimension) -> BeforeValidator:
-    return BeforeValidator(_as_value_error(lambda value: to_si(value, dimension)))
+    return BeforeValidator(as_value_error(lambda value: to_si(value, dimension)))
 
 
 def _quantity(dimension: Dimension) -> WithJsonSchema:
@@ -35,7 +35,7 @@ def _quantity(dimension: Dimension) -> WithJsonSchema:
     return WithJsonSchema({"type": ["number", "string"], "description": description})
 
 
-def _key_of(names: Collection[str]) -> BeforeValidator:
+def key_of(names: Collection[str]) -> BeforeValidator:
     """Return a validator that accepts the keys of a mapping such as RULES."""
 
     def check(value: Any) -> Any:
@@ -63,24 +63,26 @@ def _file_name(value: Any) -> Any:
 Length = Annotated[float, _si("length"), _quantity("length")]
 Stress = Annotated[float, _si("stress"), _quantity("stress")]
 Density = Annotated[float, _si("density"), _quantity("density")]
+Stiffness = Annotated[float, _si("stiffness"), _quantity("stiffness")]
+StiffnessPerArea = Annotated[float, _si("stiffness per area"), _quantity("stiffness per area")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
 QUANTITIES: dict[Dimension, Any] = {
     dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
 }
 _RULES = {"description": "; ".join(f"{name}: {rule.idea}" for name, rule in RULES.items())}
-RuleName = Annotated[str, _key_of(RULES), WithJsonSchema({"enum": list(RULES)} | _RULES)]
+RuleName = Annotated[str, key_of(RULES), WithJsonSchema({"enum": list(RULES)} | _RULES)]
 _PLAIN_RULES = [name for name, rule in RULES.items() if not rule.coupled]
-PlainRuleName = Annotated[str, _key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
+PlainRuleName = Annotated[str, key_of(_PLAIN_RULES), WithJsonSchema({"enum": _PLAIN_RULES})]
 _LAWS = {"description": "; ".join(f"{name}: {law.source}" for name, law in LAWS.items())}
-LawName = Annotated[str, _key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
+LawName = Annotated[str, key_of(LAWS), WithJsonSchema({"enum": list(LAWS)} | _LAWS)]
 # Laws that no spring has are an error of the model, with the reason.
 _SPRINGS_LAWS = list(dict.fromkeys((*LAWS, *PAIR_LAWS)))
-SpringsLawName = Annotated[str, _key_of(_SPRINGS_LAWS), WithJsonSchema({"enum": _SPRINGS_LAWS})]
-FemElement = Annotated[str, _key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
-PlaneElement = Annotated[str, _key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
-SolidElement = Annotated[str, _key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
-Diagonal = Annotated[str, _key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
-SectionKind = Annotated[str, _key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
+SpringsLawName = Annotated[str, key_of(_SPRINGS_LAWS), WithJsonSchema({"enum": _SPRINGS_LAWS})]
+FemElement = Annotated[str, key_of(ELEMENTS), WithJsonSchema({"enum": list(ELEMENTS)})]
+PlaneElement = Annotated[str, key_of(PLANE_ELEMENTS), WithJsonSchema({"enum": list(PLANE_ELEMENTS)})]
+SolidElement = Annotated[str, key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": list(SOLID_ELEMENTS)})]
+Diagonal = Annotated[str, key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
+SectionKind = Annotated[str, key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
 #: Path of a file, relative to the folder of the study unless absolute.
 FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
@@ -155,10 +157,10 @@ _ON_SCHEMA = {
         ),
     ],
 }
-On = Annotated[Any, PlainValidator(_as_value_error(_selection)), WithJsonSchema(_ON_SCHEMA)]
+On = Annotated[Any, PlainValidator(as_value_error(_selection)), WithJsonSchema(_ON_SCHEMA)]
 _POINT_SCHEMA = {"type": "array", "items": {"type": ["number", "string"]}}
 Probe = Annotated[
-    Any, PlainValidator(_as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
+    Any, PlainValidator(as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
 ]
 
 
@@ -166,7 +168,7 @@ _ONE_ALONG = [{"type": "string"}, {"type": "array", "items": {"type": "number"},
 #: Direction of fibres: a vector or the name of an array of the mesh file, or a list of these.
 Along = Annotated[
     Any,
-    PlainValidator(_as_value_error(_along)),
+    PlainValidator(as_value_error(_along)),
     WithJsonSchema({"anyOf": [*_ONE_ALONG, {"type": "array", "items": {"anyOf": _ONE_ALONG}, "minItems": 1}]}),
 ]
 

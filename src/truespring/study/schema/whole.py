@@ -15,6 +15,7 @@ from truespring.study.places import Places
 from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, SectionKeys, SupportKeys
 from truespring.study.schema.meshes import AnyMesh
 from truespring.study.schema.models import AnyModel, ModelKeys
+from truespring.study.schema.tools import GraspKeys, ToolKeys
 from truespring.study.schema.values import Direction, Keys, Length, Number, On, Probe
 
 
@@ -155,6 +156,8 @@ class StudyKeys(Keys):
         description="supports, which together prevent rigid-body motion"
     )
     load: list[AnyLoad] = Field(default=[], description="loads; load_factor scales all of them, linearly")
+    tool: list[ToolKeys] = Field(default=[], description="rigid bodies that move and touch the body")
+    grasp: list[GraspKeys] = Field(default=[], description="patches held by springs to a place that moves")
     solver: SolverKeys = Field(default=SolverKeys(), description="how equilibrium is found")
     models: Annotated[dict[ModelName, AnyModel], Field(min_length=1)] = Field(
         description="models to solve, by names of your choice"

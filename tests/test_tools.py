@@ -1,0 +1,393 @@
+"""Tools and grasps: derivatives, areas, closed forms of contact and friction, and wrong input."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truespring as ts
+from truespring.arrays import Floats
+from truespring.conditions import Interaction
+from truespring.errors import ProblemError, StudyError
+from truespring.mesh import SecondOrder
+from truespring.study import read_study
+from truespring.tools import TOOLS, Tool
+
+YOUNG, POISSON = 10e3, 0.3
+MATERIAL = ts.Material(YOUNG, POISSON)
+
+
+def body(dim: int, element: str | None = None) -> ts.Mesh:
+    """A block of 60 mm by 30 mm, with its top at y = 30 mm; not quite regular."""
+    if dim == 2:
+        return ts.rectangle((0.06, 0.03), (12, 6), element or "quadrilateral")
+    return ts.box((0.06, 0.03, 0.06), (6, 2, 6), element or "hexahedron")
+
+
+def problem(mesh: ts.Mesh, *tools: Tool, grasps: tuple[ts.Grasp, ...] = (), supports: object = None) -> ts.Problem:
+    section = ts.PlaneStrain(0.01) if mesh.dim == 2 else None
+    held = [ts.Fixed("bottom")] if supports is None else supports
+    return ts.Problem(mesh, MATERIAL, section, held, tools=tools, grasps=grasps)  # type: ignore[arg-type]
+
+
+def path(dim: int, *rows: tuple[float, float, float]) -> list[list[float]]:
+    """Rows of place on the way, x and y, at the middle along z."""
+    return [[*row, *([0.03] if dim == 3 else [])] for row in rows]
+
+
+def above(dim: int) -> dict[str, Tool]:
+    """One tool of each shape that touches the top at level 0, and goes down by 3 mm."""
+    down = path(dim, (0, 0.031, 0.041), (1, 0.032, 0.038))
+    flat = path(dim, (0, 0.031, 0.031), (1, 0.032, 0.028))
+    zero = (0.0,) * (dim - 2)
+    return {
+        "sphere": ts.Sphere("tool", 0.03, path(dim, (0, 0.031, 0.061), (1, 0.032, 0.058))),
+        "capsule": ts.Capsule("tool", 0.01, (-0.011, 0.0, *zero), (0.012, 0.002, *zero), down),
+        "plane": ts.HalfSpace("tool", (0.04, -2.0, *zero), flat),
+        "box": ts.Block("tool", (0.023, 0.02, *([0.021] if dim == 3 else [])), down),
+    }
+
+
+def test_every_shape_is_tested() -> None:
+    assert above(2).keys() == above(3).keys() == TOOLS.keys()
+
+
+def in_a_step(tool: Tool, mesh: ts.Mesh, seed: int = 3) -> tuple[Interaction, Floats]:
+    """Contact in the middle of a step with friction, and positions at which nodes touch, some sliding."""
+    acting = problem(mesh, replace(tool, friction=0.4)).loading.interactions[0]
+    moved = np.random.default_rng(seed).uniform(-4e-4, 4e-4, (2, *mesh.nodes.shape))
+    begin = acting.cleared(mesh.nodes + moved[0], 0.8)
+    positions = acting.cleared(begin + moved[1], 1.0)
+    return acting.since(begin, 0.8, 3e-4).lagged(positions, 1.0), positions
+
+
+@pytest.mark.parametrize("contact", ["penalty", "barrier"])
+@pytest.mark.parametrize("shape", TOOLS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_gradient_and_blocks_are_derivatives(dim: int, shape: str, contact: str) -> None:
+    width = 5e-3 if contact == "barrier" else None
+    mesh = body(dim)
+    acting, positions = in_a_step(replace(above(dim)[shape], contact=contact, width=width), mesh)
+    nodes, blocks = acting.blocks(positions, 1.0)
+    found = acting.gradient(positions, 1.0)
+    assert np.array_equal(np.flatnonzero(found.any(axis=1)), np.sort(nodes))
+    assert len(nodes) >= 2
+    step = 1e-8
+    by_energy, by_gradient = np.zeros_like(found), np.zeros_like(blocks)
+    for row, node in enumerate(nodes):
+        for axis in range(dim):
+            there = [positions.copy() for _ in range(2)]
+            there[0][node, axis] += step
+            there[1][node, axis] -= step
+            energies = [acting.energy(one, 1.0) for one in there]
+            by_energy[node, axis] = (energies[0] - energies[1]) / (2 * step)
+            gradients = [acting.gradient(one, 1.0)[node] for one in there]
+            by_gradient[row, :, axis] = (gradients[0] - gradients[1]) / (2 * step)
+    assert by_energy == pytest.approx(found, abs=1e-6 * np.abs(found).max())
+    assert by_gradient == pytest.approx(blocks, abs=2e-5 * np.abs(blocks).max())
+    assert blocks == pytest.approx(blocks.swapaxes(1, 2), abs=1e-12 * np.abs(blocks).max())
+
+
+def test_stored_energy_is_without_friction() -> None:
+    acting, positions = in_a_step(above(3)["sphere"], body(3))
+    assert 0 < acting.stored(positions, 1.0) < acting.energy(positions, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "area"),
+    [
+        (ts.rectangle((0.06, 0.03), (4, 3)), 0.18 * 0.01),
+        (ts.box((0.06, 0.03, 0.06), (4, 2, 4)), 2 * (2 * 0.06 * 0.03 + 0.06**2)),
+        (ts.box((0.06, 0.03, 0.06), (4, 2, 4), "tetrahedron"), 2 * (2 * 0.06 * 0.03 + 0.06**2)),
+    ],
+)
+def test_areas_are_those_of_the_surface(mesh: ts.Mesh, area: float) -> None:
+    """A plane deep inside pushes each node with stiffness times area times depth."""
+    ways = ((0, -1.0, *(0.0,) * (mesh.dim - 1)), (1, 1.0, *(0.0,) * (mesh.dim - 1)))
+    tool = ts.HalfSpace("tool", (1, 0, 0)[: mesh.dim], ways, stiffness=7.0)
+    bodies = [problem(mesh, tool).body]
+    if mesh.element == "tetrahedron":
+        bodies.append(bodies[0]._replace(second_order=SecondOrder(mesh)))
+    for one in bodies:
+        force = tool.acting_on(one, None, 1.0).touch(one.nodes, 1.0).force
+        assert force[0] == pytest.approx(-7.0 * area * (1 - 0.03), rel=1e-12)
+        assert not force[1:].any()
+
+
+def uniaxial(mesh: ts.Mesh, tool: Tool) -> ts.Problem:
+    """A block that only changes its height."""
+    sides = [ts.Fixed(side, fix=[axis]) for side, axis in (("left", "x"), ("right", "x"), ("bottom", "y"))]
+    if mesh.dim == 3:
+        sides += [ts.Fixed("back", fix=["z"]), ts.Fixed("front", fix=["z"])]
+    return problem(mesh, tool, supports=sides)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_plane_compresses_a_block_as_two_springs_in_series(dim: int) -> None:
+    """The body of stiffness M / H per area, M the modulus of confined compression, and the contact k."""
+    mesh, stiffness, way = body(dim), 3e6, 0.002
+    tool = ts.HalfSpace(
+        "plate", (0, -1, 0)[:dim], path(dim, (0, 0, 0.031), (1, 0, 0.03 - way)), stiffness=stiffness, on="top"
+    )
+    solution = ts.solve(uniaxial(mesh, tool), ts.Fem("linear"))
+    assert solution.status == ts.Status.CONVERGED
+    modulus = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
+    area = 0.06 * (0.01 if dim == 2 else 0.06)
+    force = area * way / (0.03 / modulus + 1 / stiffness)
+    state = solution.states[-1]
+    assert solution.applied_force(state)[1] == pytest.approx(-force, rel=1e-9)
+    touch = solution.problem.loading.interactions[0].touch(state.all_positions, 1.0)
+    assert touch.force[1] == pytest.approx(force, rel=1e-9)
+    assert touch.depth == pytest.approx(force / area / stiffness, rel=1e-9)
+    assert touch.place[1] == pytest.approx(0.03 - way)
+    first = solution.states[3]  # the plate does not touch yet
+    assert not solution.applied_force(first).any()
+    assert solution.states[4].displacement[:, 1].min() < 0
+
+
+@pytest.mark.parametrize("model", [ts.Fem("neo-hookean"), ts.Springs("gaussian")])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_barrier_keeps_all_nodes_out(dim: int, model: ts.Fem | ts.Springs) -> None:
+    mesh, way = body(dim), path(dim, (0, 0.03, 0.0405), (1, 0.03, 0.036))
+    one = problem(mesh, ts.Sphere("ball", 0.01, way, contact="barrier"))
+    solution = ts.solve(one, model, ts.Newton(4))
+    assert solution.status == ts.Status.CONVERGED
+    acting, width = one.loading.interactions[0], 1e-3 * mesh.diameter
+    gaps = [
+        np.linalg.norm(state.positions - acting.touch(state.positions, state.load_factor).place, axis=1).min() - 0.01
+        for state in solution.states
+    ]
+    assert len(gaps) == 5
+    assert all(0 < gap < width for gap in gaps[1:])
+    assert all(acting.touch(state.positions, state.load_factor).depth == 0 for state in solution.states)
+
+
+def rubbed(dim: int, drag: float, friction: float = 0.3) -> tuple[ts.Solution, Interaction]:
+    """A block pressed by a plane in the first half of the way, then dragged along x."""
+    rows = path(dim, (0, 0, 0.03), (0.5, 0, 0.029), (1, drag, 0.029))
+    tool = ts.HalfSpace("plate", (0, -1, 0)[:dim], rows, friction=friction, on="top")
+    one = problem(body(dim), tool)
+    return ts.solve(one, ts.Fem("neo-hookean"), ts.Newton(8)), one.loading.interactions[0]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_plate_that_slides_drags_with_the_coefficient_of_friction(dim: int) -> None:
+    solution, _ = rubbed(dim, 0.02)
+    assert solution.status == ts.Status.CONVERGED
+    pressed, dragged = solution.at(0.5), solution.states[-1]
+    assert pressed is not None
+    assert abs(pressed.applied_force[0]) < 1e-6 * abs(pressed.applied_force[1])
+    assert dragged.applied_force[0] / -dragged.applied_force[1] == pytest.approx(0.3, rel=1e-3)
+
+
+def test_below_the_limit_a_plate_sticks() -> None:
+    """The shear of a block under 0.2 % is below the friction of a pressure of 3 %."""
+    drag = 6e-5
+    solution, _ = rubbed(2, drag, friction=0.8)
+    state, pressed = solution.states[-1], solution.at(0.5)
+    assert pressed is not None
+    assert 0 < state.applied_force[0] < 0.8 * -state.applied_force[1]
+    top = solution.problem.mesh.nodes[:, 1] > 0.0299
+    slip = drag - (state.displacement - pressed.displacement)[top, 0]
+    creep = 1e-5 * solution.problem.mesh.diameter
+    assert np.abs(slip).max() < 4 * creep  # of four steps
+    assert np.median(np.abs(slip)) < 2 * creep
+
+
+def test_friction_of_a_node_at_a_state() -> None:
+    """As an explicit scheme needs it: coefficient times normal force, and the tool's velocity in a motion of 2 s."""
+    mesh = body(3)
+    tool = ts.HalfSpace("plate", (0, -1, 0), [[0, 0, 0.03, 0], [1, 0, 0.029, 0], [2, 0.02, 0.029, 0]], friction=0.3)
+    acting = tool.acting_on(problem(mesh, tool).body, YOUNG, 2.0)
+    slide = acting.slide(mesh.nodes, 0.75)
+    pushed = acting.gradient(mesh.nodes, 0.75)
+    assert np.array_equal(slide.nodes, np.flatnonzero(mesh.nodes[:, 1] > 0.0299))
+    assert slide.limit == pytest.approx(0.3 * np.linalg.norm(pushed[slide.nodes], axis=1))
+    assert slide.normals == pytest.approx(np.tile((0, -1, 0), (len(slide.nodes), 1)))
+    assert slide.velocity == pytest.approx((0.02, 0, 0))
+    assert acting.slide(mesh.nodes, 0.25).velocity == pytest.approx((0, -0.001, 0))
+    assert acting.corners == (0.5,)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_stiff_grasp_moves_its_patch_like_a_support(dim: int) -> None:
+    mesh = body(dim)
+    at = (0.06, 0.015, 0.03)[:dim]
+    rows = [[0, *at], [1, at[0] + 0.004, at[1] + 0.003, *at[2:]]]
+    grasp = ts.Grasp("forceps", at, 0.011, rows, stiffness=1e9)
+    solution = ts.solve(problem(mesh, grasps=(grasp,)), ts.Fem("neo-hookean"))
+    assert solution.status == ts.Status.CONVERGED
+    patch = np.flatnonzero((np.linalg.norm(mesh.nodes - at, axis=1) <= 0.011) & (mesh.nodes[:, 0] > 0.0599))
+    assert len(patch) >= 3
+    motion = (0.004, 0.003, 0)[:dim]
+    moved = problem(mesh, supports=[ts.Fixed("bottom"), ts.Fixed(patch, displacement=motion)])  # type: ignore[arg-type]
+    expected = ts.solve(moved, ts.Fem("neo-hookean"))
+    state = solution.states[-1]
+    assert state.displacement == pytest.approx(expected.states[-1].displacement, abs=1e-7)
+    force = solution.applied_force(state)
+    assert force == pytest.approx(expected.applied_force(expected.states[-1]), rel=1e-4)
+    assert force + state.reaction.sum(axis=0) == pytest.approx(0, abs=1e-8 * np.abs(force).max())
+    touch = solution.problem.loading.interactions[0].touch(state.positions, 1.0)
+    assert touch.force == pytest.approx(-force)
+    assert not solution.applied_force(solution.states[0]).any()
+
+
+def test_the_springs_of_a_grasp_share_its_stiffness() -> None:
+    """On a body at rest the force is stiffness times motion; by default E times the radius, or the thickness."""
+    for dim, stiffness in ((2, YOUNG * 0.01), (3, YOUNG * 0.012)):
+        at = (0.06, 0.015, 0.03)[:dim]
+        grasp = ts.Grasp("forceps", at, 0.012, [[0, *at], [1, 0.061, *at[1:]]])
+        one = problem(body(dim), grasps=(grasp,))
+        touch = one.loading.interactions[0].touch(one.mesh.nodes, 1.0)
+        assert touch.force[0] == pytest.approx(-stiffness * 0.001)
+        assert touch.depth == pytest.approx(0.001)
+        assert one.loading.interactions[0].largest_stiffness().sum() == pytest.approx(stiffness)
+
+
+BALL = ts.Sphere("ball", 0.01, [[0, 0.03, 0.041], [1, 0.03, 0.037]])
+
+
+@pytest.mark.parametrize(
+    ("tool", "words"),
+    [
+        (
+            replace(BALL, path=[[0, 0.03, 0.0375], [1, 0.03, 0.037]]),
+            ["ball", "inside the body by 0.0025 m", "(0.03, 0.04)"],
+        ),
+        (
+            replace(BALL, path=[[0, 0.03, 0.04], [1, 0.03, 0.037]], contact="barrier"),
+            ["ball", "barrier starts outside"],
+        ),
+        (replace(BALL, path=[[0, 0.03, 0.041], [0.8, 0.03, 0.037]]), ["ball", "path ends at 0.8", "[1, ...]"]),
+        (replace(BALL, path=[[0.1, 0.03, 0.041], [1, 0.03, 0.037]]), ["path begins at 0.1", "[0, ...]"]),
+        (replace(BALL, path=[[0, 0.03, 0.041], [0, 0.03, 0.037], [1, 0, 0]]), ["must ascend"]),
+        (replace(BALL, path=[[0, 0.03, 0.041, 0], [1, 0.03, 0.037, 0]]), ["2 coordinates", "3 values, not 4"]),
+        (replace(BALL, path=[0.03, 0.041, 0]), ["does not move", "2 values, not 3"]),
+        (replace(BALL, path=[[0, 0.03, 0.041], [1, 0.03]]), ["rows of equal length"]),
+        (replace(BALL, path="down"), ["rows of equal length"]),
+        (replace(BALL, radius=-0.01), ["radius", "positive number"]),
+        (replace(BALL, friction=-0.1), ["friction", "not negative"]),
+        (replace(BALL, stiffness=0.0), ["stiffness", "positive number"]),
+        (replace(BALL, width=float("nan")), ["width", "positive number"]),
+        (replace(BALL, contact="barier"), ["contact", "did you mean 'barrier'"]),
+        (replace(BALL, on="lft"), ["on", "left"]),
+        (ts.HalfSpace("ball", (0, 0), [0, 1]), ["normal", "must not be zero"]),
+        (ts.HalfSpace("ball", (0, -1, 0), [0, 1]), ["normal", "2 numbers"]),
+        (ts.Block("ball", (0.01, 0), [0, 1]), ["size", "must be positive"]),
+        (ts.Capsule("ball", 0.01, (0, 0), (0, 0), [0, 1]), ["end", "use a sphere"]),
+        (ts.Grasp("ball", (0.07, 0.015), 0.005, [0.07, 0.015]), ["no node", "0.01 m away"]),
+        (ts.Grasp("ball", (0.06, 0.015), 0.0, [0.07, 0.015]), ["radius", "positive number"]),
+    ],
+)
+def test_wrong_tools_are_errors_with_the_way_out(tool: Tool | ts.Grasp, words: list[str]) -> None:
+    grasps = (tool,) if isinstance(tool, ts.Grasp) else ()
+    with pytest.raises(ProblemError) as error:
+        problem(body(2), *(() if grasps else (tool,)), grasps=grasps)  # type: ignore[arg-type]
+    assert str(error.value).startswith("'ball'")
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_two_tools_of_one_name_are_an_error() -> None:
+    with pytest.raises(ProblemError, match="'ball': name"):
+        problem(body(2), BALL, BALL)
+
+
+def test_a_network_without_elements_has_no_surface() -> None:
+    network = ts.SpringNetwork([[0, 0], [0.01, 0], [0, 0.01]], [[0, 1], [1, 2], [0, 2]], [1.0, 1.0, 1.0])
+    supports = [ts.Fixed([0, 1])]
+    with pytest.raises(ProblemError, match="network of springs without elements"):
+        ts.Problem(network.mesh, supports=supports, tools=[replace(BALL, stiffness=1e6)])
+    with pytest.raises(ProblemError, match=r"stiffness: is required.*\[Pa/m\]"):
+        ts.Problem(network.mesh, supports=supports, tools=[BALL])
+    rows = [[0, 0, 0.01], [1, 0, 0.011]]
+    one = ts.Problem(network.mesh, supports=supports, grasps=[ts.Grasp("g", (0, 0.01), 0.001, rows, 5.0)])
+    state = ts.solve(one, network).states[-1]
+    assert state.applied_force == pytest.approx(-state.reaction.sum(axis=0), abs=1e-12)
+    assert state.applied_force[1] == pytest.approx(5.0 * (0.001 - state.displacement[2, 1]))
+
+
+STUDY = """
+[mesh]
+shape = "rectangle"
+size = ["60 mm", "30 mm"]
+elements = [12, 6]
+
+[material]
+young = "10 kPa"
+poisson = 0.3
+
+[section]
+kind = "plane-strain"
+thickness = "10 mm"
+
+[[support]]
+on = "bottom"
+
+[[tool]]
+name = "probe"
+shape = "sphere"
+radius = "10 mm"
+path = [[0, "30 mm", "41 mm"], [1, "30 mm", "37 mm"]]
+friction = 0.3
+stiffness = "2 N/mm^3"
+on = "top"
+
+[[tool]]
+shape = "capsule"
+radius = "2 mm"
+start = ["0 mm", "0 mm"]
+end = ["5 mm", "0 mm"]
+path = ["0 mm", "50 mm"]
+
+[[grasp]]
+at = ["60 mm", "15 mm"]
+radius = "6 mm"
+path = "pull.csv"
+
+[models.fem]
+kind = "fem"
+law = "neo-hookean"
+"""
+
+
+def written(folder: Path, text: str = STUDY) -> Path:
+    (folder / "pull.csv").write_text("t,x [mm],y [mm]\n0,60,15\n1,63,15\n", encoding="utf-8")
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return folder / "study.toml"
+
+
+def test_a_study_states_tools_and_grasps(tmp_path: Path) -> None:
+    one = read_study(written(tmp_path)).problem
+    assert one.tools[0].stiffness == pytest.approx(2e9)
+    assert replace(one.tools[0], stiffness=2e9) == ts.Sphere(
+        "probe", 0.01, [[0, 0.03, 0.041], [1, 0.03, 0.037]], friction=0.3, stiffness=2e9, on="top"
+    )
+    assert one.tools[1] == ts.Capsule("tool 2", 0.002, [0, 0], [0.005, 0], [0, 0.05])
+    assert one.grasps == (ts.Grasp("grasp 1", [0.06, 0.015], 0.006, [[0, 0.06, 0.015], [1, 0.063, 0.015]]),)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ('shape = "sphere"', 'shape = "spher"', ["tool.1.shape", "did you mean 'sphere'"]),
+        ('radius = "10 mm"\n', "", ["tool.1", "radius is required and missing for a sphere"]),
+        ('radius = "2 mm"', 'radius = "2 mm"\nsize = [1, 1]', ["tool.2", "size is no key of a capsule"]),
+        ('"30 mm", "41 mm"]', '"30 mm", "36 mm"]', ["study.toml:22: tool.1.path", "inside the body by 0.004 m"]),
+        ("[1, ", "[0.9, ", ["tool.1.path", "ends at 0.9"]),
+        ('path = ["0 mm", "50 mm"]', 'path = ["0 mm", ["50 mm"]]', ["tool.2.path"]),
+        ('path = ["0 mm", "50 mm"]', "path = []", ["tool.2.path", "not a path"]),
+        ('"pull.csv"', '"push.csv"', ["grasp.1.path", "push.csv"]),
+        ("friction = 0.3", "friction = -0.3", ["study.toml:23: tool.1.friction"]),
+        ('on = "top"', 'on = "tp"', ["tool.1.on", "top"]),
+        ('at = ["60 mm"', 'at = ["80 mm"', ["grasp.1.at", "0.02 m away"]),
+        ("[[grasp]]", '[[grasp]]\nname = "probe"', ["name of two tools"]),
+    ],
+)
+def test_a_wrong_key_is_an_error_with_its_line(tmp_path: Path, before: str, after: str, words: list[str]) -> None:
+    assert before in STUDY
+    with pytest.raises(StudyError) as error:
+        read_study(written(tmp_path, STUDY.replace(before, after, 1)))
+    for word in words:
+        assert word in str(error.value)
