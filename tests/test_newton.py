@@ -461,9 +461,9 @@ def test_an_indefinite_tangent_is_shifted_by_ever_more_of_its_diagonal() -> None
     """The smallest shift that helps is the best: it is tried first."""
     tangent = sparse.csr_array(np.array([[2.0, 5.0], [5.0, -4.0]]))
     balance: Any = SimpleNamespace(
-        potential=None, in_blocks=lambda matrix: matrix, diagonal=lambda matrix: matrix.diagonal()
+        projected=lambda *_: None, in_blocks=lambda matrix: matrix, diagonal=lambda matrix: matrix.diagonal()
     )
-    first, *others = _candidates(balance, np.zeros((1, 2)), tangent)
+    first, *others = _candidates(balance, np.zeros((1, 2)), tangent, 1.0)
     assert first is tangent
     shares = [(one - tangent).diagonal() / [2.0 + 3.0, 4.0 + 3.0] for one in others]
     assert all(share == pytest.approx(share[0], rel=1e-6) for share in shares)
