@@ -184,7 +184,7 @@ def _load(rng: random.Random, dim: int, size: list[float], young: float) -> Tabl
         case "traction":
             return {"on": rng.choice(("right", "top")), "traction": _vector(rng, dim, stress)}
         case "pressure":
-            return {"on": rng.choice(("right", "top", "bottom")), "pressure": stress}  # refused where edges are free
+            return {"on": rng.choice(("right", "top", "bottom")), "pressure": stress}
         case "moment":
             return {"on": "right", "moment": stress * section * size[1]}
         case "gravity":

@@ -158,7 +158,6 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "two loads in one": ((FORCE, f'{FORCE}pressure = "1 Pa"\n'), ("load.1", "force and pressure")),
     "load nowhere": (('on = "right"\nforce', "force"), ("load.1", "on is required")),
     "pressure in newton": ((FORCE, 'pressure = "1 N"\n'), ("load.1.pressure", "stress")),
-    "pressure on an open edge": ((FORCE, 'pressure = "1 Pa"\n'), ("load.1", "no potential", "edge of its surface")),
     "gravity somewhere": ((FORCE, 'gravity = ["0 m/s^2", "-1 m/s^2"]\n'), ("load.1", "whole body", "leave out on")),
     "weight of nothing": ((ON + FORCE, 'gravity = ["0 m/s^2", "-1 m/s^2"]\n'), ("load.1", "density")),
     "gravity downwards": ((ON + FORCE, 'gravity = ["0 m/s^2", "-1 m"]\n'), ("load.1.gravity.2", "acceleration")),

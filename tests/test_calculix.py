@@ -379,6 +379,8 @@ LOADED = {
     "traction": lambda: slab(ts.Traction("top", (0.0, -4.0, 2.0))),
     "pressure": lambda: slab(ts.Pressure("top", 1200.0), supports=ALL_AROUND),
     "pressure from below": lambda: slab(ts.Pressure("bottom", 1200.0), supports=ALL_AROUND),
+    "pressure on an open side": lambda: slab(ts.Pressure("top", 30.0)),
+    "pressure on a free end": lambda: slab((ts.Pressure("right", -150.0), ts.Force("right", (0.0, -0.04, 0.0)))),
     "twist": lambda: slab((), supports=[ts.Fixed("left"), ts.Fixed("right", rotation=1.0, axis=(1.0, 0.0, 0.0))]),
     "pressure in the plane": lambda: ts.Problem(
         ts.rectangle((0.16, 0.04), (16, 4)),
@@ -386,6 +388,13 @@ LOADED = {
         ts.PlaneStrain(0.01),
         [ts.Fixed("left"), ts.Fixed("right")],
         [ts.Pressure("top", 900.0), ts.Gravity((0.2, -0.5))],
+    ),
+    "pressure on an open side in the plane": lambda: ts.Problem(
+        ts.rectangle((0.16, 0.04), (16, 4)),
+        ts.Material(10e3, 0.3),
+        ts.PlaneStrain(0.01),
+        ts.Fixed("left"),
+        ts.Pressure("top", 60.0),
     ),
 }
 

@@ -259,9 +259,10 @@ def objectives() -> dict[str, Objective]:
     newton = ts.Newton(load_steps=2, tolerance=1e-13)
     bent, moved = cantilever(), cantilever(loads=(), displacement=(0.02, -0.05))
     pressed = cantilever(loads=(ts.Moment("right", 2e-3), ts.Force("right", (0.1, 0.0))))
+    opened = cantilever(loads=ts.Pressure("top", 40.0))
     fem = {
         name: ts.solve(one, ts.Fem("saint-venant-kirchhoff"), newton)
-        for name, one in (("bent", bent), ("moved", moved), ("pressed", pressed))
+        for name, one in (("bent", bent), ("moved", moved), ("pressed", pressed), ("open", opened))
     }
     force = np.array([[0.0, 0.0], [0.1, -0.03], [0.3, -0.1]])
     pull = Curve(np.array([0.0, 0.4, 1.0]), "force", np.array([0, 1]), force)
@@ -274,6 +275,7 @@ def objectives() -> dict[str, Objective]:
         "a curve of forces": [LoadCase("pull", moved, curve=pull, solver=newton)],
         "a curve of displacements": [LoadCase("tip", bent, curve=gone, solver=newton)],
         "loads that follow": [LoadCase("pressed", pressed, fem["pressed"], solver=newton)],
+        "loads without a potential": [LoadCase("open", opened, fem["open"], solver=newton)],
         "several": [
             LoadCase("bent", bent, fem["bent"], solver=newton),
             LoadCase("pull", moved, curve=pull, solver=newton),
@@ -290,6 +292,7 @@ KINDS = (
     "a curve of forces",
     "a curve of displacements",
     "loads that follow",
+    "loads without a potential",
     "several",
 )
 

@@ -17,7 +17,7 @@ from truespring.conditions import Loading, Turn
 from truespring.material import Material
 from truespring.mesh import Mesh, coarser
 from truespring.models import LAWS
-from truespring.potential import Potential, SparseMatrix
+from truespring.potential import Potential, SparseMatrix, is_symmetric, tangent_of
 from truespring.problem import Problem, Region
 
 # Shares of a coarse cell that the body fills are rounded to multiples of this, and are at least this.
@@ -202,7 +202,20 @@ class Interpolated:
 
     def hessian(self, positions: Floats) -> SparseMatrix:
         """Return the second derivative by the coarse positions [N/m], shape (n_dof, n_dof)."""
+        return self._interpolated(self._potential.hessian(self._places(positions)))
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the fine nodes' force has a potential."""
+        return is_symmetric(self._potential)
+
+    def tangent(self, positions: Floats) -> SparseMatrix:
+        """Return the derivative of the gradient by the coarse positions [N/m], shape (n_dof, n_dof)."""
+        return self._interpolated(tangent_of(self._potential, self._places(positions)))
+
+    def _interpolated(self, fine: SparseMatrix) -> SparseMatrix:
+        """Return a matrix of the fine nodes as one of the coarse nodes, shape (n_dof, n_dof)."""
         dim = self.nodes.shape[1]
         moved = sparse.csr_array(sparse.kron(self._weights, sparse.eye_array(dim)))
-        matrix = moved.T @ (sparse.csr_array(self._potential.hessian(self._places(positions))) @ moved)
+        matrix = moved.T @ (sparse.csr_array(fine) @ moved)
         return sparse.bsr_array(matrix, blocksize=(dim, dim))

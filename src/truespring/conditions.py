@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
-from truespring.potential import Potential
+from truespring.potential import Potential, SparseMatrix, is_symmetric, tangent_of
 
 
 class Turn(NamedTuple):
@@ -163,7 +163,8 @@ class Loading:
         held: true for prescribed directions, shape (n_nodes, dim).
         displacement: prescribed displacement at share 1 [m], zero in free directions, shape (n_nodes, dim).
         turns: prescribed rotations, added to the displacement.
-        following: loads that follow the body, as potentials whose energy is minus the work of the load [J].
+        following: loads that follow the body, as potentials whose energy is minus the work of the load [J], see also
+            Unsymmetric.
         amplitude: share of all of these along the way.
         further: loads and motion with other amplitudes, each with the same `held`.
         interactions: contacts with tools and grasps.
@@ -209,7 +210,12 @@ class Loading:
 
     def vanishes(self, level: float) -> bool:
         """Return whether no load acts at a level, and no prescribed motion."""
-        return not self.interactions and all(one.amplitude.at(level) == 0 for one in self.parts)
+        return not self.interactions and all(one._idle or one.amplitude.at(level) == 0 for one in self.parts)
+
+    @property
+    def _idle(self) -> bool:
+        """Whether this part has neither loads nor prescribed motion."""
+        return not (self.following or self.turns or self.external_force.any() or self.displacement.any())
 
     def motion(self, level: float = 1.0) -> Floats:
         """Return the prescribed displacement at a level [m], zero in free directions, shape (n_nodes, dim)."""
@@ -240,6 +246,20 @@ class Loading:
         """Whether a load follows the body."""
         return any(part.following for part in self.parts)
 
+    @property
+    def symmetric(self) -> bool:
+        """Whether all loads have potentials, so that tangents are symmetric."""
+        return all(is_symmetric(load) for part in self.parts for load in part.following)
+
+    def has_potential(self, level: float) -> bool:
+        """Return whether all loads that act at a level have potentials."""
+        return all(is_symmetric(load) for _, load in self.followers(level))
+
+    def tangents(self, positions: Floats, level: float) -> Iterator[SparseMatrix]:
+        """Yield the tangents of the loads that follow the body [N/m], shape (n_dof, n_dof)."""
+        for share, load in self.followers(level):
+            yield share * tangent_of(load, positions)
+
     def loads(self, positions: Floats, level: float = 1.0) -> Floats:
         """Return the force of the loads on the nodes at these positions [N], shape (n_nodes, dim)."""
         force = self.dead_force(level)
@@ -255,9 +275,10 @@ class Loading:
         return force
 
     def energies(self, positions: Floats, level: float) -> Iterator[float]:
-        """Yield the energies of the loads that follow the body, of tools and of grasps [J]."""
+        """Yield the energies of following loads that have a potential, of tools and of grasps [J]."""
         for share, load in self.followers(level):
-            yield share * load.energy(positions)
+            if is_symmetric(load):
+                yield share * load.energy(positions)
         for one in self.interactions:
             yield one.energy(positions, level)
 

@@ -156,7 +156,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         warnings=(
             *model.warnings(problem),
             *broken,
-            *path_warnings(states, best, model.finite, stable, below_rounding),
+            *path_warnings(states, best, model.finite, stable, below_rounding, loading.symmetric),
             *([model.limit] if best is not None and model.limit else ()),
         ),
         best=best,

@@ -16,7 +16,15 @@ from truespring.arrays import Floats, Ints, ShortInts
 from truespring.conditions import Loading
 from truespring.errors import ModelError
 from truespring.models import Model
-from truespring.potential import Potential, Projectable, SparseMatrix, Stressed, Unstressed
+from truespring.potential import (
+    Potential,
+    Projectable,
+    SparseMatrix,
+    Stressed,
+    Unstressed,
+    is_symmetric,
+    tangent_of,
+)
 from truespring.problem import Problem
 from truespring.ranks import Communicator, Layout, bisected
 
@@ -204,10 +212,22 @@ class _OwnRows:
 
     def hessian(self, positions: Floats) -> SparseMatrix:
         """Return the rows of the own nodes [N/m], shape (n_dof, n_dof), the others empty."""
-        dim = positions.shape[1]
+        return self._own(self.load.hessian(positions))
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the load has a potential."""
+        return is_symmetric(self.load)
+
+    def tangent(self, positions: Floats) -> SparseMatrix:
+        """Return the rows of the own nodes of the tangent [N/m], shape (n_dof, n_dof), the others empty."""
+        return self._own(tangent_of(self.load, positions))
+
+    def _own(self, matrix: SparseMatrix) -> SparseMatrix:
+        """Return the rows of the own nodes of a matrix, the others empty."""
+        dim = self.nodes.shape[1]
         own = np.repeat((self.layout.owner == self.layout.ranks.rank).astype(np.float64), dim)
-        rows = sparse.diags_array(own) @ sparse.csr_array(self.load.hessian(positions))
-        return sparse.bsr_array(rows, blocksize=(dim, dim))
+        return sparse.bsr_array(sparse.diags_array(own) @ sparse.csr_array(matrix), blocksize=(dim, dim))
 
 
 def own_rows(loading: Loading, layout: Layout) -> Loading:

@@ -57,6 +57,38 @@ class Potential(Protocol):
 
 
 @runtime_checkable
+class Unsymmetric(Potential, Protocol):
+    """A load that follows the body, whose force may have no potential; `energy` then depends on the path.
+
+    `gradient` is minus the force. `hessian` is symmetric in any case: the symmetric part of the tangent.
+    """
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent of the free directions is symmetric: the force has a potential."""
+        ...
+
+    def tangent(self, positions: Floats) -> SparseMatrix:
+        """Return the derivative of the gradient [N/m], not symmetric, shape (n_dof, n_dof)."""
+        ...
+
+
+def is_symmetric(load: Potential) -> bool:
+    """Return whether the force of a load has a potential, that is, whether its tangent is symmetric."""
+    return not isinstance(load, Unsymmetric) or load.symmetric
+
+
+def tangent_of(load: Potential, positions: Floats) -> SparseMatrix:
+    """Return the tangent of a load at positions [m] for Newton's method [N/m], shape (n_dof, n_dof).
+
+    Symmetric if the load has a potential.
+    """
+    if isinstance(load, Unsymmetric) and not load.symmetric:
+        return load.tangent(positions)
+    return load.hessian(positions)
+
+
+@runtime_checkable
 class Projectable(Potential, Protocol):
     """A potential with a positive semidefinite approximation of its Hessian."""
 

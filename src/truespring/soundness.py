@@ -26,11 +26,17 @@ def path_status(states: tuple[State, ...], best: State | None, finite: bool, kee
 
 
 def path_warnings(
-    states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool, below_rounding: bool
+    states: tuple[State, ...],
+    best: State | None,
+    finite: bool,
+    keeps_to_stable: bool,
+    below_rounding: bool,
+    symmetric: bool = True,
 ) -> tuple[str, ...]:
     """Return warnings about a solution: why it ended, and which states are not valid.
 
-    `below_rounding` is true if it ended because the load is below rounding errors; other arguments as `path_status`.
+    `below_rounding` is true if it ended because the load is below rounding errors, `symmetric` if all loads have
+    potentials; other arguments as `path_status`.
     """
     warnings = []
     if best is not None:
@@ -78,11 +84,17 @@ def path_warnings(
     loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
     if loose > _LOOSE:
         warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load is near rounding errors")
-    if any(state.negative_eigenvalues is None for state in states):
+    if not symmetric:
+        warnings.append(_NO_POTENTIAL)
+    elif any(state.negative_eigenvalues is None for state in states):
         warnings.append("stability not proven: the inertia of a tangent was not computed")
     return tuple(warnings)
 
 
+_NO_POTENTIAL = (
+    "the pressure on an open surface has no potential: its work depends on the path, so the energy of the loads is not "
+    "defined, and stability not proven"
+)
 _BELOW_ROUNDING = (
     "the load is below rounding errors: it is too small for the stiffness and the coordinates of the body; apply a "
     "larger load, or place the body near the origin"

@@ -102,15 +102,15 @@ class Objective:
         """Return dJ/dc [-], shape (n,), by the adjoint method, with one linear system per level.
 
         With f the internal force and K its tangent, K dx = -df/dc on the free directions. Of displacements
-        K lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends on
-        c directly too: K lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
+        K^T lam = B^T r gives dJ/dc = -lam . df/dc; of forces and torques of supports r = G (f - F) - y, which depends
+        on c directly too: K^T lam = (G K)^T r and dJ/dc = (G^T r - lam) . df/dc.
         """
         seen = self._seen(values)
         if seen is None:
             raise ModelError("there is no equilibrium at these unknowns, so no gradient")
         total = self.regularisation**2 * (values - 1) / len(values)
         for group in _by_state(seen):
-            tangent = _At(self, group[0])
+            tangent = _At(self, group[0], transposed=True)
             right, direct = np.zeros(tangent.shape), np.zeros(tangent.shape)
             for one in group:
                 scaled = (self._weights / one.observation.scale) ** 2 * _misfit(one)
@@ -159,9 +159,12 @@ def _by_state(seen: Sequence[_Seen]) -> list[list[_Seen]]:
 
 
 class _At:
-    """The tangent at an equilibrium, with that of following loads, and the derivative of the force by each unknown."""
+    """The tangent at an equilibrium, with that of following loads, and the derivative of the force by each unknown.
 
-    def __init__(self, objective: Objective, one: _Seen) -> None:
+    `transposed` if it is that of an adjoint system.
+    """
+
+    def __init__(self, objective: Objective, one: _Seen, transposed: bool = False) -> None:
         case, state = objective.cases[one.case], one.state
         loading, positions = case.problem.loading, state.positions
         assert objective._last is not None  # a state was seen
@@ -169,11 +172,12 @@ class _At:
         assert paths is not None
         potential = paths[one.case].potential
         assert potential is not None  # it was solved
-        linear = choose(case.solver.linear, potential.nodes, loading.held)
+        linear = choose(case.solver.linear, potential.nodes, loading.held, symmetric=loading.symmetric)
         usual = Newton()
         balance = Balance(potential, loading, usual.tolerance, usual.max_iterations, linear)
         self.shape, self._free, self._positions, self._balance = positions.shape, ~loading.held, positions, balance
-        self._matrix = balance.hessian(positions, state.load_factor)
+        tangent = balance.hessian(positions, state.load_factor)
+        self._matrix = balance.in_blocks(tangent.T) if transposed and not loading.symmetric else tangent
         try:
             self._ready: Tangent = balance.ready(self._matrix, positions)
         except SingularMatrixError:

@@ -1,12 +1,9 @@
-"""Protocols of linear solvers, and the choice among them.
-
-Held directions are excluded: right sides and solutions, shape (n_nodes, dim), are zero there.
-"""
+"""The choice among linear solvers."""
 
 import importlib.util
 from collections.abc import Callable, Sequence
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol
+from typing import Any
 
 from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError, nearest, one_line
@@ -14,77 +11,15 @@ from truespring.linear.direct import FACTORISERS, Direct, direct_bytes, present
 from truespring.linear.iterative import Multigrid
 from truespring.linear.petsc import INSTALL, MODULES, Petsc
 from truespring.linear.pressure import PressureMultigrid
+from truespring.linear.protocols import LinearSolver as LinearSolver
+from truespring.linear.protocols import Tangent as Tangent
+from truespring.linear.unsymmetric import Gmres, Lu
 from truespring.memory import available_memory
-from truespring.potential import SparseMatrix, VolumeStiffness
+from truespring.potential import VolumeStiffness
 from truespring.ranks import ALONE, Communicator, Layout, layout_alone, started_processes
 
 # Largest number of free directions for which "auto" factorises, in the plane and in space: as fast as multigrid there.
 _DIRECT = MappingProxyType({2: 8_000, 3: 1_000})
-
-
-class Tangent(Protocol):
-    """A tangent stiffness prepared for solving."""
-
-    #: Whether it remains valid when the solver prepares the next tangent.
-    lasting: ClassVar[bool]
-
-    @property
-    def negative_eigenvalues(self) -> int | None:
-        """The number of negative eigenvalues; of an iterative solver 1 if there are any; None if not known."""
-        ...
-
-    def solve(self, right: Floats, accuracy: float = 1e-12) -> Floats:
-        """Return x of tangent x = right [m], shape (n_nodes, dim), with a relative residual of at most `accuracy`.
-
-        Raises IndefiniteError if an iterative solver finds a direction of negative curvature.
-        """
-        ...
-
-    def lowest_mode(self) -> Floats | None:
-        """Return a mode of a negative eigenvalue, largest component +1 [-], shape (n_nodes, dim).
-
-        None if not available.
-        """
-        ...
-
-
-class LinearSolver(Protocol):
-    """A method that prepares tangents for solving.
-
-    Costs are those so far, see Cost.
-    """
-
-    @property
-    def name(self) -> str:
-        """Name for notes and reports."""
-        ...
-
-    @property
-    def factorisations(self) -> int:
-        """The number of factorisations, or of times that coarse levels were built."""
-        ...
-
-    @property
-    def cg_iterations(self) -> int:
-        """The number of iterations of conjugate gradients."""
-        ...
-
-    @property
-    def lanczos_iterations(self) -> int:
-        """The number of Lanczos iterations."""
-        ...
-
-    @property
-    def memory(self) -> int:
-        """Largest memory of factors or coarse levels [bytes]."""
-        ...
-
-    def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
-        """Prepare the tangent at `positions` [m], shape (n_nodes, dim); raise SingularMatrixError without an inverse.
-
-        `matrix` has shape (n_dof, n_dof).
-        """
-        ...
 
 
 #: Allowed values of a solver's `linear`.
@@ -127,16 +62,23 @@ def choose(
     coarser: Callable[[], Sequence[Any]] = tuple,
     volumes: Callable[[Floats], Sequence[VolumeStiffness]] | None = None,
     layout: Layout | None = None,
+    symmetric: bool = True,
 ) -> LinearSolver:
     """Return the linear solver `name`, one of LINEAR; "auto" chooses by size and dimension.
 
     `nodes` [m] and `held` have shape (n_nodes, dim). `coarser` returns the weights of the nodes from those of a coarser
     mesh, of these from a still coarser one, and so on, for multigrid: sparse, shape (n, n_coarse). `volumes` returns
     the stiffness against changes of volume at positions [m], see Volumetric. `layout` has the nodes of each process,
-    for "petsc"; by default one process has all.
+    for "petsc"; by default one process has all. `symmetric` states whether all tangents are symmetric.
 
-    Raises ProblemError if a factorisation does not fit in memory, by estimate.
+    Raises ProblemError if a factorisation does not fit in memory, by estimate, and for "petsc" if tangents are not
+    symmetric.
     """
+    if name == "petsc" and not symmetric:
+        raise ProblemError(
+            "linear = 'petsc': solves symmetric systems only, and a pressure on an open surface has no symmetric "
+            "tangent: use linear = 'auto', 'direct' or 'multigrid', hold the edge of the surface, or use a traction"
+        )
     check_linear(name)
     n_free, dim = int((~held).sum()), nodes.shape[1]
     if name == "auto":
@@ -144,11 +86,12 @@ def choose(
     if name == "petsc":
         return Petsc(held, layout or layout_alone(len(nodes)))
     if name == "multigrid":
-        return PressureMultigrid(nodes, held, coarser(), volumes) if volumes else Multigrid(nodes, held, coarser())
+        found = PressureMultigrid(nodes, held, coarser(), volumes) if volumes else Multigrid(nodes, held, coarser())
+        return found if symmetric else Gmres(found, held)
     needed, there = direct_bytes(nodes.shape), available_memory()
     if needed > there:
         raise ProblemError(
             f"linear = '{name}': a factorisation for {len(nodes):,} nodes needs about {needed / 2**30:,.0f} GiB, "
             f"{there / 2**30:,.1f} GiB are available: use linear = 'multigrid' or fewer elements"
         )
-    return Direct(held, name)
+    return Direct(held, name) if symmetric else Lu(held, name)

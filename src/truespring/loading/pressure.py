@@ -1,10 +1,11 @@
 """A pressure that follows the body; its potential is pressure times the volume that the surface sweeps.
 
-A potential exists if the edge of the surface is held or slides in a plane, or if the surface is closed. Any other
-pressure does work that depends on the path and is an error.
+A potential exists if the edge of the surface is held or slides in a plane, or if the surface is closed. The work of any
+other pressure depends on the path, and its tangent is not symmetric.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -12,7 +13,6 @@ from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
-from truespring.errors import ProblemError
 from truespring.loading.body import Body
 from truespring.loading.history import History
 from truespring.loading.load import FacePressure, FollowingLoad, Mark
@@ -45,13 +45,10 @@ class Pressure(FollowingLoad):
     instead = "a traction, which is dead"
 
     def following(self, body: Body, held: Bools) -> "SurfacePressure":
-        """Return the potential; raise ProblemError if the work of the pressure depends on the path."""
+        """Return minus the work of the pressure and its derivatives; see SurfacePressure.symmetric."""
         pressure = number(self.pressure, "pressure", "Pa")
         facets = body.whole(outer_facets(body.mesh, self.on))
-        load = SurfacePressure(body.nodes, facets, body.thickness * pressure, held)
-        if pressure:
-            load.check_edges()
-        return load
+        return SurfacePressure(body.nodes, facets, body.thickness * pressure, held)
 
     def rim(self, mesh: Mesh) -> Ints:
         """Return the edges of the loaded surface in 3D as node numbers, shape (n, 2)."""
@@ -120,9 +117,10 @@ def _points(k: int, dim: int) -> _Points:
 
 
 class SurfacePressure:
-    """Potential of a pressure: pressure times the volume that the free nodes of the surface sweep.
+    """Pressure times the volume that the free nodes of the surface sweep: a potential if `symmetric`.
 
-    The gradient includes the forces on held nodes. The hessian is symmetrised, which changes nothing for free nodes.
+    The gradient includes the forces on held nodes. The hessian is symmetrised, which changes nothing for free nodes if
+    there is a potential.
     """
 
     def __init__(self, nodes: Floats, facets: Ints, pressure: float, held: Bools) -> None:
@@ -141,7 +139,7 @@ class SurfacePressure:
     def energy(self, positions: Floats) -> float:
         """Return minus the work [J] of the pressure on a straight motion of the free nodes to `positions`.
 
-        Held nodes are at their final positions throughout.
+        Held nodes are at their final positions throughout. Without a potential, other motions do other work.
         """
         moved = np.where(self._free, positions - self.nodes, 0.0)
         start = positions - moved
@@ -164,6 +162,10 @@ class SurfacePressure:
 
         return self._pattern.summed(symmetric)
 
+    def tangent(self, positions: Floats) -> SparseMatrix:
+        """Return the derivative of the gradient [N/m], shape (n_nodes dim, n_nodes dim), not symmetric at edges."""
+        return self._pattern.summed(lambda first, last: self._slopes(positions, first, last))
+
     def _slopes(self, positions: Floats, first: int, last: int) -> Floats:
         """Return the derivative of the gradient of a range of facets by their nodes [N/m], shape (n, k dim, k dim)."""
         points, dim = self._points, positions.shape[1]
@@ -178,25 +180,16 @@ class SurfacePressure:
         n = facets.shape[1] * dim
         return np.asarray(found.reshape(len(facets), n, n))
 
-    def check_edges(self) -> None:
-        """Raise ProblemError if the tangent of the free nodes is not symmetric: the work then depends on the path."""
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether the tangent of the free nodes is symmetric: the work then does not depend on the path."""
         random = np.random.default_rng(1).uniform(-1.0, 1.0, self.nodes.shape)
         size = float(np.ptp(self.nodes[np.unique(self._facets)], axis=0).max())
         there = self.nodes + np.where(self._free, _DEFORMED * size * random, 0.0)
-        tangent = self._pattern.summed(lambda first, last: self._slopes(there, first, last))
         slightly = _SYMMETRIC * float(np.abs(self._slopes(there, 0, len(self._facets))).max())
         free = sparse.diags_array(self._free.ravel().astype(float))
-        within = sparse.csr_array(free @ sparse.csr_array(tangent) @ free)
-        askew = abs(within - within.T)
-        if askew.nnz and askew.max() > slightly:
-            where = np.unique(np.flatnonzero(askew.max(axis=1).toarray() > slightly))
-            nodes = np.unique(where // self.nodes.shape[1])
-            some = ", ".join(map(str, nodes[:4])) + (", ..." if len(nodes) > 4 else "")
-            raise ProblemError(
-                f"this pressure has no potential: the edge of its surface is free to move at {len(nodes)} "
-                f"node{'s' * (len(nodes) != 1)} ({some}). Hold the edge, hold the direction normal to a plane in "
-                "which the edge lies, select a closed surface, or use a traction, which is a dead load"
-            )
+        within = sparse.csr_array(free @ sparse.csr_array(self.tangent(there)) @ free)
+        return bool(abs(within - within.T).max() <= slightly)
 
 
 def _cross_matrix(v: Floats) -> Floats:

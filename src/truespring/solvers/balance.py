@@ -114,7 +114,7 @@ class Balance:
         self.size = float(np.linalg.norm(np.ptp(self.potential.nodes, axis=0)))
 
     def total_energy(self, positions: Floats, load_factor: float) -> tuple[float, float]:
-        """Return stored energy minus the work of the loads, and the sum of their sizes [J]."""
+        """Return stored energy minus the work of the loads that have a potential, and the sum of their sizes [J]."""
         with np.errstate(over="ignore", invalid="ignore"):
             stored = self.potential.energy(positions)
         work = self.loading.dead_force(load_factor) * (positions - self.potential.nodes)
@@ -144,13 +144,13 @@ class Balance:
     def hessian(self, positions: Floats, load_factor: float, *stress: Floats) -> SparseMatrix:
         """Return the tangent [N/m] with that of following loads, tools and grasps, in blocks of shape (dim, dim).
 
-        Shape (n_dof, n_dof).
+        Shape (n_dof, n_dof). It is not symmetric under loads without a potential, see Loading.symmetric.
 
         `stress` is passed on to the potential, see Stressed.hessian.
         """
         tangent = self.in_blocks(self.potential.hessian(positions, *stress))
-        for share, load in self.loading.followers(load_factor):
-            tangent = self.in_blocks(tangent + share * load.hessian(positions))
+        for following in self.loading.tangents(positions, load_factor):
+            tangent = self.in_blocks(tangent + following)
         for one in self.loading.interactions:
             nodes, blocks = one.blocks(positions, load_factor)
             tangent = with_diagonal(tangent, blocks, nodes)
@@ -210,9 +210,14 @@ class Balance:
         return 8 * _EPS * float(np.sqrt(self.ranks.sum(float(sum(squares)))))
 
     def judged(self, state: Equilibrium) -> Found:
-        """Return an equilibrium with its stability, and the tangent if it was factorised."""
+        """Return an equilibrium with its stability, and the tangent if it was factorised.
+
+        Stability is not determined under loads without a potential.
+        """
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
+        if not self.loading.has_potential(state.load_factor):
+            return Found(replace(state, negative_eigenvalues=None))
         if not isinstance(self.linear, Direct) and self._stable_at_rest(state):
             return Found(replace(state, negative_eigenvalues=0))
         try:
@@ -254,7 +259,7 @@ class Balance:
             self.note(f"{reason}: a factorisation would help, but needs one process")
             return False
         try:
-            directly = choose("direct", self.potential.nodes, self.loading.held)
+            directly = choose("direct", self.potential.nodes, self.loading.held, symmetric=self.loading.symmetric)
         except ProblemError:
             self.note(f"{reason}: a factorisation would help, but does not fit in memory")
             return False
@@ -362,36 +367,51 @@ class Watch:
             return Found(replace(self.best, energy=self._balance.potential.energy(self.best.positions)))
 
 
+class Stepped(NamedTuple):
+    """A Newton step [m], shape (n_nodes, dim), and the tangent that it was computed by."""
+
+    step: Floats
+    tangent: Tangent
+
+
 def stepped(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
 ) -> Floats | None:
     """Return the solution of tangent x = right [m], shape (n_nodes, dim).
 
-    None if the tangent is not positive definite.
+    None if the tangent is singular, or not positive definite although all loads have potentials.
     """
+    found = stepped_by(balance, tangent, positions, right, accuracy)
+    return None if found is None else found.step
+
+
+def stepped_by(
+    balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
+) -> Stepped | None:
+    """Return the solution as `stepped` does, and the tangent prepared for solving."""
     if not balance.is_finite(tangent):
         return None
     try:
-        step = _solved(balance, tangent, positions, right, accuracy)
+        found = _solved(balance, tangent, positions, right, accuracy)
     except (SingularMatrixError, IndefiniteError):
         return None
-    return step if step is not None and np.isfinite(step).all() else None
+    return found if found is not None and np.isfinite(found.step).all() else None
 
 
 def _solved(
     balance: Balance, tangent: SparseMatrix, positions: Floats, right: Floats, accuracy: float
-) -> Floats | None:
+) -> Stepped | None:
     """Solve a linear system; if multigrid is slow even with new coarse levels, by a factorisation.
 
     Returns None if the tangent is not positive definite, the last iterate if a factorisation does not fit in memory.
     """
     for attempt in range(3):
         ready = balance.ready(tangent, positions)
-        if ready.lasting and ready.negative_eigenvalues != 0:
+        if ready.lasting and ready.negative_eigenvalues != 0 and balance.loading.symmetric:
             return None
         try:
-            return ready.solve(right, accuracy)
+            return Stepped(ready.solve(right, accuracy), ready)
         except SlowError as slow:
             if attempt and not balance.go_direct("conjugate gradients were slow"):
-                return slow.best
+                return Stepped(slow.best, ready)
     return None

@@ -175,7 +175,7 @@ def _balance(
     potential: Potential, loading: Loading, control: DisplacementControl | ArcLength, report: Reporter | None
 ) -> Balance:
     """Return the balance of forces with the settings of a solver."""
-    linear = choose(control.linear, potential.nodes, loading.held)
+    linear = choose(control.linear, potential.nodes, loading.held, symmetric=loading.symmetric)
     return Balance(potential, loading, control.tolerance, control.max_iterations, linear, report)
 
 

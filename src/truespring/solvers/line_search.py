@@ -1,4 +1,7 @@
-"""Newton's method with line search on the total energy: robust, but slow."""
+"""Newton's method with line search on the total energy: robust, but slow.
+
+Under loads without a potential there is no such energy: steps are halved until the residual decreases.
+"""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,6 +14,7 @@ from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError
 from truespring.potential import SparseMatrix
 from truespring.solvers.balance import Balance, Found, Watch, stepped
+from truespring.solvers.residual_search import reduced
 
 # Relative differences of energy below this are rounding errors; see `_search`.
 _ENERGY_ROUNDING = 1e-9
@@ -55,6 +59,8 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
             return watch.equilibrium()
         if undamped_iterations or watch.below_rounding:
             moved = _full_step(balance, positions, tangent, watch.force)
+        elif not balance.loading.has_potential(load_factor):
+            moved = reduced(balance, load_factor, positions, tangent, watch)
         else:
             step = _step(balance, positions, tangent, watch)
             moved = step and _search(balance, load_factor, positions, step)

@@ -123,8 +123,12 @@ class Newton(Solver):
         return self.method == "line-search" or not isinstance(balance.potential, Stressed)
 
     def _jump(self, balance: Balance, geometry: Geometry, rest: Equilibrium) -> Jump | None:
-        """Return starts from coarser meshes; None without any, or if the body deforms without load."""
-        if not self.coarse_start or self._searches(balance) or not balance.loading.proportional:
+        """Return starts from coarser meshes.
+
+        None without any, if the body deforms without load, or if stability, which a start needs, is not determined.
+        """
+        loading = balance.loading
+        if not self.coarse_start or self._searches(balance) or not loading.proportional or not loading.symmetric:
             return None
         if not np.array_equal(rest.positions, balance.potential.nodes):
             return None
@@ -224,7 +228,9 @@ class Nearby(Newton):
 def linear_of(name: str, potential: Potential, loading: Loading, geometry: Geometry) -> LinearSolver:
     """Return the linear solver `name` for a potential, see `choose`."""
     volumes, layout = volumes_of(potential), layout_of(potential)
-    return choose(name, potential.nodes, loading.held, geometry.interpolations, volumes, layout)
+    return choose(
+        name, potential.nodes, loading.held, geometry.interpolations, volumes, layout, symmetric=loading.symmetric
+    )
 
 
 def _find_by_search(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Found:
