@@ -68,3 +68,5 @@ from .tools import Grasp as Grasp
 from .tools import HalfSpace as HalfSpace
 from .tools import Sphere as Sphere
 from .validity import map_validity as map_validity
+from .vibration import Modes as Modes
+from .vibration import modes as modes

@@ -6,7 +6,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from truespring.cli import calibrate, check, compare, converge, export, maps, moduli, new, solve, sweep, table1, tables
+from truespring.cli import (
+    calibrate,
+    check,
+    compare,
+    converge,
+    export,
+    maps,
+    modes,
+    moduli,
+    new,
+    solve,
+    sweep,
+    table1,
+    tables,
+)
 from truespring.cli.printing import show
 from truespring.cli.verb import Verb, add_common
 from truespring.errors import nearest
@@ -20,6 +34,7 @@ VERBS: dict[str, Verb] = {
         solve.VERIFY,
         solve.SOLVE,
         moduli.MODULI,
+        modes.MODES,
         converge.CONVERGE,
         compare.COMPARE,
         maps.MAP,

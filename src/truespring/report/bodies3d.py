@@ -48,7 +48,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
     arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2])
     layers = []
     if len(facets):
-        layers.append(_solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
+        layers.append(solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
     if springs is not None:
         layers.append(_wires(points, facets, springs, 0.6))
     elif not len(facets):
@@ -114,7 +114,7 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
     mesh = comparison.model.problem.mesh
     facets, lines = facets_of(mesh), path_lines(comparison.reference)
     if len(facets):
-        black = _solid(pair.theirs, facets, _one_color(facets, _REFERENCE), lines, INK, 1.2)
+        black = solid(pair.theirs, facets, one_color(facets, _REFERENCE), lines, INK, 1.2)
     else:
         black = _wires(pair.theirs, facets, lines, 1.3, INK)
     blue = _wires(pair.mine, facets, path_lines(comparison.model), 0.8)
@@ -146,7 +146,7 @@ def distance_picture(result: Result, name: str, comparison: Comparison) -> Pictu
     if not len(facets):
         return _dots_picture(result, name, comparison, pair) if result.in_detail else None
     colors = error_colors(pair.distance / (farthest or 1.0))[facets]
-    surface = _solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
+    surface = solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
     black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
     reference = display_name(result, name)
     bar = bar_of(farthest, pair.largest)
@@ -170,7 +170,7 @@ def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair
         if len(facets) and state is not None:
             points = seen(path.problem.mesh.nodes + pair.factor * state.displacement)
             corners.append(points)
-            layers.append(_solid(points, facets, _one_color(facets, _BODY), edges_of(facets), INK, 0.35))
+            layers.append(solid(points, facets, one_color(facets, _BODY), edges_of(facets), INK, 0.35))
     if not layers:
         layers.append(_wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
     legend = (Entry("undeformed", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
@@ -224,7 +224,7 @@ def _pair_picture(
 # --- layers ---------------------------------------------------------------------------------------
 
 
-def _solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, width: float) -> Layer:
+def solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, width: float) -> Layer:
     """Return a lit surface with lines on it; colours of shape (n_facets, corners, 3)."""
     on, owners = lines_on(facets, lines)
     facing = normals(points, facets) @ _LIGHT
@@ -245,19 +245,20 @@ def _thin(width: float, count: int) -> float:
     return width * min(1.0, max(0.3, float(np.sqrt(1200 / max(count, 1)))))
 
 
-def _one_color(facets: Ints, color: str) -> Floats:
+def one_color(facets: Ints, color: str) -> Floats:
+    """Return one colour for all corners of facets, shape (n_facets, corners, 3)."""
     return np.broadcast_to(rgb(color), (*facets.shape, 3))
 
 
 def _tinted(problem: Problem, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
     """Return the colours of the undeformed body: darker where it is clamped, tinted where arrows act."""
     mesh = problem.mesh
-    colors = _one_color(facets, _BODY).copy()
+    colors = one_color(facets, _BODY).copy()
     clamped = clamped_nodes(problem)[facets].all(axis=1)
-    colors[clamped] = _one_color(facets[clamped], _HELD)
+    colors[clamped] = one_color(facets[clamped], _HELD)
     for arrow in arrows:
         acted = _within(facets, arrow.nodes, mesh.n_nodes)
-        colors[acted] = 0.7 * _one_color(facets[acted], _BODY) + 0.3 * _one_color(facets[acted], arrow.color)
+        colors[acted] = 0.7 * one_color(facets[acted], _BODY) + 0.3 * one_color(facets[acted], arrow.color)
     return colors
 
 
