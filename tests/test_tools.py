@@ -9,13 +9,17 @@ import pytest
 import truespring as ts
 from truespring.arrays import Floats
 from truespring.conditions import Interaction
-from truespring.errors import ProblemError, StudyError
+from truespring.errors import ExportError, ProblemError, StudyError
+from truespring.exports import TARGETS, export
+from truespring.exports.decks import check_fem
 from truespring.mesh import SecondOrder
-from truespring.study import read_study
+from truespring.refining import refined_problem
+from truespring.study import plan, read_study
 from truespring.tools import TOOLS, Tool
 
 YOUNG, POISSON = 10e3, 0.3
 MATERIAL = ts.Material(YOUNG, POISSON)
+BALL = ts.Sphere("ball", 0.01, [[0, 0.03, 0.041], [1, 0.03, 0.037]])
 
 
 def body(dim: int, element: str | None = None) -> ts.Mesh:
@@ -181,6 +185,56 @@ def test_a_plate_that_slides_drags_with_the_coefficient_of_friction(dim: int) ->
     assert dragged.applied_force[0] / -dragged.applied_force[1] == pytest.approx(0.3, rel=1e-3)
 
 
+def test_friction_has_the_normal_forces_of_the_state_itself() -> None:
+    """A ball that is pressed and drawn at once: the result does not depend on the number of steps."""
+    rows = [[0, 0.03, 0.0405], [1, 0.034, 0.037]]
+    one = problem(body(2), ts.Sphere("ball", 0.01, rows, friction=0.3))
+    few, many = (ts.solve(one, ts.Fem("neo-hookean"), ts.Newton(steps)).states[-1] for steps in (4, 12))
+    assert few.applied_force == pytest.approx(many.applied_force, rel=3e-3)
+    assert few.applied_force[0] / -few.applied_force[1] > 0.29
+
+
+def graded(n: int, ratio: float, length: float) -> ts.Mesh:
+    """A cube of n x n x n bricks, each longer by a ratio than the one nearer to the edge x = z = 0 of the top."""
+    unit = ts.box((1, 1, 1), (n, n, n))
+
+    def along(share: Floats) -> Floats:
+        return np.asarray(length * (ratio ** (n * share) - 1) / (ratio**n - 1))
+
+    x, y, z = unit.nodes.T
+    return ts.Mesh(np.stack([along(x), length - along(1 - y), along(z)], axis=1), unit.elements, "hexahedron")
+
+
+def hertz(model: ts.Fem | ts.Springs, n: int, ratio: float) -> None:
+    """A sphere pressed into a quarter of a block, four times as thick: 4/3 E/(1 - nu^2) sqrt(R) d^1.5."""
+    radius, length, depths = 0.03, 0.12, np.array([0.0005, 0.001, 0.002])
+    ways = [[share, 0, length + radius - depth, 0] for share, depth in zip((0.25, 0.5, 1), depths, strict=True)]
+    ball = ts.Sphere("ball", radius, [[0, 0, length + radius, 0], *ways], on="top", stiffness=5e8)
+    supports = [ts.Fixed("bottom"), ts.Fixed("left", fix=["x"]), ts.Fixed("back", fix=["z"])]
+    one = problem(graded(n, ratio, length), ball, supports=supports)
+    solution = ts.solve(one, model, ts.Newton(1))
+    assert solution.status == ts.Status.CONVERGED
+    states = [solution.at(share) for share in (0.25, 0.5, 1)]
+    forces = 4 * np.array([-state.applied_force[1] for state in states if state is not None])
+    expected = 4 / 3 * YOUNG / (1 - POISSON**2) * np.sqrt(radius) * depths**1.5
+    assert forces / expected == pytest.approx(1, abs=0.08)
+    assert np.polyfit(np.log(depths), np.log(forces), 1)[0] == pytest.approx(1.5, abs=0.06)
+    acting = one.loading.interactions[0]
+    for state, depth in zip(states, depths, strict=True):
+        assert state is not None
+        assert acting.touch(state.positions, state.load_factor).depth < 0.01 * depth
+
+
+def test_a_sphere_on_springs_is_as_stiff_as_hertz_says() -> None:
+    hertz(ts.Springs("gaussian"), 9, 1.35)
+
+
+@pytest.mark.verification
+@pytest.mark.parametrize("model", [ts.Fem("neo-hookean"), ts.Springs("gaussian")])
+def test_a_sphere_is_as_stiff_as_hertz_says(model: ts.Fem | ts.Springs) -> None:
+    hertz(model, 13, 1.28)
+
+
 def test_below_the_limit_a_plate_sticks() -> None:
     """The shear of a block under 0.2 % is below the friction of a pressure of 3 %."""
     drag = 6e-5
@@ -245,7 +299,25 @@ def test_the_springs_of_a_grasp_share_its_stiffness() -> None:
         assert one.loading.interactions[0].largest_stiffness().sum() == pytest.approx(stiffness)
 
 
-BALL = ts.Sphere("ball", 0.01, [[0, 0.03, 0.041], [1, 0.03, 0.037]])
+@pytest.mark.parametrize("target", TARGETS)
+def test_tools_are_not_exported(target: str, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="tools and grasps, such as 'ball'"):
+        export(problem(body(2), BALL), ts.Springs("isotropic"), target, tmp_path)
+
+
+def test_calculix_does_not_take_tools() -> None:
+    with pytest.raises(ExportError, match="tools and grasps, such as 'ball'"):
+        check_fem(problem(body(2), BALL), "neo-hookean")
+
+
+def test_a_tool_on_node_numbers_acts_on_the_refined_mesh() -> None:
+    mesh = ts.rectangle((0.06, 0.03), (4, 2))
+    top = np.flatnonzero(mesh.nodes[:, 1] > 0.0299)
+    finer = refined_problem(problem(mesh, replace(BALL, on=top)))  # type: ignore[arg-type]
+    acting, expected = (one.loading.interactions[0] for one in (finer, replace(finer, tools=[replace(BALL, on="top")])))
+    pushed = acting.gradient(finer.mesh.nodes, 1.0)
+    assert pushed.any()
+    assert np.array_equal(pushed, expected.gradient(finer.mesh.nodes, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -366,6 +438,13 @@ def test_a_study_states_tools_and_grasps(tmp_path: Path) -> None:
     )
     assert one.tools[1] == ts.Capsule("tool 2", 0.002, [0, 0], [0.005, 0], [0, 0.05])
     assert one.grasps == (ts.Grasp("grasp 1", [0.06, 0.015], 0.006, [[0, 0.06, 0.015], [1, 0.063, 0.015]]),)
+    found = plan(read_study(tmp_path / "study.toml"))
+    assert found["tools"] == [
+        "'probe': sphere of radius 0.01 m, friction 0.3, from (0.03, 0.041) m to (0.03, 0.037) m",
+        "'tool 2': capsule of radius 0.002 m from (0, 0) to (0.005, 0) m, at (0, 0.05) m",
+        "'grasp 1': grasp within 0.006 m of (0.06, 0.015) m, from (0.06, 0.015) m to (0.063, 0.015) m",
+    ]
+    assert found["total_force"] == [0, 0]
 
 
 @pytest.mark.parametrize(

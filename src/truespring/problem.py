@@ -242,10 +242,14 @@ class Problem:
             force = nodal_force(self._of_each_load(lambda load: load.spread(body), loads), held.shape)
             following = tuple(self._of_each_load(lambda load: load.following(body, held), loads))
             parts.append(Loading(force, held, displacement, turned, following, amplitude))
-        several: tuple[Tool | Grasp, ...] = (*self.tools, *self.grasps)
-        _check_names(several)
-        acting = tuple(one.acting_on(body, self._young, self.duration or 1.0) for one in several)
+        _check_names(self.touching)
+        acting = tuple(one.acting_on(body, self._young, self.duration or 1.0) for one in self.touching)
         return replace(parts[0], further=tuple(parts[1:]), interactions=acting)
+
+    @property
+    def touching(self) -> tuple[Tool | Grasp, ...]:
+        """The tools, then the grasps."""
+        return (*self.tools, *self.grasps)
 
     @cached_property
     def _histories(self) -> tuple[Rows | None, ...]:

@@ -250,6 +250,7 @@ def coarser_problem(problem: Problem) -> Problem:
     """
     mesh, counts = problem.mesh, cell_counts(problem.mesh)
     chosen = [one.on for one in problem.supports] + [one.on for one in problem.loads]
+    chosen += [one.on for one in problem.tools]
     plain = all(on is None or isinstance(on, str | Plane | Box | Near) for on in chosen) and not problem.regions
     plain &= not (mesh.element_groups or mesh.facet_groups or mesh.element_vectors)
     plain &= not any(one.on_elements and one.on is not None for one in problem.loads)
@@ -267,9 +268,9 @@ def coarser_problem(problem: Problem) -> Problem:
 
 
 def _by_groups(problem: Problem) -> Problem:
-    """Return a problem whose supports, loads and regions select by group, not by number or by the centres of elements.
+    """Return a problem whose supports, loads, tools and regions select by group.
 
-    Refinement divides groups with the mesh; numbers and centres of elements change.
+    Refinement divides groups with the mesh; node numbers, and numbers and centres of elements, change.
     """
     mesh = problem.mesh
     nodes, elements = dict(mesh.node_groups), dict(mesh.element_groups)
@@ -292,13 +293,13 @@ def _by_groups(problem: Problem) -> Problem:
     loads = [
         one.moved_to(of_elements(one.on)) if one.on_elements and one.on is not None else one for one in problem.loads
     ]
-    supports, loads, regions = named(problem.supports), named(loads), []
+    supports, loads, tools, regions = named(problem.supports), named(loads), named(problem.tools), []
     for region in problem.regions:
         regions.append(Region(of_elements(region.on), region.material))
     if len(nodes) == len(mesh.node_groups) and len(elements) == len(mesh.element_groups):
         return problem
     mesh = replace(mesh, node_groups=nodes, element_groups=elements)
-    return replace(problem, mesh=mesh, supports=supports, loads=loads, regions=regions)
+    return replace(problem, mesh=mesh, supports=supports, loads=loads, regions=regions, tools=tools)
 
 
 def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float, clock: "_Clock") -> Solution:

@@ -97,6 +97,8 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
     screen.print(f"held nodes: {held}")
     for load in plan["loads"]:
         screen.print(f"load: {load}", soft_wrap=True)
+    for tool in plan["tools"]:
+        screen.print(f"tool: {tool}", soft_wrap=True)
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
     motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
     screen.print(f"total force ({force}) N{motion}, in {plan['load_steps']} load steps")

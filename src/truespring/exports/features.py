@@ -77,12 +77,22 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
 
 
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
-    """Raise UntakenError for the first feature of springs or loads that is not in `takes`, ExportError for fibres."""
+    """Raise UntakenError for the first feature of springs or loads that is not in `takes`.
+
+    Raises ExportError for fibres, tools and grasps.
+    """
+    refuse_tools(problem, program)
     if springs.beyond != PRESSURE:  # the arrays of these contain the fibres
         refuse_fibres(problem, program)
     for feature, where in features(problem, springs):
         if feature not in takes:
             raise UntakenError(feature, f"{program} does not support {feature}: {where}")
+
+
+def refuse_tools(problem: Problem, program: str) -> None:
+    """Raise ExportError if tools or grasps act on the body."""
+    for one in problem.touching:
+        raise ExportError(f"{program}: tools and grasps, such as '{one.name}', are not exported: solve it here")
 
 
 def refuse_fibres(problem: Problem, program: str) -> None:

@@ -174,6 +174,7 @@ def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
         return [("loads and supports", "not in the file")]
     facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
     facts += [("load", load.words()) for load in problem.loads]
+    facts += [("tool", tool.words()) for tool in problem.touching]
     loading = problem.loading.full
     forces = loading.force(problem.mesh.nodes)
     total = forces.sum(axis=0)

@@ -25,6 +25,9 @@ METHODS = ("auto", "mixed", "line-search")
 _SAME = 1e-9
 # Slip in a load step at which regularised friction is full, as a share of the body's size.
 _CREEP = 1e-5
+# Friction has the normal forces of the last iterate: they are renewed until that changes the balance by less than the
+# share, at most so often.
+_LAG, _MAX_LAGS = 1e-4, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +95,7 @@ class Newton(Solver):
             if previous is not None and any(previous.load_factor < one < level - _SAME for one in loading.corners):
                 previous = None  # the motion before a corner of a history says nothing about that after it
             balance.loading = loading.since(last.state.positions, last.state.load_factor, _CREEP * balance.size)
-            reached = self._find(balance, level, last, previous, admissible, jump)
+            reached = _settled(balance, level, self._find(balance, level, last, previous, admissible, jump))
             spent += reached.state.iterations
             refused = reached.state.converged and strict and not admissible(reached.state.positions)
             ever_refused = ever_refused or refused
@@ -242,6 +245,26 @@ def _find_by_search(balance: Balance, level: float, last: Found, previous: Equil
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))
     start = min(guesses, key=lambda guess: balance.norm(balance.force(guess, level)))
     return stabilised(balance, descend(balance, level, start))
+
+
+def _settled(balance: Balance, level: float, found: Found) -> Found:
+    """Return the equilibrium whose friction has its own normal forces, if renewing them converges."""
+    if not balance.loading.interactions:
+        return found
+    for _ in range(_MAX_LAGS):
+        state, before = found.state, balance.loading
+        lagged = before.lagged(state.positions, level)
+        force, scale = balance.unbalanced(state.internal_force, lagged.force(state.positions, level))
+        if not state.converged or balance.norm(force) <= _LAG * scale:
+            break
+        balance.loading = lagged
+        again = descend(balance, level, state.positions)
+        found = again if again.state.converged else found
+        found = found._replace(state=replace(found.state, iterations=state.iterations + again.state.iterations))
+        if not again.state.converged:
+            balance.loading = before
+            break
+    return found
 
 
 def _predictions(balance: Balance, level: float, last: Found, previous: Equilibrium | None) -> Iterator[Floats]:

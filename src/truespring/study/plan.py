@@ -46,6 +46,7 @@ def plan(study: Study) -> dict[str, Any]:
         "n_unknowns": int((~loading.held).sum()),
         "supports": [support.words(mesh.dim) for support in problem.supports],
         "loads": [load.words() for load in problem.loads],
+        "tools": [one.words() for one in problem.touching],
         "held": {axis: int(loading.held[:, number].sum()) for number, axis in enumerate(AXES[: mesh.dim])},
         "total_force": loading.loads(mesh.nodes).sum(axis=0).tolist(),
         "largest_motion": float(np.linalg.norm(loading.motion(), axis=1).max()),

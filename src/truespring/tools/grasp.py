@@ -9,8 +9,8 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Interaction, Slide, Touch
 from truespring.errors import ToolError
-from truespring.loading import Body
-from truespring.tools.path import Path, Track, track_of
+from truespring.loading import Body, vector_words
+from truespring.tools.path import Path, Track, path_words, track_of
 from truespring.tools.surface import surface
 from truespring.tools.values import positive, vector
 
@@ -37,6 +37,11 @@ class Grasp:
     path: Path
     stiffness: float | None = None
 
+    def words(self) -> str:
+        """Return name, patch and path, for tables."""
+        where = f"grasp within {self.radius:g} m of {vector_words(self.at)} m"
+        return f"'{self.name}': {where}, {path_words(self.path)}"
+
     def acting_on(self, body: Body, young: float | None, span: float) -> Interaction:
         """Return the springs of the grasp on a body; arguments and errors as `Tool.acting_on`."""
         dim = body.mesh.dim
@@ -51,11 +56,11 @@ class Grasp:
         inside = distance <= radius
         if not inside.any():
             nearest = int(distance.argmin())
-            place = ", ".join(f"{one:g}" for one in body.nodes[nodes[nearest]])
+            place = vector_words(body.nodes[nodes[nearest]])
             raise ToolError(
                 self.name,
-                f"no node of the boundary is within {radius:g} m of ({', '.join(f'{one:g}' for one in at)}) m: the "
-                f"nearest, at ({place}) m, is {distance[nearest]:.4g} m away; move the grasp or increase the radius",
+                f"no node of the boundary is within {radius:g} m of {vector_words(at)} m: the "
+                f"nearest, at {place} m, is {distance[nearest]:.4g} m away; move the grasp or increase the radius",
                 "at",
             )
         shares = areas[inside] / areas[inside].sum()

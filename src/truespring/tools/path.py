@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ToolError
+from truespring.loading import vector_words
 
 #: Rows of the place on the way and the coordinates [m]: the place is a share of the way at rest, 0 to 1, or a time [s]
 #: in motion. Or the coordinates alone [m], of a tool that does not move.
@@ -82,6 +83,14 @@ def track_of(name: str, path: Path, dim: int, span: float) -> Track:
             "path",
         )
     return Track(ways, rows[:, 1:], span)
+
+
+def path_words(path: Path) -> str:
+    """Return the begin and the end of a path for tables: "from (0.03, 0.041) m to (0.03, 0.037) m"."""
+    rows = np.asarray(path, dtype=float)
+    if rows.ndim == 1:
+        return f"at {vector_words(rows)} m"
+    return f"from {vector_words(rows[0, 1:])} m to {vector_words(rows[-1, 1:])} m"
 
 
 def _rows(name: str, path: Any) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats
 from truespring.errors import ToolError
+from truespring.loading import vector_words
 from truespring.tools.path import Path
 from truespring.tools.tool import Tool
 from truespring.tools.values import positive, vector
@@ -56,6 +57,10 @@ class Sphere(_Round):
         """Raise ToolError unless the radius is positive."""
         positive(self.name, "radius", self.radius, "m")
 
+    def form(self) -> str:
+        """Return shape and dimensions."""
+        return f"sphere of radius {self.radius:g} m"
+
     def core(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the places and identity matrices."""
         n, dim = places.shape
@@ -81,6 +86,10 @@ class Capsule(_Round):
         start, end = (vector(self.name, key, getattr(self, key), dim, "m") for key in ("start", "end"))
         if np.array_equal(start, end):
             raise ToolError(self.name, f"{list(self.end)} is the start itself: use a sphere", "end")
+
+    def form(self) -> str:
+        """Return shape and dimensions."""
+        return f"capsule of radius {self.radius:g} m from {vector_words(self.start)} to {vector_words(self.end)} m"
 
     def core(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the vectors from the nearest points of the line; between its ends they follow the places along it."""
@@ -111,6 +120,10 @@ class HalfSpace(Tool):
         if not vector(self.name, "normal", self.normal, dim, "-").any():
             raise ToolError(self.name, f"{list(self.normal)}: must not be zero", "normal")
 
+    def form(self) -> str:
+        """Return shape and dimensions."""
+        return f"plane with normal {vector_words(self.normal)}"
+
     def gaps(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the distance from the surface [m], and the normal."""
         normal = np.asarray(self.normal, dtype=float)
@@ -140,6 +153,10 @@ class Block(Tool):
         """Raise ToolError unless the lengths are positive."""
         if not (vector(self.name, "size", self.size, dim, "m") > 0).all():
             raise ToolError(self.name, f"{list(self.size)} m: must be positive", "size")
+
+    def form(self) -> str:
+        """Return shape and dimensions."""
+        return f"box of {vector_words(self.size)} m"
 
     def _outside(self, places: Floats) -> tuple[Floats, Bools]:
         """Return how far places are beyond the faces along each axis [m], and whether any is; (n, dim) and (n,)."""

@@ -1,18 +1,19 @@
 """Base class of tools: rigid bodies that move along a path and touch the surface of a body."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.conditions import Interaction
 from truespring.errors import ToolError, TruespringError, nearest
-from truespring.loading import Body
+from truespring.loading import Body, vector_words
 from truespring.mesh import Selection
 from truespring.tools.contact import Contact
 from truespring.tools.laws import CONTACTS, Law
-from truespring.tools.path import Path, track_of
+from truespring.tools.path import Path, path_words, track_of
 from truespring.tools.surface import surface
 from truespring.tools.values import positive
 
@@ -47,8 +48,8 @@ class Touching:
 class Tool(Touching, ABC):
     """A rigid body that moves along a path without turning, a frozen dataclass.
 
-    Subclasses define their dimensions, `gaps` and `bends`; add them to TOOLS to make them shapes of studies. Contact is
-    that of the nodes of the body's surface: a tool much smaller than the facets passes between them.
+    Subclasses define their dimensions, `gaps`, `bends`, `check` and `form`; add them to TOOLS to make them shapes of
+    studies. Contact is that of the nodes of the body's surface: a tool far smaller than the facets passes between them.
 
     Attributes:
         name: name in tables.
@@ -69,6 +70,20 @@ class Tool(Touching, ABC):
     @abstractmethod
     def check(self, dim: int) -> None:
         """Raise ToolError if the dimensions of the tool do not fit a body of `dim` directions."""
+
+    @abstractmethod
+    def form(self) -> str:
+        """Return shape and dimensions: "sphere of radius 0.01 m"."""
+
+    def words(self) -> str:
+        """Return name, form and path, for tables."""
+        rubbing = f", friction {self.friction:g}" if self.friction else ""
+        return f"'{self.name}': {self.form()}{rubbing}, {path_words(self.path)}"
+
+    def moved_to(self, on: Selection) -> Self:
+        """Return the tool on another selection of facets, such as a group of another mesh."""
+        changed: Any = replace(self, on=on)
+        return changed  # type: ignore[no-any-return]
 
     def acting_on(self, body: Body, young: float | None, span: float) -> Interaction:
         """Return the contact of the tool with a body.
@@ -114,15 +129,15 @@ class Tool(Touching, ABC):
         if gaps[deepest] >= slack or (gaps[deepest] > -slack and not contact.law.clearance > 0):
             return
         out = -normals[deepest]
-        place = ", ".join(f"{one:g}" for one in nodes[contact.nodes[deepest]])
+        place = vector_words(nodes[contact.nodes[deepest]])
         if gaps[deepest] > -slack:
             says, further = "touches the body, and a barrier starts outside", contact.law.reach
         else:
             says, further = f"starts inside the body by {-gaps[deepest]:.4g} m", -float(gaps[deepest])
-        way_out = ", ".join(f"{one:.4g}" for one in contact.track.at(0.0) + further * out)
+        way_out = vector_words(contact.track.at(0.0) + further * out, 4)
         raise ToolError(
             self.name,
-            f"{says}, at node {contact.nodes[deepest]} at ({place}) m: begin the path further out, such as at "
-            f"({way_out}) m",
+            f"{says}, at node {contact.nodes[deepest]} at {place} m: begin the path further out, such as at "
+            f"{way_out} m",
             "path",
         )
