@@ -8,6 +8,8 @@ from .calibration.page import draw_calibration as draw_calibration
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .converging import converge as converge
+from .dynamics import Damping as Damping
+from .dynamics import Dynamics as Dynamics
 from .equilibrium import Solution as Solution
 from .equilibrium import State as State
 from .equilibrium import Status as Status

@@ -113,6 +113,11 @@ class Interaction(Protocol):
         """The levels between 0 and 1 at which the path has a corner [-]."""
         ...
 
+    @property
+    def frictional(self) -> bool:
+        """Whether there is friction, which depends on the begin of a step."""
+        ...
+
     def energy(self, positions: Floats, level: float) -> float:
         """Return the stored energy plus the dissipation since the begin of the step [J]; infinite where not allowed."""
         ...
@@ -301,6 +306,10 @@ class Loading:
             moved = one.cleared(moved, level)
         return positions if moved is positions else np.where(self.held, positions, moved)
 
+    def touches(self, positions: Floats, level: float) -> tuple[Touch, ...]:
+        """Return what each tool and grasp does at a state."""
+        return tuple(one.touch(positions, level) for one in self.interactions)
+
     def at_rest(self, nodes: Floats) -> "Loading":
         """Return the loading of a linear theory: following loads become dead loads with their undeformed forces."""
 
@@ -333,6 +342,11 @@ class Refined(Potential, Protocol):
     @property
     def loading(self) -> Loading:
         """The problem's loading on all nodes of the potential."""
+        ...
+
+    @property
+    def mass(self) -> Floats:
+        """The problem's lumped mass on all nodes of the potential [kg], shape (n_nodes,)."""
         ...
 
 

@@ -1,9 +1,10 @@
-"""What is asked of a motion: its duration, time step, scheme, damping, start, and what is recorded."""
+"""What is asked of a motion: its duration, time step, scheme, damping, start; and what is recorded of it."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from truespring.arrays import Floats
 from truespring.errors import ProblemError, nearest
 
 #: Schemes of time integration: "auto" chooses between "leapfrog" and "bdf2" by the largest stable step.
@@ -86,3 +87,43 @@ class Dynamics:
         if isinstance(value, bool) or not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
             allowed, unit = ', or "auto"' if name == "step" else "", "m/s" if name == "creep" else "s"
             raise ProblemError(f"{name} = {value!r} {unit}: must be a positive number{allowed}")
+
+
+@dataclass(frozen=True, slots=True)
+class Energies:
+    """Energies at one time [J].
+
+    Attributes:
+        kinetic, elastic: those of the body.
+        loads: minus the work of loads, moved supports and moving tools since the begin.
+        contact: stored in contacts and grasps.
+        damped: dissipated by damping and friction since the begin.
+        numerical: dissipated by the scheme since the begin: what is missing in the sum.
+    """
+
+    kinetic: float
+    elastic: float
+    loads: float
+    contact: float
+    damped: float
+    numerical: float
+
+    @property
+    def total(self) -> float:
+        """The sum of kinetic and elastic energy, loads and contact: constant but for what is dissipated [J]."""
+        return self.kinetic + self.elastic + self.loads + self.contact
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moving:
+    """What a state of a motion has beyond a state at rest.
+
+    Attributes:
+        time: [s].
+        velocity: velocity of the nodes of the potential [m/s], shape (n_nodes, dim).
+        energies: energies [J].
+    """
+
+    time: float
+    velocity: Floats
+    energies: Energies

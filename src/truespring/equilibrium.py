@@ -13,12 +13,14 @@ from truespring.arrays import Floats
 from truespring.coarsening import CoarseBody
 from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
 from truespring.deprecation import renamed_argument
-from truespring.errors import ModelError, OneProcessError, TruespringError, one_line
+from truespring.dynamics import Dynamics
+from truespring.errors import ModelError, OneProcessError, ProblemError, TruespringError, one_line
 from truespring.linear import processes_of
 from truespring.mesh import interpolations, select
-from truespring.models import Model, as_model, check_fibres
+from truespring.models import Model, as_model, check_fibres, damper_of
+from truespring.motion import follow_motion
 from truespring.piecewise import Piecewise, own_rows
-from truespring.potential import Potential, Stretched
+from truespring.potential import Massive, Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.ranks import Communicator, layout_of, ranks_of
@@ -142,7 +144,11 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     layout = layout_of(potential)
     if layout is not None:
         loading = own_rows(loading, layout)
-    found, broken = _followed(solver.follow(potential, loading, report, geometry), potential)
+    if problem.dynamics is None:
+        path = solver.follow(potential, loading, report, geometry)
+    else:
+        path = _motion(problem, problem.dynamics, model, (potential, loading), solver, report, geometry)
+    found, broken = _followed(path, potential)
     found, below_rounding = _above_rounding(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
@@ -152,11 +158,11 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         label=model.label_on(problem),
         kind=model.kind,
         states=states,
-        status=Status.NOT_CONVERGED if broken else path_status(states, best, model.finite, stable),
+        status=Status.NOT_CONVERGED if broken else path_status(problem, states, best, model.finite, stable),
         warnings=(
             *model.warnings(problem),
             *broken,
-            *path_warnings(states, best, model.finite, stable, below_rounding, loading.symmetric),
+            *path_warnings(problem, states, best, model.finite, stable, below_rounding, loading.symmetric),
             *([model.limit] if best is not None and model.limit else ()),
         ),
         best=best,
@@ -168,6 +174,33 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         n_unknowns=int((~loading.held).sum()),
         cost=found[-1].cost,
     )
+
+
+def _motion(
+    problem: Problem,
+    dynamics: Dynamics,
+    model: Model,
+    body: tuple[Potential, Loading],
+    solver: Solver,
+    report: Reporter | None,
+    geometry: Geometry,
+) -> Iterator[Equilibrium]:
+    """Return the states of a motion of a potential under a loading.
+
+    Raises ProblemError if the solver cannot take its steps, or the body has no mass.
+    """
+    potential, loading = body
+    if not isinstance(solver, Newton):
+        raise ProblemError(f"the steps of a motion are solved by Newton's method, not by {type(solver).__name__}")
+    if processes_of(solver.linear).size > 1:
+        raise ProblemError("a motion is computed by one process: start one, or leave dynamics out")
+    if isinstance(potential, Refined):
+        mass = potential.mass
+    else:
+        own = potential.mass if isinstance(potential, Massive) else np.zeros(0)
+        mass = own if len(own) else problem.mass
+    damper = damper_of(problem, potential, model.finite) if dynamics.damping.stiffness else None
+    return follow_motion(potential, loading, dynamics, mass, damper, solver, report, geometry)
 
 
 def _coarse_body(model: Model, body: CoarseBody) -> Coarse | None:
@@ -192,6 +225,8 @@ def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[li
     The unbalanced force of that state is not small against the load: it is returned last, as not converged.
     """
     found: list[Equilibrium] = []
+    if problem.dynamics is not None:  # its residuals are those of steps, see `_of_motion`
+        return list(follow), False
     for one in follow:
         unbalanced = one.converged and one.residual > UNBALANCED and not problem.loading.vanishes(one.load_factor)
         if unbalanced and not _moved_by_more_than_rounding(problem, one.load_factor):
@@ -293,7 +328,7 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         all_positions=found.positions,
         displacement=positions - problem.mesh.nodes,
         reaction=reaction,
-        applied_force=found.external_force.sum(axis=0),
+        applied_force=_applied(loading, found).sum(axis=0),
         energy=found.energy,
         iterations=found.iterations,
         residual=found.residual,
@@ -304,9 +339,18 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         mode=None if found.mode is None else found.mode[:n_nodes],
         level=_level(found),
         reason=found.reason,
+        touches=found.touches,
+        moving=found.moving,
         area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
+
+
+def _applied(loading: Loading, found: Equilibrium) -> Floats:
+    """Return the force of the loads alone, without tools and grasps [N], shape (n_nodes, dim)."""
+    if not loading.interactions:
+        return found.external_force
+    return loading.loads(found.positions, found.load_factor)
 
 
 def _level(found: Equilibrium) -> float | None:

@@ -4,7 +4,7 @@ A model makes a `Potential` from a problem. A solver uses potentials and a `Load
 elements or meshes.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -122,6 +122,38 @@ class Stressed(Potential, Protocol):
 
         Symmetric, shape (n_dof, n_dof).
         """
+        ...
+
+
+@runtime_checkable
+class Scaled(Potential, Protocol):
+    """A potential of several parts, whose forces cancel in balance, as those of inertia and of elasticity."""
+
+    def force_scale(self) -> float:
+        """Return the size of the parts of the last gradient [N], to which an unbalanced force is compared."""
+        ...
+
+
+@runtime_checkable
+class Damper(Protocol):
+    """Dashpots beside springs or elements."""
+
+    def measure(self, positions: Floats) -> Sequence[Floats]:
+        """Return the lengths or strains of the dashpots at positions [m], shape (n_nodes, dim)."""
+        ...
+
+    def since(self, measures: Sequence[Floats], time: float) -> tuple[Potential, ...]:
+        """Return the dashpots as springs of `time` [-] times their elastic stiffness, relaxed at `measures`."""
+        ...
+
+
+@runtime_checkable
+class Massive(Protocol):
+    """A model with the mass of its nodes."""
+
+    @property
+    def mass(self) -> Floats:
+        """Mass of the nodes [kg], shape (n_nodes,); empty for that of the problem."""
         ...
 
 

@@ -114,7 +114,7 @@ class Problem:
 
     def _check_motion(self, dynamics: Dynamics) -> None:
         """Raise ProblemError if a motion has no mass, or its velocity does not fit the body."""
-        if self.body.density is None:
+        if self.material is not None and self.body.density is None:
             raise ProblemError("a motion needs a density [kg/m^3] of the material and of each region")
         if dynamics.velocity is not None:
             components(dynamics.velocity, self.mesh.dim, "velocity", "m/s")

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.conditions import Refined
+from truespring.conditions import Refined, Touch
+from truespring.dynamics import Moving
 from truespring.mesh import Grid, Shell, Surface
 from truespring.models import Moduli
 from truespring.potential import Potential
@@ -28,6 +29,7 @@ class Status(StrEnum):
     INVERTED = "inverted"
     NOT_CONVERGED = "not-converged"
     READ = "read"
+    FIXED_ITERATIONS = "fixed-iterations"
 
     @property
     def advice(self) -> str:
@@ -41,6 +43,7 @@ _ADVICE = {
     "branch",
     Status.INVERTED: "an element is inverted, at a corner at least; reduce the load, use more load_steps or a finer "
     "mesh, or with rule = 'gaussian' a larger hourglass: other springs and St. Venant-Kirchhoff resist no inversion",
+    Status.FIXED_ITERATIONS: "each time step ended after a fixed number of iterations, not converged, as in real time",
     Status.READ: "read from a file, which does not state whether it converged",
     Status.NOT_CONVERGED: "no equilibrium was found beyond the last level reached; reduce the load, use more "
     "load_steps or another law: each has a largest load",
@@ -73,6 +76,8 @@ class State:
         supports: force and torque of each moved support, if they do not follow from the reactions (read from a file,
             or interpolated on another mesh), else None; see Solution.support_forces.
         reason: why the solver did not look for equilibria beyond this state, else empty.
+        touches: what each tool and grasp of the problem does, in their order; empty if not known.
+        moving: time, velocity and energies of a state of a motion, None at rest.
     """
 
     load_factor: float
@@ -94,6 +99,8 @@ class State:
     level: float | None = None
     supports: tuple[SupportForce, ...] | None = None
     reason: str = ""
+    touches: tuple[Touch, ...] = ()
+    moving: Moving | None = None
 
     @property
     def loaded(self) -> bool:
@@ -238,5 +245,7 @@ class Solution:
         loading = self.problem.loading if self.problem.stated else None
         if loading is None or loading.interactions or not loading.driven_by_motion:
             return state.applied_force
+        if self._leading is None and state.touches:
+            return np.asarray(-sum(touch.force for touch in state.touches))
         of_leading = [one.force for one in self.support_forces(state) if one.support == self._leading]
         return of_leading[0] if of_leading else np.full(self.problem.mesh.dim, math.nan)

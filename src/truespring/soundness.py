@@ -1,8 +1,12 @@
 """Status and warnings of a solution: inverted, unstable and unbalanced states."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from truespring.dynamics import Dynamics
 from truespring.mesh.selections import AXES
+from truespring.problem import Problem
 from truespring.solution import State, Status
 
 # A larger relative residual is reported; it occurs only under loads that are near rounding errors.
@@ -11,8 +15,10 @@ _LOOSE = 1e-6
 UNBALANCED = 1e-3
 
 
-def path_status(states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool) -> Status:
-    """Return the status of a solution; `best` is the state of a level that was not reached, else None.
+def path_status(
+    problem: Problem, states: tuple[State, ...], best: State | None, finite: bool, keeps_to_stable: bool
+) -> Status:
+    """Return the status of a solution of a problem; `best` is the state of a level that was not reached, else None.
 
     `finite` and `keeps_to_stable` are those of model and solver, see Model.finite and Solver.keeps_to_stable_states.
     """
@@ -22,10 +28,12 @@ def path_status(states: tuple[State, ...], best: State | None, finite: bool, kee
         return Status.INVERTED
     if keeps_to_stable and any(state.negative_eigenvalues for state in states):
         return Status.UNSTABLE
-    return Status.CONVERGED
+    fixed = problem.dynamics is not None and problem.dynamics.iterations
+    return Status.FIXED_ITERATIONS if fixed else Status.CONVERGED
 
 
 def path_warnings(
+    problem: Problem,
     states: tuple[State, ...],
     best: State | None,
     finite: bool,
@@ -82,6 +90,8 @@ def path_warnings(
             "suggests: it may have snapped through unstable states, which are not in the solution; use more load_steps"
         )
     loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
+    if problem.dynamics is not None:
+        return (*warnings, *_of_motion(problem.dynamics, loose))
     if loose > _LOOSE:
         warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load is near rounding errors")
     if not symmetric:
@@ -95,6 +105,20 @@ _NO_POTENTIAL = (
     "the pressure on an open surface has no potential: its work depends on the path, so the energy of the loads is not "
     "defined, and stability not proven"
 )
+
+
+def _of_motion(dynamics: Dynamics, residual: float) -> Iterator[str]:
+    """Yield a warning about the solution of the time steps; `residual` is the largest of them [-]."""
+    if dynamics.iterations:
+        several = "s" * (dynamics.iterations != 1)
+        yield (
+            f"{dynamics.iterations} iteration{several} a step, not converged: the largest relative residual is "
+            f"{residual:.1e}"
+        )
+    elif residual > _LOOSE:
+        yield f"time steps are solved only to a relative residual of {residual:.1e}: the load is near rounding errors"
+
+
 _BELOW_ROUNDING = (
     "the load is below rounding errors: it is too small for the stiffness and the coordinates of the body; apply a "
     "larger load, or place the body near the origin"

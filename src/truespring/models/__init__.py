@@ -2,6 +2,7 @@
 
 from truespring.models.bem_springs import BemSprings as BemSprings
 from truespring.models.biquadratic import BiquadraticSprings as BiquadraticSprings
+from truespring.models.dashpots import damper_of as damper_of
 from truespring.models.fem import Fem as Fem
 from truespring.models.fem_potential import FemPotential as FemPotential
 from truespring.models.fem_potential import FiniteElements as FiniteElements

@@ -1,7 +1,7 @@
 """Networks of springs."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,6 +38,7 @@ class SpringNetwork(Model):
         rest_length: rest length of each spring [m], shape (n_springs,); empty, the default, for the undeformed lengths.
         law: force law, a key of PAIR_LAWS: "straight", the default, or "neo-hookean", tension
             k L (s - s^-(d+1)) / (d + 2) with s = l / L and the dimension d of the nodes.
+        mass: mass of the nodes, for a motion [kg], shape (n_nodes,); empty, the default, for that of the problem.
     """
 
     nodes: Floats
@@ -45,6 +46,7 @@ class SpringNetwork(Model):
     stiffness: Floats
     rest_length: Floats = field(default_factory=lambda: np.zeros(0))
     law: str = STRAIGHT
+    mass: Floats = field(default_factory=lambda: np.zeros(0))
 
     kind = "springs"
     has_springs = True
@@ -64,10 +66,14 @@ class SpringNetwork(Model):
                 else np.linalg.norm(self.nodes[self.springs[:, 1]] - self.nodes[self.springs[:, 0]], axis=1)
             )
             set_field(self, "rest_length", frozen_floats(rest, (n_springs,), "rest_length"))
+            n_masses = len(self.nodes) if np.size(self.mass) else 0
+            set_field(self, "mass", frozen_floats(self.mass, (n_masses,), "mass"))
         except ValueError as error:
             raise ModelError(str(error)) from None
         if not (self.rest_length > 0).all():
             raise ModelError(f"rest_length of spring {int((self.rest_length <= 0).argmax())} is not positive")
+        if not (self.mass > 0).all():
+            raise ModelError(f"mass of node {int((self.mass <= 0).argmax())} is not positive")
         if self.law not in PAIR_LAWS:
             raise ModelError(
                 f"law = '{self.law}' is unknown{nearest(self.law, PAIR_LAWS)}; allowed: {', '.join(PAIR_LAWS)}"
@@ -92,8 +98,9 @@ class SpringNetwork(Model):
         return "springs"
 
     def potential(self, problem: Problem) -> "SpringNetwork":
-        """Return the network; raise ModelError if it is a mechanism."""
-        check_mechanism(self, problem.loading.held)
+        """Return the network; raise ModelError if it is a mechanism, which only inertia holds."""
+        if problem.dynamics is None:
+            check_mechanism(self, problem.loading.held)
         return self
 
     @cached_property
@@ -155,6 +162,21 @@ class SpringNetwork(Model):
         """Whether no spring has a negative stiffness or a tension at rest: the Hessian is then a sum of k n n^T."""
         change = np.abs(self.lengths(self.nodes) - self.rest_length)
         return bool((self.stiffness >= 0).all() and (change <= _UNSTRESSED * self.rest_length).all())
+
+    def measure(self, positions: Floats) -> tuple[Floats]:
+        """Return the length of each spring [m], shape (n_springs,), the only measure of its dashpot."""
+        return (self.lengths(positions),)
+
+    def since(self, measures: Sequence[Floats], time: float) -> "tuple[SpringNetwork]":
+        """Return dashpots beside the springs: springs of `time` [-] times their stiffness, relaxed at the lengths.
+
+        A Kelvin-Voigt element is again a spring: no rigid motion is damped (Kelvin-Voigt; see motion.Damper).
+        """
+        _ = self._pattern
+        (lengths,) = measures
+        found = replace(self, stiffness=time * np.abs(self.stiffness), rest_length=lengths, law=STRAIGHT)
+        vars(found)["_pattern"] = self._pattern
+        return (found,)
 
     def stretch(self, positions: Floats) -> Floats:
         """Return length over rest length of each spring [-], shape (n_springs,)."""

@@ -85,6 +85,11 @@ class QuadraticPotential(FemPotential):
         return self.problem.loading_on(self.body, held, np.array(displacements), turns)
 
     @property
+    def mass(self) -> Floats:
+        """The lumped mass of all nodes [kg], shape (n_nodes + n_edges,), see `nodal_mass`."""
+        return self.problem.mass_on(self.body)
+
+    @property
     def body(self) -> Body:
         """The body that loads act on, with nodes on the edges of its cells."""
         return self.problem.body._replace(second_order=self._second_order)

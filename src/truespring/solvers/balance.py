@@ -8,12 +8,13 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
-from truespring.conditions import Loading
+from truespring.conditions import Loading, Touch
+from truespring.dynamics import Moving
 from truespring.errors import ProblemError
 from truespring.linear.choice import LinearSolver, Tangent, choose
 from truespring.linear.direct import Direct, SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError, norm
-from truespring.potential import Potential, Projectable, SparseMatrix, Unstressed, with_diagonal
+from truespring.potential import Potential, Projectable, Scaled, SparseMatrix, Unstressed, with_diagonal
 from truespring.ranks import ranks_of
 from truespring.solvers.cost import Cost
 
@@ -52,6 +53,8 @@ class Equilibrium:
         mode: buckling mode of a critical point, largest component 1 [-], shape (n_nodes, dim); None of other states.
         level: share of the controlled quantity, 0 to 1; None if that is the load factor.
         reason: why the solver did not look for an equilibrium, else empty.
+        touches: what each tool and grasp does.
+        moving: time, velocity and energies of a state of a motion, None at rest.
         cost: methods and costs up to this state.
     """
 
@@ -70,6 +73,8 @@ class Equilibrium:
     mode: Floats | None = None
     level: float | None = None
     reason: str = ""
+    touches: tuple[Touch, ...] = ()
+    moving: Moving | None = None
     cost: Cost | None = None
 
 
@@ -97,6 +102,7 @@ class Balance:
         free: true for free directions, shape (n_nodes, dim).
         size: diagonal of the undeformed body's bounding box [m].
         ranks: the processes that share the potential: matrices have the rows of each, all else is that of all nodes.
+        judges: whether the stability of equilibria is determined.
     """
 
     potential: Potential
@@ -107,6 +113,7 @@ class Balance:
     report: Reporter | None = None
     notes: list[str] = field(default_factory=list)
     spent: int = 0
+    judges: bool = True
 
     def __post_init__(self) -> None:
         self.free = ~self.loading.held
@@ -131,6 +138,8 @@ class Balance:
     def unbalanced(self, internal: Floats, applied: Floats) -> tuple[Floats, float]:
         """Return the unbalanced force [N], zero in held directions, shape (n_nodes, dim), and its scale [N]."""
         scale = max(self.norm(applied), self.norm(internal))
+        if isinstance(self.potential, Scaled):
+            scale = max(scale, self.potential.force_scale())
         return np.where(self.free, internal - applied, 0.0), scale
 
     def norm(self, vector: Floats) -> float:
@@ -214,6 +223,8 @@ class Balance:
 
         Stability is not determined under loads without a potential.
         """
+        if not self.judges:
+            return Found(state)
         if not self.free.any():
             return Found(replace(state, negative_eigenvalues=0))
         if not self.loading.has_potential(state.load_factor):
@@ -337,6 +348,11 @@ class Watch:
         self.best = replace(self.best, iterations=iteration)
         return bool(np.isfinite(self.residual))
 
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether the last state evaluated is in equilibrium up to the tolerance."""
+        return self._size <= self._balance.tolerance * self._scale
+
     def balanced(self, tangent: SparseMatrix, positions: Floats) -> bool:
         """Return whether the last state evaluated is in equilibrium.
 
@@ -348,7 +364,7 @@ class Watch:
         unloaded = self._balance.loading.vanishes(self.load_factor)
         noise = self.below_rounding and (unloaded or self._size > self._size_before / 2)
         self._size_before = self._size if self.below_rounding else np.inf
-        return noise or self._size <= self._balance.tolerance * self._scale
+        return noise or self.within_tolerance
 
     def equilibrium(self) -> Found:
         """Return the last state evaluated, or an earlier one of less unbalanced force, as converged.
@@ -358,7 +374,8 @@ class Watch:
         state = self.best if self._best_size < self._size else self._here
         energy = self._balance.potential.energy(state.positions)
         self._balance.spent += state.iterations
-        return self._balance.judged(replace(state, energy=energy, converged=True))
+        touches = self._balance.loading.touches(state.positions, state.load_factor)
+        return self._balance.judged(replace(state, energy=energy, converged=True, touches=touches))
 
     def failure(self) -> Found:
         """Return the state of least residual, as not converged."""

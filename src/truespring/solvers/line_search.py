@@ -53,6 +53,8 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
     for iteration in range((undamped_iterations or balance.max_iterations) + 1):
         if not watch.at(positions, iteration):
             break
+        if watch.within_tolerance:
+            return watch.equilibrium()
         tangent = balance.hessian(positions, load_factor)
         if watch.balanced(tangent, positions):
             del tangent  # its memory is used again

@@ -66,6 +66,8 @@ def _converge(balance: Balance, load_factor: float, start: Start) -> Found:
     for iteration in range(min(_MAX_ITERATIONS, balance.max_iterations) + 1):
         if not watch.at(positions, iteration, motion is None):
             break
+        if motion is None and watch.within_tolerance:
+            return watch.equilibrium()
         tangent = balance.hessian(positions, load_factor, stress)
         if motion is None and watch.balanced(tangent, positions):
             del tangent  # its memory is used again

@@ -1,0 +1,92 @@
+"""The explicit scheme: leapfrog, or velocity Verlet, and its largest stable step."""
+
+from copy import copy
+
+import numpy as np
+from scipy import sparse
+
+from truespring.arrays import Floats
+from truespring.motion.advance import Advance
+from truespring.motion.moving import Body
+from truespring.motion.record import Account
+from truespring.motion.stages import History, Moment
+from truespring.solvers.balance import Equilibrium
+
+# Share of the largest stable step at rest that is taken: a deformed body is stiffer.
+SAFE = 0.5
+
+
+def stable_step(body: Body) -> float:
+    """Return the largest stable step of leapfrog for small motion about the undeformed body [s].
+
+    2 / omega of the highest frequency omega, shortened by the dashpots of the material, whose damping ratio there is
+    xi = tau omega / 2, to 2 / omega (sqrt(1 + xi^2) - xi) (Belytschko, Liu, Moran, Nonlinear Finite Elements, 6.2).
+    Zero with friction, which is too stiff for an explicit scheme.
+    """
+    from scipy.sparse.linalg import ArpackNoConvergence, eigsh
+
+    if any(one.frictional for one in body.loading.interactions):
+        return 0.0
+    nodes = body.potential.nodes
+    matrix = sparse.csr_array(body.potential.hessian(nodes))
+    touched = sum((one.largest_stiffness() for one in body.loading.interactions), np.zeros(len(nodes)))
+    matrix = matrix + sparse.diags_array(np.repeat(touched, nodes.shape[1]))
+    inverse = np.where(body.held, 0.0, 1 / np.sqrt(body.mass)[:, None]).ravel()
+    scaled = sparse.csr_array(sparse.diags_array(inverse) @ matrix @ sparse.diags_array(inverse))
+    free = np.flatnonzero(~body.held.ravel())
+    if len(free) < 3:  # too few for an iteration
+        largest = float(np.linalg.eigvalsh(scaled.toarray()).max(initial=0.0))
+    else:
+        start = np.random.default_rng(1).normal(size=scaled.shape[0])
+        try:
+            largest = float(eigsh(scaled, k=1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
+        except ArpackNoConvergence as error:
+            largest = float(max(error.eigenvalues, default=abs(scaled).sum(axis=1).max()))
+    omega = float(np.sqrt(max(largest, 0.0)))
+    if not omega:
+        return np.inf
+    xi = body.damping.stiffness * omega / 2
+    return 2 / omega * float(np.sqrt(1 + xi**2) - xi)
+
+
+class Leapfrog:
+    """Steps of the leapfrog scheme, with half a kick at both ends: order 2, symmetric in time."""
+
+    def __init__(self, body: Body) -> None:
+        """Store the body."""
+        self.body = body
+        self._force: Floats | None = None
+
+    def advance(self, history: History, h: float, account: Account) -> Advance:
+        """Return the step of length h [s] with the work in it."""
+        body, last, alpha, account = self.body, history.last, self.body.damping.mass, copy(account)
+        levels = last.time / body.duration, (last.time + h) / body.duration
+        mass, held = body.mass[:, None], body.held
+        if self._force is None:
+            self._force = self._forces(last.positions, levels[0])
+        half = last.velocity + h / 2 * (self._force / mass - alpha * last.velocity)
+        positions = body.placed(last.positions + h * half, levels[1])
+        moved = positions - last.positions
+        half = np.where(held, moved / h, half)
+        force = self._forces(positions, levels[1])
+        if body.damper is not None:
+            before = body.damper.measure(last.positions)
+            for one in body.damper.since(before, body.damping.stiffness / h):
+                drag = one.gradient(positions)
+                force = force - drag
+                account.damped += float((drag * moved).sum())
+        velocity = np.where(held, half, (half + h / 2 * force / mass) / (1 + h / 2 * alpha))
+        account.step(body.loading, last.positions, positions, levels[1])
+        inertia = mass * (velocity - last.velocity) / h
+        reaction = np.where(held, inertia - (self._force + force) / 2, 0.0)
+        account.support(reaction, moved)
+        if alpha:
+            account.damped += alpha * float((mass * half * moved).sum())
+        self._force = force
+        moment, still = Moment(last.time + h, positions, velocity), np.zeros_like(positions)
+        state = Equilibrium(levels[1], positions, reaction, still, 0.0, 0, 0.0, converged=True)
+        return Advance(moment, state, body.loading, np.where(held, 0.0, force / mass), account, 0)
+
+    def _forces(self, positions: Floats, level: float) -> Floats:
+        """Return loads minus internal force [N], shape (n_nodes, dim)."""
+        return self.body.loading.force(positions, level) - self.body.potential.gradient(positions)

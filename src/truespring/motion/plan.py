@@ -1,0 +1,94 @@
+"""The scheme, the time steps and the recorded times of a motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truespring.dynamics import Dynamics
+from truespring.errors import ProblemError
+from truespring.motion.explicit import SAFE, stable_step
+from truespring.motion.moving import Body
+
+# Number of recorded states by default.
+_RECORDS = 100
+#: Times closer than this share of the duration are equal.
+SAME = 1e-9
+# "auto" takes leapfrog if that needs at most so many times the steps of an implicit scheme, and so many steps of an
+# implicit scheme are expected if the step is not given.
+_CHEAPER, _EXPECTED = 20.0, 200
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The scheme and the times of a motion.
+
+    Attributes:
+        scheme: name of the scheme.
+        step: time step [s]; None if chosen step by step.
+        goals: times that steps end at, ascending [s].
+        recorded: numbers of those that are recorded.
+        note: why the scheme was chosen, else empty.
+    """
+
+    scheme: str
+    step: float | None
+    goals: Sequence[float]
+    recorded: frozenset[int]
+    note: str = ""
+
+
+def planned(body: Body, dynamics: Dynamics) -> Plan:
+    """Return the scheme and the times of a motion.
+
+    Raises ProblemError for leapfrog with a step that is not stable, and for a fixed number of iterations with it.
+    """
+    scheme, note, step = dynamics.scheme, "", dynamics.step
+    if scheme in ("auto", "leapfrog"):
+        stable = stable_step(body)
+        safe = SAFE * stable
+        if scheme == "auto":
+            scheme, note = _chosen(dynamics, stable)
+        if scheme == "leapfrog":
+            if dynamics.iterations:
+                raise ProblemError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
+            if not stable:
+                raise ProblemError(
+                    "leapfrog has no stable step with friction: use euler, bdf2 or midpoint, or leave friction out"
+                )
+            if isinstance(step, int | float) and step > stable and dynamics.scheme == "leapfrog":
+                raise ProblemError(
+                    f"step = {step:g} s is not stable with leapfrog: the largest stable step at rest is {stable:.3g} "
+                    "s; take at most half of it, or an implicit scheme (bdf2)"
+                )
+            step = min(step, safe) if isinstance(step, int | float) and dynamics.scheme == "auto" else step
+            step = safe if step == "auto" else step
+    fixed = float(step) if isinstance(step, int | float) else None
+    return Plan(scheme, fixed, *_times(body, dynamics, fixed), note)
+
+
+def _chosen(dynamics: Dynamics, stable: float) -> tuple[str, str]:
+    """Return the scheme that costs less, and why."""
+    implicit = dynamics.step if isinstance(dynamics.step, int | float) else dynamics.duration / _EXPECTED
+    ratio = implicit / (SAFE * stable) if stable else np.inf
+    if dynamics.iterations or ratio > _CHEAPER:
+        why = "a fixed number of iterations is asked" if dynamics.iterations else f"{ratio:.3g} explicit steps each"
+        why = "friction has no explicit form here" if not stable else why
+        return "bdf2", f"scheme bdf2: {why} (the largest stable step of leapfrog is {stable:.3g} s)"
+    return "leapfrog", f"scheme leapfrog: its largest stable step is {stable:.3g} s, half of it is taken"
+
+
+def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence[float], frozenset[int]]:
+    """Return the times that steps end at [s], and the numbers of those that are recorded."""
+    duration = dynamics.duration
+    record = dynamics.record or duration / _RECORDS
+    if step is not None:
+        n = max(1, int(np.ceil(duration / step - SAME)))
+        each = max(1, round(record * n / duration))
+        goals = [duration * (k + 1) / n for k in range(n)]
+        return goals, frozenset({*range(each - 1, n, each), n - 1})
+    n = max(1, int(np.ceil(duration / record - SAME)))
+    recorded = [duration * (k + 1) / n for k in range(n)]
+    corners = [duration * one for one in body.loading.corners]
+    goals = sorted({*recorded, *corners})
+    return goals, frozenset(number for number, goal in enumerate(goals) if goal in recorded)
