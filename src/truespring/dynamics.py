@@ -46,7 +46,8 @@ class Dynamics:
         velocity: velocity of all nodes at time 0 [m/s], one value per direction; None for zero.
         iterations: 0 solves each step to the tolerance of the solver; n stops after n Newton iterations, as real-time
             programs do.
-        record: time between recorded states [s]; None for a hundredth of the duration, at least a step.
+        record: time between recorded states [s]; None for a hundredth of the duration, at least a step. Steps are
+            shortened so that a whole number of them fits in it.
         accuracy: with `step` "auto", the largest error of a step over the largest displacement [-].
         creep: speed at which regularised friction is full [m/s]; None for 0.001 sqrt(g L), L the size of the body.
     """

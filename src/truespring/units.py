@@ -11,7 +11,18 @@ if TYPE_CHECKING:
     import pint
 
 Dimension = Literal[
-    "length", "stress", "force", "density", "acceleration", "moment", "angle", "stiffness", "stiffness per area", "time"
+    "length",
+    "stress",
+    "force",
+    "density",
+    "acceleration",
+    "moment",
+    "angle",
+    "stiffness",
+    "stiffness per area",
+    "time",
+    "rate",
+    "speed",
 ]
 
 #: The SI unit of each dimension, and an example for error messages.
@@ -25,7 +36,9 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "angle": ("rad", '"30 deg"'),
     "stiffness": ("N/m", '"5 N/mm"'),
     "stiffness per area": ("N/m^3", '"5 N/mm^3"'),
-    "time": ("s", '"0.2 s"'),
+    "time": ("s", '"20 ms"'),
+    "rate": ("1/s", '"2 1/s"'),
+    "speed": ("m/s", '"30 mm/s"'),
 }
 
 #: Limits on the magnitude of nonzero quantities in SI units; their fourth powers do not overflow.
@@ -111,8 +124,9 @@ _QUANTITY = re.compile(
 
 # Common units, which are converted without importing pint; pint converts all others.
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
-_COMMON = {f"{prefix}{unit}": (factor, unit) for unit in ("m", "Pa", "N") for prefix, factor in _PREFIXES.items()}
-_COMMON |= {unit: (1.0, unit) for unit in ("kg/m^3", "m/s^2")}
+_COMMON = {f"{prefix}{unit}": (factor, unit) for unit in ("m", "Pa", "N", "s") for prefix, factor in _PREFIXES.items()}
+_COMMON |= {unit: (1.0, unit) for unit in ("kg/m^3", "m/s^2", "m/s")}
+_COMMON["mm/s"] = (1e-3, "m/s")
 _COMMON["deg"] = (math.pi / 180, "rad")
 
 # Units that are probably misspelt by case, by dimension: the unit, the unit that may be meant, and an unambiguous unit

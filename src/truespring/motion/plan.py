@@ -79,16 +79,31 @@ def _chosen(dynamics: Dynamics, stable: float) -> tuple[str, str]:
 
 
 def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence[float], frozenset[int]]:
-    """Return the times that steps end at [s], and the numbers of those that are recorded."""
-    duration = dynamics.duration
-    record = dynamics.record or duration / _RECORDS
+    """Return the times that steps end at [s], and the numbers of those that are recorded.
+
+    Steps are shortened so that a whole number of them ends at each recorded time: models are compared at these.
+    """
+    interval, n_recorded = _recorded(dynamics)
     if step is not None:
-        n = max(1, int(np.ceil(duration / step - SAME)))
-        each = max(1, round(record * n / duration))
-        goals = [duration * (k + 1) / n for k in range(n)]
-        return goals, frozenset({*range(each - 1, n, each), n - 1})
-    n = max(1, int(np.ceil(duration / record - SAME)))
-    recorded = [duration * (k + 1) / n for k in range(n)]
-    corners = [duration * one for one in body.loading.corners]
-    goals = sorted({*recorded, *corners})
+        each = max(1, int(np.ceil(interval / step - SAME)))
+        n = n_recorded * each
+        goals = [dynamics.duration * (k + 1) / n for k in range(n)]
+        return goals, frozenset(range(each - 1, n, each))
+    recorded = [dynamics.duration * (k + 1) / n_recorded for k in range(n_recorded)]
+    goals = sorted({*recorded, *(dynamics.duration * one for one in body.loading.corners)})
     return goals, frozenset(number for number, goal in enumerate(goals) if goal in recorded)
+
+
+def _recorded(dynamics: Dynamics) -> tuple[float, int]:
+    """Return the interval between recorded times [s], and their number.
+
+    By default about _RECORDS, a whole number of steps each if the step is given.
+    """
+    duration, interval = dynamics.duration, dynamics.record
+    if interval is None:
+        interval = duration / _RECORDS
+        if isinstance(dynamics.step, int | float):
+            each = duration / int(np.ceil(duration / dynamics.step - SAME))
+            interval = each * max(1, round(interval / each))
+    n = max(1, int(np.ceil(duration / interval - SAME)))
+    return duration / n, n

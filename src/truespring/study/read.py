@@ -179,8 +179,11 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
     loads = [load.build(places, number, mesh) for number, load in enumerate(keys.load)]
     tools = [tool.build(places, number, mesh) for number, tool in enumerate(keys.tool)]
     grasps = [grasp.build(places, number, mesh) for number, grasp in enumerate(keys.grasp)]
+    dynamics = None if keys.dynamics is None else keys.dynamics.build(places)
+    _check_histories(keys, places)
+    moving: dict[str, Any] = {"dynamics": dynamics, "tools": tools, "grasps": grasps}
     try:
-        return Problem(mesh, material, section, supports, loads, regions, tools=tools, grasps=grasps), network
+        return Problem(mesh, material, section, supports, loads, regions, **moving), network
     except FibreError as error:
         own = [number for number, region in enumerate(regions) if region.material.fibres == error.fibres]
         with places.at("region", own[0]) if own else places.at("material"):
@@ -194,6 +197,15 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
     except TruespringError as error:
         with places.at("load" if isinstance(error, NoLoadError) else "support"):
             raise
+
+
+def _check_histories(keys: StudyKeys, places: Places) -> None:
+    """Raise StudyError for a history over times without a motion."""
+    for kind, several in (("load", [one.over for one in keys.load]), ("support", [one.over for one in keys.support])):
+        for number, over in enumerate(several):
+            if keys.dynamics is None and over is not None and over.timed:
+                with places.at(kind, number, "over"):
+                    raise StudyError("times need [dynamics]: at rest the first column is a share of the way, 0 to 1")
 
 
 def _section(keys: StudyKeys, places: Places, mesh: Mesh) -> Section | None:

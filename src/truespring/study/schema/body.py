@@ -21,6 +21,7 @@ from truespring.study.schema.values import (
     Angle,
     Density,
     Direction,
+    History,
     Keys,
     Length,
     Number,
@@ -170,6 +171,11 @@ class SupportKeys(Keys):
         default=None, description="centre of the rotation; default: the centre of the selection"
     )
     axis: Annotated[list[Number], three] | None = Field(default=None, description="axis of the rotation in 3D")
+    over: History | None = Field(
+        default=None,
+        description="history, rows of place and share: times in a motion, shares of the way at rest; default: in "
+        "proportion to the way at rest, constant in a motion",
+    )
 
     def build(self, places: Places, number: int, mesh: Mesh) -> Fixed:
         """Return the support, the `number`-th of the study from 0; raise StudyError if it does not fit the mesh."""
@@ -178,13 +184,19 @@ class SupportKeys(Keys):
         for key in ("displacement", "about"):
             with places.at("support", number, key):
                 check_length(getattr(self, key), mesh)
-        return Fixed(self.on, self.fix, self.displacement, self.rotation, self.about, self.axis)
+        over = None if self.over is None else self.over.rows
+        return Fixed(self.on, self.fix, self.displacement, self.rotation, self.about, self.axis, over=over)
 
 
 class LoadKeys(Keys):
     """A load, which has exactly one of the keys that name a load; most loads act on a selection."""
 
     on: On = None
+    over: History | None = Field(
+        default=None,
+        description="history, rows of place and share: times in a motion, shares of the way at rest; default: in "
+        "proportion to the way at rest, constant in a motion",
+    )
     kinds: ClassVar[Mapping[str, LoadKind]] = {}
 
     @model_validator(mode="after")
@@ -197,7 +209,7 @@ class LoadKeys(Keys):
             raise ValueError(f"on is required and missing: where the {self.key} acts")
         if not self.kind.on_selection and self.on is not None:
             raise ValueError(f"{self.key} acts on the whole body: leave out on")
-        for key in sorted(self.model_fields_set - {"on", self.key, *self.kind.further}):
+        for key in sorted(self.model_fields_set - {"on", "over", self.key, *self.kind.further}):
             raise ValueError(f"{key} cannot be combined with {self.key}: leave it out")
         for key, quantity in self.kind.further.items():
             if getattr(self, key) is None and quantity.default is None:
@@ -225,6 +237,8 @@ class LoadKeys(Keys):
         """Return the load."""
         quantities = self.kind.quantities(self.key)
         arguments: dict[str, Any] = {quantities[key].argument: value for key, value in self.values.items()}
+        if self.over is not None:
+            arguments["over"] = self.over.rows
         return self.kind.load(**({"on": self.on} if self.kind.on_selection else {}), **arguments)
 
     def build(self, places: Places, number: int, mesh: Mesh) -> Load:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
 
@@ -66,6 +66,14 @@ Density = Annotated[float, _si("density"), _quantity("density")]
 Stiffness = Annotated[float, _si("stiffness"), _quantity("stiffness")]
 StiffnessPerArea = Annotated[float, _si("stiffness per area"), _quantity("stiffness per area")]
 Angle = Annotated[float, _si("angle"), _quantity("angle")]
+Time = Annotated[float, _si("time"), _quantity("time")]
+Rate = Annotated[float, _si("rate"), _quantity("rate")]
+Speed = Annotated[float, _si("speed"), _quantity("speed")]
+Step = Annotated[
+    float | str,
+    BeforeValidator(lambda value: value if value == "auto" else _as_value_error(lambda one: to_si(one, "time"))(value)),
+    WithJsonSchema({"type": ["number", "string"], "description": '"auto", or a time'}),
+]
 QUANTITIES: dict[Dimension, Any] = {
     dimension: Annotated[float, _si(dimension), _quantity(dimension)] for dimension in SI_UNITS
 }
@@ -137,6 +145,31 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+class Over(NamedTuple):
+    """A history of a load or of a prescribed motion.
+
+    Attributes:
+        rows: place and share of each row, see History.
+        timed: whether a place was given as a time with its unit.
+    """
+
+    rows: tuple[tuple[float, float], ...]
+    timed: bool
+
+
+def _over(value: Any) -> Over:
+    """Return a history from a list of rows of place and share."""
+    form = 'rows of place and share, such as [["0 s", 0], ["0.2 s", 1]] in motion or [[0, 0], [0.5, 1]] at rest'
+    if not isinstance(value, list) or not value:
+        raise TruespringError(f"{shown(value)} is not a history: give {form}")
+    rows = []
+    for row in value:
+        if not isinstance(row, list) or len(row) != 2 or not _is_number(row[1]):
+            raise TruespringError(f"{shown(row)} is not a row of place and share: give {form}")
+        rows.append((to_si(row[0], "time"), float(row[1])))
+    return Over(tuple(rows), any(isinstance(row[0], str) for row in value))
+
+
 def _probe(value: Any) -> str | tuple[float, ...]:
     return value if isinstance(value, str) else _point(value)
 
@@ -159,6 +192,12 @@ _ON_SCHEMA = {
 }
 On = Annotated[Any, PlainValidator(as_value_error(_selection)), WithJsonSchema(_ON_SCHEMA)]
 _POINT_SCHEMA = {"type": "array", "items": {"type": ["number", "string"]}}
+_OVER_SCHEMA = {
+    "type": "array",
+    "minItems": 1,
+    "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": ["number", "string"]}},
+}
+History = Annotated[Any, PlainValidator(_as_value_error(_over)), WithJsonSchema(_OVER_SCHEMA)]
 Probe = Annotated[
     Any, PlainValidator(as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
 ]

@@ -1,10 +1,11 @@
 """Keys of a whole study file, of `[solver]` and of `[compare]`."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
+from truespring.dynamics import Damping, Dynamics
 from truespring.equilibrium import check_solver
 from truespring.errors import StudyError, nearest
 from truespring.mesh import Mesh, named_point, nearest_node, select
@@ -16,7 +17,19 @@ from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, Sect
 from truespring.study.schema.meshes import AnyMesh
 from truespring.study.schema.models import AnyModel, ModelKeys
 from truespring.study.schema.tools import GraspKeys, ToolKeys
-from truespring.study.schema.values import Direction, Keys, Length, Number, On, Probe
+from truespring.study.schema.values import (
+    Direction,
+    Keys,
+    Length,
+    Number,
+    On,
+    Probe,
+    Rate,
+    Speed,
+    Step,
+    Time,
+    two_or_three,
+)
 
 
 class SolverKeys(Keys):
@@ -89,6 +102,53 @@ class SolverKeys(Keys):
                     raise StudyError(f'{fault} for control = "displacement"')
 
 
+class DampingKeys(Keys):
+    """Damping of a motion."""
+
+    stiffness: Time = Field(
+        default=0.0, description="damping by the material: viscosity over stiffness, the same for all models"
+    )
+    mass: Rate = Field(default=0.0, description="damping by the surroundings: force against the velocity, over mass")
+
+
+class DynamicsKeys(Keys):
+    """A motion in time, instead of equilibrium."""
+
+    duration: Time = Field(description='time of the motion: a number in s, or a string with its unit such as "20 ms"')
+    step: Step = Field(default="auto", description='time step; "auto" chooses each step by an estimate of its error')
+    scheme: Literal["auto", "euler", "bdf2", "midpoint", "leapfrog"] = Field(
+        default="auto",
+        description="time integration; auto: leapfrog, which is explicit, where its stable step is long, else bdf2",
+    )
+    damping: DampingKeys = Field(default=DampingKeys(), description="damping: stiffness and mass")
+    start: Literal["rest", "equilibrium"] = Field(
+        default="rest", description="the undeformed body, or the equilibrium under the loads of time 0"
+    )
+    velocity: Annotated[list[Speed], two_or_three] | None = Field(
+        default=None, description="velocity of the whole body at time 0; default: none"
+    )
+    iterations: Annotated[int, Field(ge=0, le=1000)] = Field(
+        default=0, description="Newton iterations of each step, as in real time; 0: until it is solved"
+    )
+    record: Time | None = Field(
+        default=None, description="time between recorded states; default: a hundredth of the duration"
+    )
+    accuracy: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-4, description='with step = "auto": error of a step over the largest displacement'
+    )
+    creep: Speed | None = Field(
+        default=None, description="speed at which friction is full; default: 0.001 sqrt(g L), L the size of the body"
+    )
+
+    def build(self, places: Places) -> Dynamics:
+        """Return what is asked of the motion; raise StudyError for values that are not allowed."""
+        values = {name: getattr(self, name) for name in type(self).model_fields if name != "damping"}
+        with places.at("dynamics", "damping"):
+            damping = Damping(self.damping.stiffness, self.damping.mass)
+        with places.at("dynamics"):
+            return Dynamics(damping=damping, **values)
+
+
 class CompareKeys(Keys):
     """Which models are compared, and at which node."""
 
@@ -152,17 +212,26 @@ class StudyKeys(Keys):
         default=[], description="parts of another material; where regions overlap, the last one applies"
     )
     section: SectionKeys | None = Field(default=None, description="section of a plane body; absent in 3D")
-    support: Annotated[list[SupportKeys], Field(min_length=1)] = Field(
-        description="supports, which together prevent rigid-body motion"
+    support: list[SupportKeys] = Field(
+        default=[], description="supports, which together prevent rigid-body motion; a motion needs none"
     )
-    load: list[AnyLoad] = Field(default=[], description="loads; load_factor scales all of them, linearly")
+    load: list[AnyLoad] = Field(
+        default=[], description="loads; load_factor scales all of them, linearly, unless they have a history (over)"
+    )
     tool: list[ToolKeys] = Field(default=[], description="rigid bodies that move and touch the body")
     grasp: list[GraspKeys] = Field(default=[], description="patches held by springs to a place that moves")
+    dynamics: DynamicsKeys | None = Field(default=None, description="a motion in time, instead of equilibrium")
     solver: SolverKeys = Field(default=SolverKeys(), description="how equilibrium is found")
     models: Annotated[dict[ModelName, AnyModel], Field(min_length=1)] = Field(
         description="models to solve, by names of your choice"
     )
     compare: CompareKeys = Field(default=CompareKeys(), description="which models are compared, and where")
+
+    @model_validator(mode="after")
+    def _supported(self) -> Self:
+        if not self.support and self.dynamics is None:
+            raise ValueError("support is required and missing: at least one, unless [dynamics] asks for a motion")
+        return self
 
     @field_validator("models")
     @classmethod
