@@ -132,6 +132,7 @@ ALLOWED = {
         "potential",
         "program",
         "tools",
+        "dynamics",
     },
     "report": {
         "comparison",

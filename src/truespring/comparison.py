@@ -1,7 +1,7 @@
 """Compare two solutions: the errors of a model against a reference at each load level."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,11 @@ from truespring.support_errors import Decisive, SupportError, decisive, support_
 
 #: Default tolerance: two solutions agree if their error is below 5 %.
 TOLERANCE = 0.05
+
+
+def _rms(values: Floats) -> float:
+    """Return the root mean square of values, in their unit."""
+    return float(np.sqrt((values**2).mean()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,6 +44,9 @@ class Comparison:
         rms_distances, max_distances: root-mean-square and largest nodal distance [m], shape (n,).
         support_errors: for each level, the errors of the moved supports whose forces both solutions have, length n.
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
+        over_the_way: whether the errors are those over all levels, as of a motion or a load that returns to zero. The
+            errors at a level are then over the root-mean-square, or the largest, quantity of all levels; the rms and
+            probe errors are their root mean square, the largest error is the worst.
     """
 
     model: Solution
@@ -57,14 +65,17 @@ class Comparison:
     support_errors: tuple[tuple[SupportError, ...], ...] = ()
     node_by_node: bool = True
     surface: SurfaceDistance | None = None
+    over_the_way: bool = False
 
     def __repr__(self) -> str:
         return f"Comparison({self})"
 
-    def _at_full_load(self, errors: Floats) -> float | None:
-        """Return the last of the errors if it is at full load and not NaN, else None."""
-        reached = self.load_factors.size and self.load_factors[-1] == 1.0
-        return float(errors[-1]) if reached and np.isfinite(errors[-1]) else None
+    def _at_full_load(self, errors: Floats, over: Callable[[Floats], float] = _rms) -> float | None:
+        """Return the last of the errors if it is at full load and not NaN, or that over the way; else None."""
+        if not self.load_factors.size or self.load_factors[-1] != 1.0:
+            return None
+        error = over(errors) if self.over_the_way else float(errors[-1])
+        return error if np.isfinite(error) else None
 
     @property
     def probe_error(self) -> float | None:
@@ -79,7 +90,7 @@ class Comparison:
     @property
     def max_error(self) -> float | None:
         """The largest error at full load; None if a solution does not reach it."""
-        return self._at_full_load(self.max_errors)
+        return self._at_full_load(self.max_errors, lambda errors: float(errors.max()))
 
     @cached_property
     def decisive(self) -> tuple[Decisive, ...]:
@@ -218,6 +229,10 @@ def compare(
     both = [(one, other) for one, other in pairs if other is not None]
     compared = ~outside & ~_prescribed(mine.path, theirs.path)
     found = [_Distances.between(one, other, compared) for one, other in both]
+    probed = [_at_probe(one, other, watched) for one, other in both]
+    over = mine.path.problem.returns
+    if over:
+        found, probed = _over_the_way(found), _over_the_way(probed)
     return Comparison(
         model=mine.path,
         reference=theirs.path,
@@ -226,15 +241,16 @@ def compare(
         load_factors=np.array([one.level for one, _ in both]),
         rms_errors=np.array([one.rms / one.rms_size if one.rms_size else np.nan for one in found]),
         max_errors=np.array([one.max / one.max_size if one.max_size else np.nan for one in found]),
-        probe_errors=np.array([_probe_error(one, other, watched) for one, other in both]),
+        probe_errors=np.array([one.rms / one.rms_size if one.rms_size else np.nan for one in probed]),
         rms_distances=np.array([one.rms for one in found]),
         max_distances=np.array([one.max for one in found]),
         known_on=(model, reference),
         outside=outside,
         compared=compared,
-        support_errors=tuple(tuple(support_errors(mine.path, theirs.path, *pair)) for pair in both),
+        support_errors=tuple(() if over else tuple(support_errors(mine.path, theirs.path, *pair)) for pair in both),
         node_by_node=mine.node_by_node and theirs.node_by_node,
         surface=_surface_distance(mine.path, theirs.path),
+        over_the_way=over,
     )
 
 
@@ -317,10 +333,19 @@ class _Distances:
         return _Distances(rms, float(distance.max()), rms_size, float(size.max()))
 
 
-def _probe_error(mine: State, theirs: State, probe: int) -> float:
-    """Return the relative error at the probe, NaN if the reference does not move there."""
+def _at_probe(mine: State, theirs: State, probe: int) -> _Distances:
+    """Return the distance at the probe, and the size of the reference's displacement."""
     size = float(np.linalg.norm(theirs.displacement[probe]))
-    return float(np.linalg.norm(mine.displacement[probe] - theirs.displacement[probe])) / size if size else np.nan
+    distance = float(np.linalg.norm(mine.displacement[probe] - theirs.displacement[probe]))
+    return _Distances(distance, distance, size, size)
+
+
+def _over_the_way(found: Sequence[_Distances]) -> list[_Distances]:
+    """Return distances with the displacement of all levels: its root mean square, and the largest."""
+    if not found:
+        return []
+    rms, largest = _rms(np.array([one.rms_size for one in found])), max(one.max_size for one in found)
+    return [replace(one, rms_size=rms, max_size=largest) for one in found]
 
 
 def _facets(path: Solution, level: float) -> Floats | None:

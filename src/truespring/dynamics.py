@@ -50,6 +50,7 @@ class Dynamics:
             shortened so that a whole number of them fits in it.
         accuracy: with `step` "auto", the largest error of a step over the largest displacement [-].
         creep: speed at which regularised friction is full [m/s]; None for 0.001 sqrt(g L), L the size of the body.
+        substeps: number of parts that each step is divided into, to estimate the error of the step.
     """
 
     duration: float
@@ -62,6 +63,7 @@ class Dynamics:
     record: float | None = None
     accuracy: float = 1e-4
     creep: float | None = None
+    substeps: int = 1
 
     def __post_init__(self) -> None:
         self._check_positive("duration", self.duration)

@@ -24,6 +24,7 @@ from truespring.potential import Massive, Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.ranks import Communicator, layout_of, ranks_of
+from truespring.solution import FINE as FINE
 from truespring.solution import Solution as Solution
 from truespring.solution import State as State
 from truespring.solution import Status as Status

@@ -266,6 +266,11 @@ class Problem:
         return None if self.dynamics is None else self.dynamics.duration
 
     @property
+    def returns(self) -> bool:
+        """Whether displacements may return to zero on the way: in a motion, and with histories."""
+        return self.dynamics is not None or any(history is not None for history in self._histories)
+
+    @property
     def _young(self) -> float | None:
         """The largest Young's modulus of the materials [Pa], None without a material."""
         return max((material.young for material in self.materials), default=None)

@@ -37,6 +37,9 @@ class Status(StrEnum):
         return _ADVICE[self]
 
 
+#: Statuses without trouble.
+FINE = (Status.CONVERGED, Status.READ, Status.FIXED_ITERATIONS)
+
 _ADVICE = {
     Status.CONVERGED: "a stable equilibrium was found at every load level",
     Status.UNSTABLE: "a real body would leave such a state; reduce the load, or add a small side force to choose a "

@@ -149,7 +149,8 @@ class _Steps:
     """The lengths of steps: as planned, halved where a step fails, or by an estimate of the error."""
 
     def __init__(self, body: Body, plan: Plan, dynamics: Dynamics, scheme: Scheme, acceleration: Floats) -> None:
-        self._body, self._plan, self._scheme, self._accuracy = body, plan, scheme, dynamics.accuracy
+        self._body, self._plan, self._scheme = body, plan, scheme
+        self._accuracy = dynamics.accuracy / dynamics.substeps**3
         duration = dynamics.duration
         self._h = plan.step or _FIRST * duration
         self._smallest = _SMALLEST * duration if plan.step is None else plan.step / 2**_MAX_HALVINGS

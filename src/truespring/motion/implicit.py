@@ -79,6 +79,7 @@ class Implicit:
     def _solved(self, level: float, start: Floats, other: Floats) -> Equilibrium:
         """Return the equilibrium of a step found from a start, else from another; or after a number of iterations."""
         balance, potential = self._balance, self._balance.potential
+        start, other = (balance.loading.cleared(one, level) for one in (start, other))
         if not np.isfinite(balance.total_energy(start, level)[0]):
             start = other
         if self._iterations:

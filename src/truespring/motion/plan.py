@@ -85,7 +85,7 @@ def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence
     """
     interval, n_recorded = _recorded(dynamics)
     if step is not None:
-        each = max(1, int(np.ceil(interval / step - SAME)))
+        each = max(1, int(np.ceil(interval / step - SAME))) * dynamics.substeps
         n = n_recorded * each
         goals = [dynamics.duration * (k + 1) / n for k in range(n)]
         return goals, frozenset(range(each - 1, n, each))

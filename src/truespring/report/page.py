@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from truespring.comparison import Comparison
-from truespring.equilibrium import Solution, Status
+from truespring.equilibrium import FINE, Solution
 from truespring.material import Material
 from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
@@ -255,7 +255,7 @@ def _model_row(name: str, path: Solution) -> dict[str, Any]:
         "name": name,
         "label": path.label,
         "status": str(path.status),
-        "sound": path.status in (Status.CONVERGED, Status.READ),
+        "sound": path.status in FINE,
         "advice": path.status.advice if solved else "read from a file, not solved here",
         "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",

@@ -7,10 +7,27 @@ from functools import cached_property
 from pathlib import Path
 
 from truespring.comparison import Comparison, closest
-from truespring.equilibrium import Solution, Status
+from truespring.equilibrium import FINE, Solution
 from truespring.models import Fitness
 from truespring.problem import Problem
 from truespring.refining import Standing
+
+
+@dataclass(frozen=True)
+class MotionErrors:
+    """Errors of a motion besides that of its model, relative to the same model.
+
+    Each is the root mean square over nodes and recorded times, as `Comparison.rms_error` of a motion.
+
+    Attributes:
+        step: that of the time step, against steps half as long, both solved [-]; None if not known.
+        solver: that of a fixed number of iterations, against solved steps [-]; 0 for solved steps, None if not known.
+        notes: why an error is not known.
+    """
+
+    step: float | None
+    solver: float | None
+    notes: tuple[str, ...] = ()
 
 
 def head_note(source: str) -> str:
@@ -35,6 +52,7 @@ class Result:
         source: text of the study file; comments at its head are shown with its results.
         fitness: whether springs fit the material, by name of the model.
         standings: estimated error of each reference, by its name; empty if none was refined.
+        splits: errors of the time step and of the solver in a motion of the model; None at rest, or if not known.
         in_detail: whether distances of surfaces [m] and energies are reported too, and plane bodies coloured by
             distance, as in comparisons of two results.
     """
@@ -50,6 +68,7 @@ class Result:
     source: str
     fitness: Mapping[str, Fitness] = field(default_factory=dict)
     standings: Mapping[str, Standing] = field(default_factory=dict)
+    splits: MotionErrors | None = None
     in_detail: bool = False
 
     def __repr__(self) -> str:
@@ -73,4 +92,4 @@ class Result:
     @property
     def converged(self) -> bool:
         """Whether every solved path reached full load through stable equilibria."""
-        return all(path.status in (Status.CONVERGED, Status.READ) for path in self.paths.values())
+        return all(path.status in FINE for path in self.paths.values())

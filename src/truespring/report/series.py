@@ -33,16 +33,17 @@ def write_series(path: Solution, folder: Path, name: str) -> None:
     surface = path.surface if not bodies else None
     if surface is not None:
         bodies = [surface.load_factor]
+    times = [state.moving.time for state in path.states if state.moving is not None] or bodies
     entries = []
     forwards = all(one < other for one, other in pairwise(bodies))
-    for number, load_factor in enumerate(bodies):
+    for number in range(len(bodies)):
         file = levels / f"{name}_{number:04d}.vtu"
         if surface is not None:
             write_vtu(file, surface.points, [("triangle", surface.triangles)])
         else:
             _write_state(path, path.states[number], file)
         entries.append(
-            f'<DataSet timestep="{load_factor if forwards else number!r}" file={quoteattr(f"{name}/{file.name}")}/>'
+            f'<DataSet timestep="{times[number] if forwards else number!r}" file={quoteattr(f"{name}/{file.name}")}/>'
         )
     collection = "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries])
     (folder / f"{name}.pvd").write_text(f"{collection}\n</Collection>\n</VTKFile>\n", encoding="utf-8")

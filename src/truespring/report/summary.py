@@ -24,7 +24,15 @@ def summary(result: Result) -> dict[str, Any]:
         "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
         "comparison": {name: _comparison(one) | _standing(result, name) for name, one in result.comparisons.items()},
         "closest": result.closest,
-    }
+    } | _splits(result)
+
+
+def _splits(result: Result) -> dict[str, Any]:
+    """Return the errors of the time step and of the solver of a motion; empty at rest."""
+    splits = result.splits
+    if splits is None:
+        return {}
+    return {"motion": {"step_error": splits.step, "solver_error": splits.solver, "notes": list(splits.notes)}}
 
 
 def _model(path: Solution, probe: int) -> dict[str, Any]:

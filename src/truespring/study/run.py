@@ -12,6 +12,7 @@ from truespring.models import (
 from truespring.report.result import Result
 from truespring.solvers import Reporter
 from truespring.study.read import Study
+from truespring.study.splits import motion_errors
 from truespring.study.standings import standings
 
 #: Callback with study, model and the load factor reached, for a progress bar.
@@ -73,6 +74,7 @@ def run(
         if comparing
         else {},
         standings=standings(study, paths, names, timeout) if refining else {},
+        splits=motion_errors(study, model, probe, timeout) if comparing and refining else None,
     )
 
 

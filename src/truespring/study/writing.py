@@ -9,6 +9,7 @@ from truespring.outputs import Output, write_whole
 from truespring.reactions import moved_supports
 from truespring.report.command import command_line
 from truespring.report.curves import write_curves, write_reactions
+from truespring.report.histories import write_histories
 from truespring.report.result import Result
 from truespring.report.series import write_mesh, write_series, write_stl
 from truespring.report.summary import summary
@@ -41,6 +42,7 @@ def write_rest(result: Result, output: Output, command: str | None) -> None:
     """
     folder = output.staging
     write_curves(result, folder / "curves.csv")
+    write_histories(result, folder)
     if moved_supports(result.problem):
         write_reactions(result, folder / "reactions.csv")
     if result.problem.mesh.element != "line":

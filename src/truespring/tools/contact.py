@@ -59,6 +59,11 @@ class Contact:
         """The levels between 0 and 1 at which the path has a corner [-]."""
         return self.track.corners
 
+    @property
+    def frictional(self) -> bool:
+        """Whether there is friction."""
+        return self.coefficient > 0
+
     def gaps(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
         """Return the gaps of the nodes [m], shape (n,), and the normals [-], shape (n, dim)."""
         return self.shape.gaps(positions[self.nodes] - self.track.at(level))

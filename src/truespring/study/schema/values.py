@@ -71,7 +71,7 @@ Rate = Annotated[float, _si("rate"), _quantity("rate")]
 Speed = Annotated[float, _si("speed"), _quantity("speed")]
 Step = Annotated[
     float | str,
-    BeforeValidator(lambda value: value if value == "auto" else _as_value_error(lambda one: to_si(one, "time"))(value)),
+    BeforeValidator(lambda value: value if value == "auto" else as_value_error(lambda one: to_si(one, "time"))(value)),
     WithJsonSchema({"type": ["number", "string"], "description": '"auto", or a time'}),
 ]
 QUANTITIES: dict[Dimension, Any] = {
@@ -197,7 +197,7 @@ _OVER_SCHEMA = {
     "minItems": 1,
     "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": ["number", "string"]}},
 }
-History = Annotated[Any, PlainValidator(_as_value_error(_over)), WithJsonSchema(_OVER_SCHEMA)]
+History = Annotated[Any, PlainValidator(as_value_error(_over)), WithJsonSchema(_OVER_SCHEMA)]
 Probe = Annotated[
     Any, PlainValidator(as_value_error(_probe)), WithJsonSchema({"anyOf": [{"type": "string"}, _POINT_SCHEMA]})
 ]
