@@ -139,7 +139,8 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
     )
     if model.finite and model.any_mesh and alone:
         geometry = replace(geometry, coarse_body=partial(_coarse_body, model, CoarseBody.finest(problem, loading)))
-    ranks.together(lambda: solver.check(problem.loading, geometry))
+    if problem.dynamics is None:
+        ranks.together(lambda: solver.check(problem.loading, geometry))
     if not model.finite:
         loading = loading.at_rest(potential.nodes)
     layout = layout_of(potential)
