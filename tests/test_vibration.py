@@ -281,6 +281,15 @@ def test_json_and_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert Path(line).is_file()
 
 
+def test_a_study_without_supports_and_loads_has_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lone = (('[[support]]\non = "left"\n', ""), ('[[load]]\non = "right"\nforce = ["0 N", "-0.01 N"]\n', ""))
+    file = study(tmp_path, *lone)
+    assert main(["modes", file, "--json", "--count", "1", "--out", str(tmp_path / "out")]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert [one["n_rigid"] for one in values["models"].values()] == [3, 3]
+    assert main(["solve", file, "--out", str(tmp_path / "out")]) == 2
+
+
 def test_without_density_the_verb_says_where_it_belongs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "study.toml"
     file.write_text(changed(), encoding="utf-8")

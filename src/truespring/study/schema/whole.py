@@ -152,8 +152,8 @@ class StudyKeys(Keys):
         default=[], description="parts of another material; where regions overlap, the last one applies"
     )
     section: SectionKeys | None = Field(default=None, description="section of a plane body; absent in 3D")
-    support: Annotated[list[SupportKeys], Field(min_length=1)] = Field(
-        description="supports, which together prevent rigid-body motion"
+    support: list[SupportKeys] = Field(
+        default=[], description="supports, which at rest together prevent rigid-body motion"
     )
     load: list[AnyLoad] = Field(default=[], description="loads; load_factor scales all of them, linearly")
     tool: list[ToolKeys] = Field(default=[], description="rigid bodies that move and touch the body")
