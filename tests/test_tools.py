@@ -235,6 +235,16 @@ def test_a_sphere_is_as_stiff_as_hertz_says(model: ts.Fem | ts.Springs) -> None:
     hertz(model, 13, 1.28)
 
 
+def test_the_error_of_a_reference_includes_friction() -> None:
+    """A state with friction cannot be found at full load alone."""
+    rows = [[0, 0, 0.03], [0.5, 0, 0.0295], [1, 0.01, 0.0295]]
+    one = problem(ts.rectangle((0.06, 0.03), (4, 2)), ts.HalfSpace("plate", (0, -1), rows, friction=0.3, on="top"))
+    found = ts.reference_error(one, ts.Fem("neo-hookean"), ts.Newton(4))
+    assert found.limit is not None
+    force = found.limit.states[-1].applied_force
+    assert force[0] / -force[1] == pytest.approx(0.3, rel=1e-3)
+
+
 def test_below_the_limit_a_plate_sticks() -> None:
     """The shear of a block under 0.2 % is below the friction of a pressure of 3 %."""
     drag = 6e-5

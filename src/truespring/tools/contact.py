@@ -59,6 +59,11 @@ class Contact:
         """The levels between 0 and 1 at which the path has a corner [-]."""
         return self.track.corners
 
+    @property
+    def dissipates(self) -> bool:
+        """Whether there is friction."""
+        return self.coefficient > 0
+
     def gaps(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
         """Return the gaps of the nodes [m], shape (n,), and the normals [-], shape (n, dim)."""
         return self.shape.gaps(positions[self.nodes] - self.track.at(level))
@@ -106,7 +111,7 @@ class Contact:
 
     def since(self, positions: Floats, level: float, creep: float) -> Self:
         """Return the contact in a step that begins at a state; friction is full from a slip of `creep` [m] on."""
-        if not self.coefficient:
+        if not self.dissipates:
             return self
         begin, limit, normals = positions[self.nodes].copy(), *self._limit(positions, level)
         return replace(self, friction=Friction(begin, self.track.at(level), normals, limit, creep))

@@ -97,6 +97,11 @@ class Springs:
         """The levels between 0 and 1 at which the path has a corner [-]."""
         return self.track.corners
 
+    @property
+    def dissipates(self) -> bool:
+        """False: springs store their work."""
+        return False
+
     def _stretch(self, positions: Floats, level: float) -> Floats:
         """Return the vectors from the ends of the springs to the nodes [m], shape (n, dim)."""
         motion = self.track.at(level) - self.track.at(0.0)
