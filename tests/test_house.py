@@ -218,7 +218,7 @@ ALLOWED = {
     "solvers": {"linear", "potential", "conditions", "ranks"},
     "linear": {"potential", "rigid_modes", "ranks"},
     "problem": {"loading", "tools", "dynamics", "mesh", "material", "fibres", "conditions", "rigid_modes"},
-    "tools": {"loading", "mesh", "conditions"},
+    "tools": {"loading", "mesh", "conditions", "units"},
     "dynamics": set(),
     "loading": {"potential", "mesh", "units", "assembly", "conditions"},
     "conditions": {"potential"},
