@@ -51,7 +51,7 @@ BROKEN: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "section unknown": (('"plane-stress"', '"plane stress"'), ("section.kind", "did you mean 'plane-stress'")),
     "thickness zero": (('thickness = "10 mm"', 'thickness = "0 mm"'), ("section", "0.0", "positive")),
     "no thickness": (('thickness = "10 mm"\n', ""), ("section.thickness", "required")),
-    "no support": (('[[support]]\non = "left"\n', ""), ("support", "required")),
+    "no support": (('[[support]]\non = "left"\n', ""), ("support", "rigid body")),
     "support of nothing": (('on = "left"', 'on = "lef"'), ("support.1.on", "did you mean 'left'")),
     "support between nodes": (('on = "left"', 'on = { x = "1 mm" }'), ("support.1.on", "0.001", "nearest")),
     "empty box": (('on = "left"', "on = { box = [[1, 1], [2, 2]] }"), ("support.1.on", "no node in the box")),

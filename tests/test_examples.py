@@ -39,7 +39,7 @@ def script(name: str) -> ModuleType:
 
 def test_every_example_is_run_here() -> None:
     names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
-    assert names == {*NAMES, "truss", "organ", "six_methods"}
+    assert names == {*NAMES, "truss", "organ", "six_methods", "cantilever_modes"}
 
 
 def test_six_methods_stand_side_by_side() -> None:

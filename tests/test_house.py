@@ -222,7 +222,7 @@ ALLOWED = {
     "solvers": {"linear", "potential", "conditions", "dynamics", "ranks"},
     "linear": {"potential", "rigid_modes", "ranks"},
     "problem": {"loading", "tools", "dynamics", "mesh", "material", "fibres", "conditions", "rigid_modes"},
-    "tools": {"loading", "mesh", "conditions"},
+    "tools": {"loading", "mesh", "conditions", "units"},
     "dynamics": set(),
     "loading": {"potential", "mesh", "units", "assembly", "conditions"},
     "conditions": {"potential"},

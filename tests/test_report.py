@@ -231,6 +231,8 @@ def test_verdict_without_references() -> None:
     springs = path(stretched(), kind="springs", label="springs (lloyd)")
     text = verdict(result(springs, {}))
     assert in_order(text, "springs", "full load", "stable equilibria", "nothing", "compared", "probe", "24.0 mm")
+    unknown = replace(springs, states=[replace(state, negative_eigenvalues=None) for state in springs.states])
+    assert "equilibria of unknown stability" in verdict(result(unknown, {}))
 
 
 def test_a_single_model_that_is_not_springs_is_spoken_of_in_the_singular() -> None:

@@ -9,13 +9,16 @@ import pytest
 import truespring as ts
 from truespring.arrays import Floats
 from truespring.conditions import Interaction
-from truespring.errors import ExportError, ProblemError, StudyError
+from truespring.errors import ExportError, MeshError, ProblemError, StudyError
 from truespring.exports import TARGETS, export
 from truespring.exports.decks import check_fem
 from truespring.mesh import SecondOrder
+from truespring.mesh.facets import triangles_of
+from truespring.mesh.files.stl import stl_bytes
 from truespring.refining import refined_problem
 from truespring.study import plan, read_study
 from truespring.tools import TOOLS, Tool
+from truespring.tools.solid import Solid
 
 YOUNG, POISSON = 10e3, 0.3
 MATERIAL = ts.Material(YOUNG, POISSON)
@@ -40,21 +43,44 @@ def path(dim: int, *rows: tuple[float, float, float]) -> list[list[float]]:
     return [[*row, *([0.03] if dim == 3 else [])] for row in rows]
 
 
-def above(dim: int) -> dict[str, Tool]:
-    """One tool of each shape that touches the top at level 0, and goes down by 3 mm."""
+def angle(size: float) -> ts.Mesh:
+    """A solid with a notch: a cube about the origin without the quarter of larger x and z."""
+    cube = ts.box((size, size, size), (4, 4, 4))
+    centred = cube.nodes - size / 2
+    kept = ~((cube.centres[:, [0, 2]] > size / 2).all(axis=1))
+    used = np.unique(cube.elements[kept])
+    return ts.Mesh(centred[used], np.searchsorted(used, cube.elements[kept]), "hexahedron")
+
+
+def write_stl(mesh: ts.Mesh, file: Path, scale: float = 1.0) -> Path:
+    """The boundary of a body, or a part of it, as an STL file."""
+    file.write_bytes(stl_bytes(scale * mesh.nodes[triangles_of(mesh.boundary)]))
+    return file
+
+
+@pytest.fixture(scope="module")
+def notched(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_stl(angle(0.024), tmp_path_factory.mktemp("tool") / "angle.stl", 1e3)
+
+
+def above(dim: int, notched: Path) -> dict[str, Tool]:
+    """One tool of each shape that is above the top at level 0, and goes down by 3 mm."""
     down = path(dim, (0, 0.031, 0.041), (1, 0.032, 0.038))
     flat = path(dim, (0, 0.031, 0.031), (1, 0.032, 0.028))
     zero = (0.0,) * (dim - 2)
-    return {
+    found: dict[str, Tool] = {
         "sphere": ts.Sphere("tool", 0.03, path(dim, (0, 0.031, 0.061), (1, 0.032, 0.058))),
         "capsule": ts.Capsule("tool", 0.01, (-0.011, 0.0, *zero), (0.012, 0.002, *zero), down),
         "plane": ts.HalfSpace("tool", (0.04, -2.0, *zero), flat),
         "box": ts.Block("tool", (0.023, 0.02, *([0.021] if dim == 3 else [])), down),
     }
+    if dim == 3:
+        found["stl"] = ts.StlTool("tool", notched, path(dim, (0, 0.031, 0.043), (1, 0.032, 0.04)), "mm")
+    return found
 
 
-def test_every_shape_is_tested() -> None:
-    assert above(2).keys() == above(3).keys() == TOOLS.keys()
+def test_every_shape_is_tested(notched: Path) -> None:
+    assert above(3, notched).keys() == TOOLS.keys() == {*above(2, notched), "stl"}
 
 
 def in_a_step(tool: Tool, mesh: ts.Mesh, seed: int = 3) -> tuple[Interaction, Floats]:
@@ -67,12 +93,11 @@ def in_a_step(tool: Tool, mesh: ts.Mesh, seed: int = 3) -> tuple[Interaction, Fl
 
 
 @pytest.mark.parametrize("contact", ["penalty", "barrier"])
-@pytest.mark.parametrize("shape", TOOLS)
-@pytest.mark.parametrize("dim", [2, 3])
-def test_gradient_and_blocks_are_derivatives(dim: int, shape: str, contact: str) -> None:
+@pytest.mark.parametrize(("dim", "shape"), [(dim, one) for dim in (2, 3) for one in TOOLS if dim == 3 or one != "stl"])
+def test_gradient_and_blocks_are_derivatives(dim: int, shape: str, contact: str, notched: Path) -> None:
     width = 5e-3 if contact == "barrier" else None
     mesh = body(dim)
-    acting, positions = in_a_step(replace(above(dim)[shape], contact=contact, width=width), mesh)
+    acting, positions = in_a_step(replace(above(dim, notched)[shape], contact=contact, width=width), mesh)
     nodes, blocks = acting.blocks(positions, 1.0)
     found = acting.gradient(positions, 1.0)
     assert np.array_equal(np.flatnonzero(found.any(axis=1)), np.sort(nodes))
@@ -93,9 +118,56 @@ def test_gradient_and_blocks_are_derivatives(dim: int, shape: str, contact: str)
     assert blocks == pytest.approx(blocks.swapaxes(1, 2), abs=1e-12 * np.abs(blocks).max())
 
 
-def test_stored_energy_is_without_friction() -> None:
-    acting, positions = in_a_step(above(3)["sphere"], body(3))
+def test_stored_energy_is_without_friction(notched: Path) -> None:
+    acting, positions = in_a_step(above(3, notched)["sphere"], body(3))
     assert 0 < acting.stored(positions, 1.0) < acting.energy(positions, 1.0)
+
+
+def test_a_box_of_triangles_is_a_box() -> None:
+    size = (0.02, 0.03, 0.04)
+    block = ts.Block("box", size, (0, 0, 0))
+    mesh = ts.box(size, (2, 3, 4), "tetrahedron")
+    solid = Solid.of((mesh.nodes - np.array(size) / 2)[mesh.boundary[:, ::-1]])  # turned inside out
+    places = np.random.default_rng(1).uniform(-0.03, 0.03, (300, 3))
+    places[0] = (0.01, 0.004, 0.007)  # on a face, where the normal is that of the face
+    gaps, normals = solid.gaps(places)
+    expected, outward = block.gaps(places)
+    assert gaps == pytest.approx(expected, abs=1e-12)
+    outside = expected >= 0
+    assert 100 < outside.sum() < 300
+    assert normals[outside] == pytest.approx(outward[outside], abs=1e-9)
+    assert solid.bends(places)[outside] == pytest.approx(block.bends(places)[outside], abs=1e-6)
+    assert np.array(solid.bounds) == pytest.approx(np.array(block.bounds))
+    assert solid.gaps(places[:0])[0].shape == (0,)
+
+
+def test_a_notch_of_triangles_is_outside() -> None:
+    mesh = angle(0.02)
+    solid = Solid.of(mesh.nodes[triangles_of(mesh.boundary)])
+    gaps, normals = solid.gaps(
+        np.array([(0.002, 0, 0.003), (-0.003, 0.001, -0.004), (0.006, 0, -0.001), (0, 0.011, -0.001)])
+    )
+    assert gaps == pytest.approx([0.002, -0.005, -0.001, 0.001])
+    assert normals == pytest.approx(np.array([(1, 0, 0), (0.6, 0, 0.8), (0, 0, 1), (0, 1, 0)]), abs=1e-12)
+
+
+def test_a_surface_that_is_not_closed_is_no_tool(tmp_path: Path) -> None:
+    cube = ts.box((1, 1, 1), (2, 2, 2))
+    facets = cube.nodes[triangles_of(cube.boundary)]
+    (tmp_path / "open.stl").write_bytes(stl_bytes(facets[1:]))
+    with pytest.raises(MeshError, match=r"open.stl.*not closed.*3 edges"):
+        ts.StlTool("tool", tmp_path / "open.stl", (0, 0, 0))
+    turned = np.concatenate([facets[:1, ::-1], facets[1:]])
+    (tmp_path / "turned.stl").write_bytes(stl_bytes(turned))
+    with pytest.raises(MeshError, match="turned alike"):
+        ts.StlTool("tool", tmp_path / "turned.stl", (0, 0, 0))
+    with pytest.raises(MeshError, match=r"none.stl"):
+        ts.StlTool("tool", tmp_path / "none.stl", (0, 0, 0))
+    write_stl(cube, tmp_path / "cube.stl")
+    with pytest.raises(MeshError, match="unit = 'mn'"):
+        ts.StlTool("tool", tmp_path / "cube.stl", (0, 0, 0), "mn")
+    with pytest.raises(ProblemError, match="needs a body in 3D"):
+        problem(body(2), ts.StlTool("tool", tmp_path / "cube.stl", (0, 5)))
 
 
 @pytest.mark.parametrize(
@@ -233,6 +305,16 @@ def test_a_sphere_on_springs_is_as_stiff_as_hertz_says() -> None:
 @pytest.mark.parametrize("model", [ts.Fem("neo-hookean"), ts.Springs("gaussian")])
 def test_a_sphere_is_as_stiff_as_hertz_says(model: ts.Fem | ts.Springs) -> None:
     hertz(model, 13, 1.28)
+
+
+def test_the_error_of_a_reference_includes_friction() -> None:
+    """A state with friction cannot be found at full load alone."""
+    rows = [[0, 0, 0.03], [0.5, 0, 0.0295], [1, 0.01, 0.0295]]
+    one = problem(ts.rectangle((0.06, 0.03), (4, 2)), ts.HalfSpace("plate", (0, -1), rows, friction=0.3, on="top"))
+    found = ts.reference_error(one, ts.Fem("neo-hookean"), ts.Newton(4))
+    assert found.limit is not None
+    force = found.limit.states[-1].applied_force
+    assert force[0] / -force[1] == pytest.approx(0.3, rel=1e-3)
 
 
 def test_below_the_limit_a_plate_sticks() -> None:
@@ -462,6 +544,7 @@ def test_a_study_states_tools_and_grasps(tmp_path: Path) -> None:
         ('on = "top"', 'on = "tp"', ["tool.1.on", "top"]),
         ('at = ["60 mm"', 'at = ["80 mm"', ["grasp.1.at", "0.02 m away"]),
         ("[[grasp]]", '[[grasp]]\nname = "probe"', ["name of two tools"]),
+        ('shape = "sphere"\nradius = "10 mm"', 'shape = "stl"\nfile = "no.stl"', ["tool.1.file", "no.stl"]),
     ],
 )
 def test_a_wrong_key_is_an_error_with_its_line(tmp_path: Path, before: str, after: str, words: list[str]) -> None:

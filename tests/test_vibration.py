@@ -14,10 +14,12 @@ from scipy.linalg import eigh
 import truespring as ts
 from tests.near import near
 from tests.studies import changed
+from tests.test_examples import EXAMPLES
 from truespring.arrays import Floats
 from truespring.cli import main
 from truespring.errors import ModelError, ProblemError
 from truespring.potential import Potential
+from truespring.study import read_study
 from truespring.vibration import Modes, assurance, pairs, study_modes
 
 SOFT = ts.Material(young=1e6, poisson=0.3, density=1000.0)
@@ -192,6 +194,18 @@ def test_springs_under_tension_at_rest_are_named() -> None:
     assert "not in equilibrium" in ts.modes(problem, network, 3).warnings[0]
 
 
+def test_the_shipped_cantilever_swings_as_its_comment_says() -> None:
+    """Euler and Bernoulli in bending, whose error by shear grows with the mode; a quarter wave along the axis."""
+    found = study_modes(read_study(EXAMPLES / "cantilever_modes.toml"), 4)
+    fem = found.found["fem"].frequencies[:4]
+    speed, beam = np.sqrt(1e6 / 1100), np.array([CANTILEVER, 4.6940911330, 7.8547574382]) ** 2 / (2 * np.pi)
+    assert fem[:2] == near(beam[:2] * 0.01 / 0.2**2 * speed / np.sqrt(12), rel=0.015)
+    assert fem[2] == pytest.approx(beam[2] * 0.01 / 0.2**2 * speed / np.sqrt(12), rel=0.035)
+    assert fem[3] == pytest.approx(speed / 0.8, rel=0.005)
+    # The same springs and elements have the same small strains.
+    assert found.found["springs"].frequencies[:4] == near(fem, rel=1e-5)
+
+
 # --- bad input --------------------------------------------------------------------------------------------
 
 
@@ -281,6 +295,15 @@ def test_json_and_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert Path(line).is_file()
 
 
+def test_a_study_without_supports_and_loads_has_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lone = (('[[support]]\non = "left"\n', ""), ('[[load]]\non = "right"\nforce = ["0 N", "-0.01 N"]\n', ""))
+    file = study(tmp_path, *lone)
+    assert main(["modes", file, "--json", "--count", "1", "--out", str(tmp_path / "out")]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert [one["n_rigid"] for one in values["models"].values()] == [3, 3]
+    assert main(["solve", file, "--out", str(tmp_path / "out")]) == 2
+
+
 def test_without_density_the_verb_says_where_it_belongs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "study.toml"
     file.write_text(changed(), encoding="utf-8")
@@ -290,7 +313,5 @@ def test_without_density_the_verb_says_where_it_belongs(tmp_path: Path, capsys: 
 
 
 def test_a_study_in_python(tmp_path: Path) -> None:
-    from truespring.study import read_study
-
     found = study_modes(read_study(study(tmp_path)), 3)
     assert found.table().height == len(found.rows) and set(found.figures()) == {"modes"}

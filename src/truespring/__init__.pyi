@@ -69,6 +69,7 @@ from .tools import Capsule as Capsule
 from .tools import Grasp as Grasp
 from .tools import HalfSpace as HalfSpace
 from .tools import Sphere as Sphere
+from .tools import StlTool as StlTool
 from .validity import map_validity as map_validity
 from .vibration import Modes as Modes
 from .vibration import modes as modes

@@ -114,8 +114,8 @@ class Interaction(Protocol):
         ...
 
     @property
-    def frictional(self) -> bool:
-        """Whether there is friction, which depends on the begin of a step."""
+    def dissipates(self) -> bool:
+        """Whether it has friction: states then depend on those before them."""
         ...
 
     def energy(self, positions: Floats, level: float) -> float:
@@ -298,6 +298,11 @@ class Loading:
         if not self.interactions:
             return self
         return replace(self, interactions=tuple(one.lagged(positions, level) for one in self.interactions))
+
+    @property
+    def dissipates(self) -> bool:
+        """Whether a tool has friction: states then depend on those before them."""
+        return any(one.dissipates for one in self.interactions)
 
     def cleared(self, positions: Floats, level: float) -> Floats:
         """Return positions with the free nodes inside of barriers moved out of them [m], shape (n_nodes, dim)."""

@@ -58,7 +58,8 @@ class Problem:
         supports: supports, one or several.
         loads: loads, one or several.
         regions: elements of other materials; where regions overlap, the last one applies.
-        stated: False for a result of another program, of which only the mesh is known; it cannot be solved.
+        stated: False if loads and supports need not define an equilibrium: for a result of another program, of which
+            only the mesh is known, and for natural frequencies; such a problem cannot be solved.
         dynamics: the motion in time; None for equilibrium.
         tools: rigid bodies that touch the body.
         grasps: patches that are held by springs to a place that moves.

@@ -41,7 +41,7 @@ class Status(StrEnum):
 FINE = (Status.CONVERGED, Status.READ, Status.FIXED_ITERATIONS)
 
 _ADVICE = {
-    Status.CONVERGED: "a stable equilibrium was found at every load level",
+    Status.CONVERGED: "an equilibrium was found at every load level, and none is known to be unstable",
     Status.UNSTABLE: "a real body would leave such a state; reduce the load, or add a small side force to choose a "
     "branch",
     Status.INVERTED: "an element is inverted, at a corner at least; reduce the load, use more load_steps or a finer "

@@ -20,7 +20,7 @@ def _run(options: argparse.Namespace) -> int:
     from truespring.vibration import study_modes
     from truespring.vibration.tables import mode_table, rigid_line
 
-    studies = read_studies(options.study)
+    studies = read_studies(options.study, balanced=False)
     reserve(options, studies)
     screen = console(options)
     values, converged = {}, True

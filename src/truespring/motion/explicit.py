@@ -25,7 +25,7 @@ def stable_step(body: Body) -> float:
     """
     from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-    if any(one.frictional for one in body.loading.interactions):
+    if any(one.dissipates for one in body.loading.interactions):
         return 0.0
     nodes = body.potential.nodes
     matrix = sparse.csr_array(body.potential.hessian(nodes))

@@ -38,7 +38,7 @@ class Implicit:
         start = body.placed(step.target, levels[2])
         start = stage.held(start, history, body.held)
         loading = body.loading.since(last.positions, levels[0], body.creep * h)
-        for _ in range(2 if any(one.frictional for one in loading.interactions) else 1):
+        for _ in range(2 if any(one.dissipates for one in loading.interactions) else 1):
             self._balance.potential, self._balance.loading = step, loading
             state = self._solved(levels[1], start, np.where(body.held, start, last.positions))
             if not state.converged and not self._iterations:

@@ -429,6 +429,6 @@ def _solved(
         try:
             return Stepped(ready.solve(right, accuracy), ready)
         except SlowError as slow:
-            if attempt and not balance.go_direct("conjugate gradients were slow"):
+            if attempt and not balance.go_direct("the iterations for a linear system were slow"):
                 return Stepped(slow.best, ready)
     return None

@@ -60,7 +60,7 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
             del tangent  # its memory is used again
             return watch.equilibrium()
         if undamped_iterations or watch.below_rounding:
-            moved = _full_step(balance, positions, tangent, watch.force)
+            moved = _full_step(balance, positions, tangent, watch)
         elif not balance.loading.has_potential(load_factor):
             moved = reduced(balance, load_factor, positions, tangent, watch)
         else:
@@ -73,19 +73,19 @@ def _descend(balance: Balance, load_factor: float, positions: Floats, undamped_i
     return watch.failure()
 
 
-def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, force: Floats) -> Floats | None:
+def _full_step(balance: Balance, positions: Floats, tangent: SparseMatrix, watch: Watch) -> Floats | None:
     """Return the positions after a full Newton step, None if there is none or its energy is not finite.
 
     An iterative solver that does not reach its accuracy gives its last iterate.
     """
     try:
-        step = balance.ready(tangent, positions).solve(force)
+        step = balance.ready(tangent, positions).solve(watch.force)
     except (SingularMatrixError, IndefiniteError):
         return None
     except SlowError as slow:
         step = slow.best
     moved = positions - step
-    return moved if np.isfinite(balance.total_energy(moved, 0.0)[0]) else None
+    return moved if np.isfinite(balance.total_energy(moved, watch.load_factor)[0]) else None
 
 
 def _step(balance: Balance, positions: Floats, tangent: SparseMatrix, watch: Watch) -> Step | None:

@@ -220,6 +220,7 @@ class Nearby(Newton):
         )
         positions = potential.nodes.copy() if self.start is None else self.start(potential)
         positions[loading.held] = (potential.nodes + loading.motion())[loading.held]
+        positions = loading.cleared(positions, 1.0)
         found = None
         if isinstance(potential, Stressed):
             found = mixed.converge(balance, 1.0, mixed.Start(positions, potential.stress(positions)))

@@ -105,12 +105,12 @@ class StudyText:
         except ValidationError as error:
             raise StudyError("\n".join(fault_lines(self.places, error))) from None
 
-    def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0) -> Study:
+    def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0, balanced: bool = True) -> Study:
         """Return the study, checked as far as possible without solving; raise StudyError. See `read_study`."""
         text = self.changed(changes) if changes else self
         keys = text.keys()
         keys = keys.model_copy(update={"mesh": keys.mesh.finer(halvings)}) if halvings else keys
-        return _build(text, keys, halvings)
+        return _build(text, keys, halvings, balanced)
 
 
 def read_text(file: str | Path) -> StudyText:
@@ -118,23 +118,26 @@ def read_text(file: str | Path) -> StudyText:
     return StudyText(Path(file), *parse(Path(file)))
 
 
-def read_study(file: str | Path, halvings: int = 0, changes: Mapping[str, Any] | None = None) -> Study:
+def read_study(
+    file: str | Path, halvings: int = 0, changes: Mapping[str, Any] | None = None, balanced: bool = True
+) -> Study:
     """Read and check a study file; raise StudyError with file, line, key, value and what is allowed.
 
     Args:
         file: path of the study.
         halvings: how often to halve the element size.
         changes: other values by dotted key: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
+        balanced: whether loads and supports have to define an equilibrium; natural frequencies need neither.
     """
-    return read_text(file).study(changes, halvings)
+    return read_text(file).study(changes, halvings, balanced)
 
 
 # --- from keys to objects -----------------------------------------------------------------------------
 
 
-def _build(text: StudyText, keys: StudyKeys, halvings: int) -> Study:
+def _build(text: StudyText, keys: StudyKeys, halvings: int, balanced: bool) -> Study:
     places = text.places
-    problem, network = _problem(keys, places, halvings)
+    problem, network = _problem(keys, places, halvings, balanced)
     solver = keys.solver.build(places, problem)
     entries = {}
     for name, model_keys in keys.models.items():
@@ -160,7 +163,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int) -> Study:
     )
 
 
-def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, SpringNetwork | None]:
+def _problem(keys: StudyKeys, places: Places, halvings: int, balanced: bool) -> tuple[Problem, SpringNetwork | None]:
     """Return the problem, and the spring network if the mesh is one, else None."""
     with places.at("mesh"):
         read = keys.mesh.build(places, halvings)
@@ -183,7 +186,7 @@ def _problem(keys: StudyKeys, places: Places, halvings: int) -> tuple[Problem, S
     _check_histories(keys, places)
     moving: dict[str, Any] = {"dynamics": dynamics, "tools": tools, "grasps": grasps}
     try:
-        return Problem(mesh, material, section, supports, loads, regions, **moving), network
+        return Problem(mesh, material, section, supports, loads, regions, stated=balanced, **moving), network
     except FibreError as error:
         own = [number for number, region in enumerate(regions) if region.material.fibres == error.fibres]
         with places.at("region", own[0]) if own else places.at("material"):

@@ -7,8 +7,11 @@ from truespring.errors import StudyError
 from truespring.study.read import Study, read_study
 
 
-def read_studies(files: Sequence[str | Path]) -> list[Study]:
-    """Read and check studies; raise StudyError with the errors of all of them, or if two files have the same stem."""
+def read_studies(files: Sequence[str | Path], balanced: bool = True) -> list[Study]:
+    """Read and check studies; raise StudyError with the errors of all of them, or if two files have the same stem.
+
+    `balanced` is that of `read_study`.
+    """
     studies: list[Study] = []
     faults: list[str] = []
     seen: dict[str, str | Path] = {}
@@ -20,7 +23,7 @@ def read_studies(files: Sequence[str | Path]) -> list[Study]:
             )
         seen[stem] = file
         try:
-            studies.append(read_study(file))
+            studies.append(read_study(file, balanced=balanced))
         except StudyError as error:
             faults.append(str(error))
     if faults:

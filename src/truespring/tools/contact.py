@@ -15,6 +15,11 @@ from truespring.tools.path import Track
 class Shape(Protocol):
     """The surface of a rigid body."""
 
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates of the body [m], shape (dim,) each or one number; may be infinite."""
+        ...
+
     def gaps(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the gaps at places relative to that of the body [m], negative inside, and their gradients [-].
 
@@ -60,13 +65,21 @@ class Contact:
         return self.track.corners
 
     @property
-    def frictional(self) -> bool:
+    def dissipates(self) -> bool:
         """Whether there is friction."""
         return self.coefficient > 0
 
     def gaps(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
-        """Return the gaps of the nodes [m], shape (n,), and the normals [-], shape (n, dim)."""
-        return self.shape.gaps(positions[self.nodes] - self.track.at(level))
+        """Return the gaps of the nodes [m], shape (n,), and the normals [-], shape (n, dim).
+
+        Nodes out of reach of the tool's bounds have an infinite gap and no normal.
+        """
+        places = positions[self.nodes] - self.track.at(level)
+        lower, upper = self.shape.bounds
+        near = ((places >= lower - self.law.reach) & (places <= upper + self.law.reach)).all(axis=1)
+        gaps, normals = np.full(len(places), np.inf), np.zeros_like(places)
+        gaps[near], normals[near] = self.shape.gaps(places[near])
+        return gaps, normals
 
     def energy(self, positions: Floats, level: float) -> float:
         """Return the stored energy plus the dissipation since the begin of the step [J]; infinite inside a barrier."""
@@ -111,7 +124,7 @@ class Contact:
 
     def since(self, positions: Floats, level: float, creep: float) -> Self:
         """Return the contact in a step that begins at a state; friction is full from a slip of `creep` [m] on."""
-        if not self.coefficient:
+        if not self.dissipates:
             return self
         begin, limit, normals = positions[self.nodes].copy(), *self._limit(positions, level)
         return replace(self, friction=Friction(begin, self.track.at(level), normals, limit, creep))

@@ -98,8 +98,8 @@ class Springs:
         return self.track.corners
 
     @property
-    def frictional(self) -> bool:
-        """False: springs have no friction."""
+    def dissipates(self) -> bool:
+        """False: springs store their work."""
         return False
 
     def _stretch(self, positions: Floats, level: float) -> Floats:

@@ -53,6 +53,11 @@ class Sphere(_Round):
     radius: float
     path: Path
 
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates relative to the place [m]."""
+        return np.array(-self.radius), np.array(self.radius)
+
     def check(self, dim: int) -> None:
         """Raise ToolError unless the radius is positive."""
         positive(self.name, "radius", self.radius, "m")
@@ -79,6 +84,12 @@ class Capsule(_Round):
     start: Sequence[float]
     end: Sequence[float]
     path: Path
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates relative to the place [m]."""
+        ends = np.array([self.start, self.end], dtype=float)
+        return ends.min(axis=0) - self.radius, ends.max(axis=0) + self.radius
 
     def check(self, dim: int) -> None:
         """Raise ToolError unless the radius is positive, and the ends are two points."""
@@ -148,6 +159,12 @@ class Block(Tool):
     name: str
     size: Sequence[float]
     path: Path
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates relative to the place [m]."""
+        half = np.asarray(self.size, dtype=float) / 2
+        return -half, half
 
     def check(self, dim: int) -> None:
         """Raise ToolError unless the lengths are positive."""

@@ -59,6 +59,11 @@ class Tool(Touching, ABC):
     name: str
     path: Path
 
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates relative to the place [m], see `Shape.bounds`; by default infinite."""
+        return np.array(-np.inf), np.array(np.inf)
+
     @abstractmethod
     def gaps(self, places: Floats) -> tuple[Floats, Floats]:
         """Return gaps and normals at places relative to that of the tool, see `Shape.gaps`."""

@@ -35,8 +35,10 @@ def _way(path: Solution) -> str:
     """Return through which equilibria and critical points a path passed."""
     critical = [state for state in path.states if state.critical]
     if not critical:
-        unstable = any(state.negative_eigenvalues for state in path.states)
-        return "equilibria of which some are unstable" if unstable else "stable equilibria"
+        counts = [state.negative_eigenvalues for state in path.states]
+        if any(counts):
+            return "equilibria of which some are unstable"
+        return "equilibria of unknown stability" if None in counts else "stable equilibria"
     kinds = {kind: [f"{one.load_factor:.4g}" for one in critical if one.critical == kind] for kind in _CRITICAL}
     points = [
         f"a {kind} at load factor {at[0]}" if len(at) == 1 else f"{kind}s at load factors {listed(at)}"

@@ -13,6 +13,7 @@ from truespring.errors import StudyError, TruespringError, shown
 from truespring.mesh import Mesh, facets_within
 from truespring.study.places import Places
 from truespring.study.schema.values import (
+    FileName,
     Keys,
     Length,
     Number,
@@ -96,6 +97,10 @@ class ToolKeys(MovingKeys):
         default=None, description="direction of a plane towards the body; the place is a point of the plane"
     )
     size: Point | None = Field(default=None, description="lengths of a box along the axes; the place is its centre")
+    file: FileName | None = Field(
+        default=None, description="STL file of a closed surface, relative to the study; the place is its origin"
+    )
+    unit: str | None = Field(default=None, description='length unit of the STL file, such as "mm"; default: m')
     contact: ContactName | None = Field(
         default=None,
         description='"penalty", the default: nodes enter the tool by pressure / stiffness; or "barrier": they stay out',
@@ -125,7 +130,10 @@ class ToolKeys(MovingKeys):
         if self.on is not None:
             with places.at("tool", number, "on"):
                 facets_within(mesh, self.on)
-        return TOOLS[self.shape](**self.arguments(places, "tool", number))
+        values = self.arguments(places, "tool", number)
+        values |= {"file": places.beside(values["file"])} if "file" in values else {}
+        with places.at("tool", number, *(["file"] if "file" in values else [])):
+            return TOOLS[self.shape](**values)
 
 
 class GraspKeys(MovingKeys):

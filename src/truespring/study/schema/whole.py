@@ -1,9 +1,9 @@
 """Keys of a whole study file, of `[solver]` and of `[compare]`."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from truespring.dynamics import Damping, Dynamics
 from truespring.equilibrium import check_solver
@@ -213,7 +213,7 @@ class StudyKeys(Keys):
     )
     section: SectionKeys | None = Field(default=None, description="section of a plane body; absent in 3D")
     support: list[SupportKeys] = Field(
-        default=[], description="supports, which together prevent rigid-body motion; a motion needs none"
+        default=[], description="supports, which at rest together prevent rigid-body motion"
     )
     load: list[AnyLoad] = Field(
         default=[], description="loads; load_factor scales all of them, linearly, unless they have a history (over)"
@@ -226,12 +226,6 @@ class StudyKeys(Keys):
         description="models to solve, by names of your choice"
     )
     compare: CompareKeys = Field(default=CompareKeys(), description="which models are compared, and where")
-
-    @model_validator(mode="after")
-    def _supported(self) -> Self:
-        if not self.support and self.dynamics is None:
-            raise ValueError("support is required and missing: at least one, unless [dynamics] asks for a motion")
-        return self
 
     @field_validator("models")
     @classmethod

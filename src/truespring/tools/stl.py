@@ -1,0 +1,62 @@
+"""A tool whose surface is an STL file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path as File
+
+from truespring.arrays import Floats
+from truespring.errors import MeshError, ToolError
+from truespring.mesh.files.stl import parse_stl
+from truespring.opening import read_file
+from truespring.tools.path import Path
+from truespring.tools.solid import Solid
+from truespring.tools.tool import Tool
+from truespring.units import unit_of
+
+
+@dataclass(frozen=True)
+class StlTool(Tool):
+    """A solid bounded by the triangles of an STL file; its path is that of the origin of the file.
+
+    Attributes:
+        name, path: as those of Tool; further ones as those of Touching.
+        file: path of the file, ASCII or binary.
+        unit: length unit of the file, such as "mm", which STL files do not state.
+        solid: the solid, read from the file. A file that cannot be read, or whose surface is not closed, raises
+            MeshError.
+    """
+
+    name: str
+    file: str | File
+    path: Path
+    unit: str = "m"
+    solid: Solid = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        size = unit_of(self.unit, "length", "unit", MeshError)
+        try:
+            solid = Solid.of(size * parse_stl(read_file(File(self.file), MeshError)))
+        except MeshError as error:
+            raise MeshError(f"{self.file}: {str(error).removeprefix(f'{self.file}: ')}") from None
+        object.__setattr__(self, "solid", solid)
+
+    def form(self) -> str:
+        """Return shape and dimensions."""
+        return f"solid of {len(self.solid.triangles)} triangles from {self.file}"
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Smallest and largest coordinates relative to the place [m]."""
+        return self.solid.bounds
+
+    def check(self, dim: int) -> None:
+        """Raise ToolError in the plane."""
+        if dim != len("xyz"):
+            raise ToolError(self.name, "a solid needs a body in 3D: in the plane use another shape")
+
+    def gaps(self, places: Floats) -> tuple[Floats, Floats]:
+        """Return the signed distance from the surface [m], and the normals."""
+        return self.solid.gaps(places)
+
+    def bends(self, places: Floats) -> Floats:
+        """Return the second derivatives of the distance [1/m]."""
+        return self.solid.bends(places)
