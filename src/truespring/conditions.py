@@ -349,9 +349,8 @@ class Refined(Potential, Protocol):
         """The problem's loading on all nodes of the potential."""
         ...
 
-    @property
-    def mass(self) -> Floats:
-        """The problem's lumped mass on all nodes of the potential [kg], shape (n_nodes,)."""
+    def lumped_mass(self) -> Floats:
+        """Return the problem's lumped mass on all nodes of the potential [kg], shape (n_nodes,)."""
         ...
 
 

@@ -197,7 +197,7 @@ def _motion(
     if processes_of(solver.linear).size > 1:
         raise ProblemError("a motion is computed by one process: start one, or leave dynamics out")
     if isinstance(potential, Refined):
-        mass = potential.mass
+        mass = potential.lumped_mass()
     else:
         own = potential.mass if isinstance(potential, Massive) else np.zeros(0)
         mass = own if len(own) else problem.mass
@@ -330,7 +330,7 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         all_positions=found.positions,
         displacement=positions - problem.mesh.nodes,
         reaction=reaction,
-        applied_force=_applied(loading, found).sum(axis=0),
+        applied_force=found.external_force.sum(axis=0),
         energy=found.energy,
         iterations=found.iterations,
         residual=found.residual,
@@ -346,13 +346,6 @@ def _state(problem: Problem, potential: Potential, loading: Loading, found: Equi
         area_ratio=problem.mesh.smallest_area_ratio(positions),
         stretch=None if stretch is None else (float(stretch.min()), float(stretch.max())),
     )
-
-
-def _applied(loading: Loading, found: Equilibrium) -> Floats:
-    """Return the force of the loads alone, without tools and grasps [N], shape (n_nodes, dim)."""
-    if not loading.interactions:
-        return found.external_force
-    return loading.loads(found.positions, found.load_factor)
 
 
 def _level(found: Equilibrium) -> float | None:

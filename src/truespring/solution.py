@@ -248,7 +248,5 @@ class Solution:
         loading = self.problem.loading if self.problem.stated else None
         if loading is None or loading.interactions or not loading.driven_by_motion:
             return state.applied_force
-        if self._leading is None and state.touches:
-            return np.asarray(-sum(touch.force for touch in state.touches))
         of_leading = [one.force for one in self.support_forces(state) if one.support == self._leading]
         return of_leading[0] if of_leading else np.full(self.problem.mesh.dim, math.nan)

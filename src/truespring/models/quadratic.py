@@ -84,9 +84,8 @@ class QuadraticPotential(FemPotential):
         turns = [tuple(self._turn(turn, whole) for turn in part.turns) for part in linear.parts]
         return self.problem.loading_on(self.body, held, np.array(displacements), turns)
 
-    @property
-    def mass(self) -> Floats:
-        """The lumped mass of all nodes [kg], shape (n_nodes + n_edges,), see `nodal_mass`."""
+    def lumped_mass(self) -> Floats:
+        """Return the lumped mass of all nodes [kg], shape (n_nodes + n_edges,), see `nodal_mass`."""
         return self.problem.mass_on(self.body)
 
     @property
