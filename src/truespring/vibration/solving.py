@@ -91,15 +91,15 @@ def _warnings(system: System, values: Floats, converged: bool) -> Iterator[str]:
             "the undeformed body is not in equilibrium by this model, as if it had springs under tension: frequencies "
             "are those of its tangent there"
         )
-    if (values < 0).any():
-        yield (
-            f"the undeformed body is unstable by this model: omega^2 is negative for {int((values < 0).sum())} of "
-            f"{len(values)} modes"
-        )
     if (values == 0).any():
         yield (
             f"{int((values == 0).sum())} modes that are not rigid-body motions have no stiffness: this model is a "
             "mechanism"
         )
-    if not converged:
+    if (values < 0).any():
+        yield (
+            f"the undeformed body is unstable by this model: omega^2 is negative for {int((values < 0).sum())} of "
+            f"{len(values)} modes"
+        )
+    elif not converged:
         yield "not all modes are accurate: LOBPCG did not converge; try linear = 'direct', or fewer modes"
