@@ -56,8 +56,8 @@ class Solid:
             keys = {tuple(way) for way in ways.tolist()}
             n_open = sum((end, start) not in keys for start, end in keys)
             raise MeshError(
-                f"the surface is not closed, or its facets are not turned alike: {n_open} edges have no neighbour; a tool "
-                "needs a surface that separates inside from outside"
+                f"the surface is not closed, or its facets are not turned alike: {n_open} edges have no neighbour; a "
+                "tool needs a surface that separates inside from outside"
             )
         volume = float(np.linalg.det(corners[triangles]).sum()) / 6
         return cls(corners, triangles if volume > 0 else triangles[:, ::-1])
