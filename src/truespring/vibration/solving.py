@@ -46,6 +46,8 @@ def modes(problem: Problem, model: Model | Potential, count: int = 6, linear: st
     started = time.perf_counter()
     potential = model.potential(problem)
     system = system_of(problem, potential)
+    if system.rigid.shape[1] == system.matrix.shape[0]:
+        raise ModelError(f"{model.label}: all motions that supports leave are rigid-body motions: nothing vibrates")
     found = lowest(system.matrix, system.rigid, lambda: system.inverse(problem, potential, linear), int(count))
     zero = np.abs(found.values) <= _ZERO * size_of(system.matrix)
     values = np.where(zero, 0.0, found.values)
