@@ -152,6 +152,21 @@ def test_a_notch_of_triangles_is_outside() -> None:
     assert normals == pytest.approx(np.array([(1, 0, 0), (0.6, 0, 0.8), (0, 0, 1), (0, 1, 0)]), abs=1e-12)
 
 
+def test_a_flat_tip_is_outside_whatever_its_triangles() -> None:
+    """A pyramid whose upper side is divided into six triangles, the lower one into one: equal weights would err."""
+    upper = [(-1, 0.05, z) for z in np.linspace(-0.5, 0.5, 7)]
+    ring = np.array([*upper, (-1, -0.05, 0.5), (-1, -0.05, -0.5)])
+    after = np.roll(ring, -1, axis=0)
+    sides = np.stack([np.zeros_like(ring), ring, after], axis=1)
+    base = np.stack([np.broadcast_to(ring[0], (7, 3)), after[1:8], ring[1:8]], axis=1)
+    solid = Solid.of(np.concatenate([sides, base]))
+    place = np.array([0.03, -0.4, 0.0])
+    gaps, normals = solid.gaps(np.array([place, (-0.9, 0.0, 0.1)]))
+    assert gaps[0] == pytest.approx(np.linalg.norm(place))
+    assert normals[0] == pytest.approx(place / np.linalg.norm(place))
+    assert gaps[1] < 0
+
+
 def test_a_surface_that_is_not_closed_is_no_tool(tmp_path: Path) -> None:
     cube = ts.box((1, 1, 1), (2, 2, 2))
     facets = cube.nodes[triangles_of(cube.boundary)]
