@@ -33,6 +33,7 @@ elements = [4, 1]
 [material]
 young = "{young} kPa"
 poisson = 0.3333333333
+density = "1000 kg/m^3"
 [section]
 kind = "plane-stress"
 thickness = "10 mm"
@@ -136,6 +137,7 @@ VERBS: dict[str, tuple[list[str], str]] = {
     "verify": ([], "study/summary.json"),
     "moduli": ([], "study/moduli.json"),
     "export": (["--to", "json"], "study/springs.json"),
+    "modes": (["--count", "1"], "study/modes.json"),
 }
 LONG: dict[str, tuple[list[str], str]] = {
     "calibrate": (["--to", "linear"], "study/calibrate.json"),

@@ -19,6 +19,7 @@ from truespring.refining import refined_problem
 from truespring.study import plan, read_study
 from truespring.tools import TOOLS, Tool
 from truespring.tools.solid import Solid
+from truespring.tools.surface import within
 
 YOUNG, POISSON = 10e3, 0.3
 MATERIAL = ts.Material(YOUNG, POISSON)
@@ -149,6 +150,21 @@ def test_a_notch_of_triangles_is_outside() -> None:
     )
     assert gaps == pytest.approx([0.002, -0.005, -0.001, 0.001])
     assert normals == pytest.approx(np.array([(1, 0, 0), (0.6, 0, 0.8), (0, 0, 1), (0, 1, 0)]), abs=1e-12)
+
+
+def test_a_flat_tip_is_outside_whatever_its_triangles() -> None:
+    """A pyramid whose upper side is divided into six triangles, the lower one into one: equal weights would err."""
+    upper = [(-1, 0.05, z) for z in np.linspace(-0.5, 0.5, 7)]
+    ring = np.array([*upper, (-1, -0.05, 0.5), (-1, -0.05, -0.5)])
+    after = np.roll(ring, -1, axis=0)
+    sides = np.stack([np.zeros_like(ring), ring, after], axis=1)
+    base = np.stack([np.broadcast_to(ring[0], (7, 3)), after[1:8], ring[1:8]], axis=1)
+    solid = Solid.of(np.concatenate([sides, base]))
+    place = np.array([0.03, -0.4, 0.0])
+    gaps, normals = solid.gaps(np.array([place, (-0.9, 0.0, 0.1)]))
+    assert gaps[0] == pytest.approx(np.linalg.norm(place))
+    assert normals[0] == pytest.approx(place / np.linalg.norm(place))
+    assert gaps[1] < 0
 
 
 def test_a_surface_that_is_not_closed_is_no_tool(tmp_path: Path) -> None:
@@ -441,6 +457,31 @@ def test_wrong_tools_are_errors_with_the_way_out(tool: Tool | ts.Grasp, words: l
     assert str(error.value).startswith("'ball'")
     for word in words:
         assert word in str(error.value)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_small_tool_between_the_nodes_starts_inside(dim: int, tmp_path: Path) -> None:
+    place = (0.0325, 0.013, 0.034)[:dim]
+    tools: list[Tool] = [
+        ts.Sphere("ball", 1e-4, place),
+        ts.Capsule("ball", 1e-4, (0, 0, 0)[:dim], (1e-4, 0, 0)[:dim], place),
+        ts.Block("ball", (1e-4,) * dim, place),
+    ]
+    if dim == 3:
+        tools.append(ts.StlTool("ball", write_stl(angle(1e-4), tmp_path / "tool.stl"), place))
+    for tool in tools:
+        with pytest.raises(ProblemError, match="'ball': path: starts inside the body, between its nodes"):
+            problem(body(dim), tool)
+        problem(body(dim), replace(tool, path=(0.0325, 0.0302, 0.034)[:dim]))  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("element", ["hexahedron", "tetrahedron", "wedge", "pyramid"])
+def test_places_within_a_body(element: str) -> None:
+    mesh = ts.box((0.06, 0.03, 0.06), (2, 1, 2), element)
+    places = np.random.default_rng(4).uniform(-0.01, 0.07, (200, 3))
+    expected = ((places > 0) & (places < (0.06, 0.03, 0.06))).all(axis=1)
+    assert 20 < expected.sum() < 180
+    assert np.array_equal(within(mesh, places), expected)
 
 
 def test_two_tools_of_one_name_are_an_error() -> None:

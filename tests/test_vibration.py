@@ -20,7 +20,7 @@ from truespring.cli import main
 from truespring.errors import ModelError, ProblemError
 from truespring.potential import Potential
 from truespring.study import read_study
-from truespring.vibration import Modes, assurance, pairs, study_modes
+from truespring.vibration import Modes, assurance, like, pairs, study_modes
 
 SOFT = ts.Material(young=1e6, poisson=0.3, density=1000.0)
 SVK = ts.Fem(law="saint-venant-kirchhoff")
@@ -185,6 +185,17 @@ def test_an_unstable_body_and_a_mechanism_are_named() -> None:
     assert loose.n_rigid == 0 and (loose.frequencies == 0).all() and "mechanism" in loose.warnings[0]
 
 
+def test_a_body_without_stiffness_does_not_vibrate() -> None:
+    problem = body(ts.rectangle((1.0, 0.5), (2, 1)))
+    with pytest.raises(ModelError, match="rigid"):
+        ts.modes(problem, Turned(SVK.potential(problem), (0.0, 0.0)))
+
+
+def test_almost_all_modes_of_a_large_body_are_not_computed() -> None:
+    with pytest.raises(ProblemError, match=r"count = 5000.* 4,\d\d\d modes"):
+        ts.modes(body(ts.rectangle((1.0, 1.0), (110, 110))), SVK, 5000)
+
+
 def test_springs_under_tension_at_rest_are_named() -> None:
     problem = body(ts.rectangle((1.0, 0.5), (2, 1)), ts.Fixed(on="left"))
     springs = problem.mesh.edges
@@ -250,6 +261,22 @@ def test_a_pair_of_equal_frequencies_is_compared_by_its_span() -> None:
     unit = replace(found, shapes=found.shapes / np.sqrt(found.modal_mass)[:, None, None])
     assert [(one.reference, one.mode) for one in pairs(unit, mixed(unit, turn))] == [(0, 0), (1, 1), (2, 2)]
     assert [one.mac for one in pairs(unit, mixed(unit, turn))] == near(np.ones(3), abs=1e-9)
+    # Figures show the combination that looks like the mode of the reference.
+    for number in range(3):
+        drawn = like(mixed(unit, turn), number, -found.shapes[number])
+        assert drawn == near(-found.shapes[number], abs=1e-9)
+
+
+def test_a_mode_beyond_those_asked_for_is_listed_where_it_has_their_shape(tmp_path: Path) -> None:
+    found = study_modes(read_study(study(tmp_path)), 2)
+    springs = found.found["springs"]
+    order = np.array([0, 2, 1, 3, 4])
+    moved = replace(springs, shapes=springs.shapes[order], eigenvalues=springs.eigenvalues[:5])
+    found = replace(found, found={**found.found, "springs": moved})
+    assert [(one.reference, one.mode) for one in found.pairs["springs"]] == [(0, 0), (1, 2), (2, 1)]
+    assert found.shown("linear") == found.shown("springs") == [0, 1, 2]
+    assert [row["reference_mode"] for row in found.rows] == [1, 3, 2, None, None, None]
+    assert found.values["models"]["linear"]["modes"][2]["mode"] == 3
 
 
 # --- the verb ---------------------------------------------------------------------------------------------

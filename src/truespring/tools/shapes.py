@@ -58,6 +58,10 @@ class Sphere(_Round):
         """Smallest and largest coordinates relative to the place [m]."""
         return np.array(-self.radius), np.array(self.radius)
 
+    def points(self, dim: int) -> Floats:
+        """Return the centre."""
+        return np.zeros((1, dim))
+
     def check(self, dim: int) -> None:
         """Raise ToolError unless the radius is positive."""
         positive(self.name, "radius", self.radius, "m")
@@ -90,6 +94,10 @@ class Capsule(_Round):
         """Smallest and largest coordinates relative to the place [m]."""
         ends = np.array([self.start, self.end], dtype=float)
         return ends.min(axis=0) - self.radius, ends.max(axis=0) + self.radius
+
+    def points(self, dim: int) -> Floats:
+        """Return the ends of the axis."""
+        return np.array([self.start, self.end], dtype=float)
 
     def check(self, dim: int) -> None:
         """Raise ToolError unless the radius is positive, and the ends are two points."""
@@ -165,6 +173,10 @@ class Block(Tool):
         """Smallest and largest coordinates relative to the place [m]."""
         half = np.asarray(self.size, dtype=float) / 2
         return -half, half
+
+    def points(self, dim: int) -> Floats:
+        """Return the centre."""
+        return np.zeros((1, dim))
 
     def check(self, dim: int) -> None:
         """Raise ToolError unless the lengths are positive."""

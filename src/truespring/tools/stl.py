@@ -12,6 +12,9 @@ from truespring.tools.solid import Solid
 from truespring.tools.tool import Tool
 from truespring.units import unit_of
 
+# Number of vertices that are checked at the start.
+_POINTS = 100
+
 
 @dataclass(frozen=True)
 class StlTool(Tool):
@@ -47,6 +50,11 @@ class StlTool(Tool):
     def bounds(self) -> tuple[Floats, Floats]:
         """Smallest and largest coordinates relative to the place [m]."""
         return self.solid.bounds
+
+    def points(self, dim: int) -> Floats:
+        """Return some of the vertices."""
+        corners = self.solid.corners
+        return corners[:: 1 + len(corners) // _POINTS]
 
     def check(self, dim: int) -> None:
         """Raise ToolError in the plane."""

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import TruespringError
 from truespring.loading import Body
-from truespring.mesh import Selection, corner_measures, facets_within
+from truespring.mesh import Mesh, Selection, corner_measures, facets_within
+from truespring.mesh.facets import triangles_of
 
 
 def surface(body: Body, on: Selection | None) -> tuple[Ints, Floats]:
@@ -29,6 +30,29 @@ def surface(body: Body, on: Selection | None) -> tuple[Ints, Floats]:
     np.add.at(areas, cells, body.thickness * measures)
     nodes = np.flatnonzero(areas > _LEAST * areas.max())
     return nodes, areas[nodes]
+
+
+def within(mesh: Mesh, places: Floats) -> Bools:
+    """Return whether places [m], shape (n, dim), lie inside the undeformed body; shape (n,).
+
+    Inside, its boundary turns once around a place: the angles, in 3D solid angles, that its facets span add up to a
+    full turn. Solid angles by van Oosterom and Strackee (1983).
+    """
+    facets = mesh.nodes[triangles_of(mesh.boundary)]
+    return np.array([_turns(facets - place) > 0.5 for place in places], dtype=bool)
+
+
+def _turns(arms: Floats) -> float:
+    """Return the number of turns of facets around the origin, from their corners [m], shape (n, dim, dim)."""
+    if arms.shape[2] == len("xy"):
+        first, second = arms[:, 0], arms[:, 1]
+        cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        return float(np.arctan2(cross, (first * second).sum(axis=1)).sum() / (2 * np.pi))
+    a, b, c = arms.swapaxes(0, 1)
+    sizes = np.linalg.norm(arms, axis=2)
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    dots = sum((one * other).sum(axis=1) * sizes[:, left] for one, other, left in ((a, b, 2), (b, c, 0), (c, a, 1)))
+    return float(2 * np.arctan2(volume, sizes.prod(axis=1) + dots).sum() / (4 * np.pi))
 
 
 # Areas below this share of the largest are rounding errors.

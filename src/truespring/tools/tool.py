@@ -14,7 +14,7 @@ from truespring.mesh import Selection
 from truespring.tools.contact import Contact
 from truespring.tools.laws import CONTACTS, Law
 from truespring.tools.path import Path, path_words, track_of
-from truespring.tools.surface import surface
+from truespring.tools.surface import surface, within
 from truespring.tools.values import positive
 
 # Default stiffness of contact over Young's modulus per length, default width of a barrier over the length: that of the
@@ -72,6 +72,13 @@ class Tool(Touching, ABC):
     def bends(self, places: Floats) -> Floats:
         """Return the second derivatives of the gaps, see `Shape.bends`."""
 
+    def points(self, dim: int) -> Floats:
+        """Return some points inside the tool, relative to the place [m], shape (n, dim): none may start in the body.
+
+        By default none: nodes that start inside the tool are an error anyway.
+        """
+        return np.zeros((0, dim))
+
     @abstractmethod
     def check(self, dim: int) -> None:
         """Raise ToolError if the dimensions of the tool do not fit a body of `dim` directions."""
@@ -111,6 +118,8 @@ class Tool(Touching, ABC):
             raise ToolError(self.name, str(error), "on" if self.on is not None else "") from None
         found = Contact(self.name, self, track, law, nodes, areas, len(body.nodes), friction)
         self._check_start(found, body.nodes, size)
+        if within(body.mesh, track.at(0.0) + self.points(body.mesh.dim)).any():
+            raise ToolError(self.name, "starts inside the body, between its nodes: begin the path outside", "path")
         return found
 
     def _law(self, young: float | None, size: float) -> Law:

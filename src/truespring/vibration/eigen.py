@@ -11,11 +11,14 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.errors import ProblemError
 
 Matrix = sparse.csr_array[Any, tuple[int, int]]
 
 # Up to this number of unknowns a dense solver is as fast.
 _DENSE = 400
+# LOBPCG is used up to this fraction of all vectors, one in so many; else a dense solver, up to a number of unknowns.
+_SHARE, _LARGEST_DENSE = 5, 10_000
 # Further vectors that are iterated, which speeds up the last ones asked for.
 _GUARDS = 4
 # Relative error of a vector in the norm of the energy, whose square is that of its eigenvalue; and most iterations.
@@ -49,10 +52,15 @@ def lowest(matrix: Matrix, known: Floats, inverse: Callable[[], Callable[[Floats
         inverse: makes a function that returns approximate solutions for right sides, both of shape (n, k); called for
             large matrices only.
         count: number of eigenpairs.
+
+    Raises ProblemError if almost all eigenpairs of a large matrix are asked for.
     """
     n, n_known = known.shape
     count = min(count, n - n_known)
-    if n <= max(_DENSE, n_known + 5 * (count + _GUARDS)):
+    if n <= max(_DENSE, n_known + _SHARE * (count + _GUARDS)):
+        if n > _LARGEST_DENSE:
+            most = (n - n_known) // _SHARE - _GUARDS
+            raise ProblemError(f"count = {count}: of a body with {n:,} unknowns at most {most:,} modes are computed")
         return _dense(matrix, known, count)
     return _iterated(matrix, known, inverse(), count)
 

@@ -80,7 +80,8 @@ def write_films(columns: Sequence[Column], folder: Path) -> None:
         for row in range(n_rows):
             found = [sheet.pixels(_COARSE)[..., :3] for sheet in sheets[row * half : (row + 1) * half]]
             frames = [Pictures.fromarray(one) for one in (*found, *found[-2:0:-1])]
-            first, *others = [one.convert("P", palette=Pictures.Palette.ADAPTIVE, colors=64) for one in frames]
+            first = frames[0].quantize(64, dither=Pictures.Dither.NONE)
+            others = [one.quantize(palette=first, dither=Pictures.Dither.NONE) for one in frames[1:]]
             file = folder / f"mode_{row + 1}.gif"
             first.save(file, save_all=True, append_images=others, duration=_PAUSE, loop=0)
 

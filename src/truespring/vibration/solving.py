@@ -46,6 +46,8 @@ def modes(problem: Problem, model: Model | Potential, count: int = 6, linear: st
     started = time.perf_counter()
     potential = model.potential(problem)
     system = system_of(problem, potential)
+    if system.rigid.shape[1] == system.matrix.shape[0]:
+        raise ModelError(f"{model.label}: all motions that supports leave are rigid-body motions: nothing vibrates")
     found = lowest(system.matrix, system.rigid, lambda: system.inverse(problem, potential, linear), int(count))
     zero = np.abs(found.values) <= _ZERO * size_of(system.matrix)
     values = np.where(zero, 0.0, found.values)
@@ -91,15 +93,15 @@ def _warnings(system: System, values: Floats, converged: bool) -> Iterator[str]:
             "the undeformed body is not in equilibrium by this model, as if it had springs under tension: frequencies "
             "are those of its tangent there"
         )
-    if (values < 0).any():
-        yield (
-            f"the undeformed body is unstable by this model: omega^2 is negative for {int((values < 0).sum())} of "
-            f"{len(values)} modes"
-        )
     if (values == 0).any():
         yield (
             f"{int((values == 0).sum())} modes that are not rigid-body motions have no stiffness: this model is a "
             "mechanism"
         )
-    if not converged:
+    if (values < 0).any():
+        yield (
+            f"the undeformed body is unstable by this model: omega^2 is negative for {int((values < 0).sum())} of "
+            f"{len(values)} modes"
+        )
+    elif not converged:
         yield "not all modes are accurate: LOBPCG did not converge; try linear = 'direct', or fewer modes"

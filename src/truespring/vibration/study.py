@@ -29,7 +29,7 @@ def study_modes(study: Study, count: int = 6, progress: Callable[[str, str, floa
     for name in names:
         if progress:
             progress(study.stem, name, 0.0)
-        with study.text.places.at("material" if study.problem.body.density is None else "models", name):
+        with study.text.places.at(*(("material",) if study.problem.body.density is None else ("models", name))):
             found[name] = modes(study.problem, study.entries[name], count + _FURTHER, study.solver.linear)
         if progress:
             progress(study.stem, name, 1.0)
