@@ -91,7 +91,7 @@ def momenta(path: ts.Solution) -> tuple[np.ndarray, np.ndarray]:
     return linear, angular
 
 
-@pytest.mark.parametrize("damping", [0.0, 2e-3])
+@pytest.mark.parametrize("damping", [0.0, pytest.param(2e-3, marks=pytest.mark.verification)])
 @pytest.mark.parametrize("model", MODELS)
 def test_a_free_body_keeps_its_momenta(model: str, damping: float) -> None:
     """A body that was spun by a moment and pulled for a while flies on freely; damping by the material keeps both."""
@@ -275,6 +275,7 @@ def test_runs_repeat_bit_for_bit() -> None:
     assert all((a.positions == b.positions).all() for a, b in zip(one.states, other.states, strict=True))
 
 
+@pytest.mark.verification
 def test_an_automatic_step_keeps_its_accuracy() -> None:
     model = ts.Springs("gaussian")
     truth = cantilever(model, ts.Dynamics(0.2, step=2e-4, scheme="midpoint", record=0.02), -2e-3)

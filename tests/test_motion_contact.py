@@ -1,0 +1,91 @@
+"""Contact and friction in motion: a block on an incline, and a body that falls on a plane."""
+
+import numpy as np
+import pytest
+
+import truespring as ts
+
+G = 9.81
+LONG = pytest.mark.verification
+
+
+def sliding(angle: float, friction: float, length: float, scheme: str = "bdf2", n: int = 60) -> ts.Solution:
+    """A block on an incline, its axes along and normal to it, let go from rest; damped by its material."""
+    time = np.sqrt(length / G)
+    slope = np.radians(angle)
+    problem = ts.Problem(
+        ts.rectangle((length, length / 2), (2, 1)),
+        ts.Material(1e6 * length, 0.3, density=1000.0),
+        ts.PlaneStress(length),
+        loads=[ts.Gravity((G * np.sin(slope), -G * np.cos(slope)))],
+        tools=[ts.HalfSpace("ground", (0.0, 1.0), [(0, 0, 0), (1.2 * time, 0, 0)], friction=friction)],
+        dynamics=ts.Dynamics(
+            1.2 * time,
+            step=1.2 * time / n,
+            scheme=scheme,
+            record=0.2 * time,
+            damping=ts.Damping(stiffness=0.02 * time),
+        ),
+    )
+    path = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(tolerance=1e-8))
+    assert path.status is ts.Status.CONVERGED
+    return path
+
+
+def speed(state: ts.State) -> float:
+    """The mean speed down the incline."""
+    return float(state.moving.velocity[:, 0].mean())
+
+
+@pytest.mark.parametrize(
+    ("angle", "friction", "length"),
+    [(30, 0.4, 1e-3), pytest.param(30, 0.4, 1.0, marks=LONG), (30, 0.0, 1.0), pytest.param(30, 0.0, 1e-3, marks=LONG)],
+)
+def test_a_block_slides_down_an_incline(angle: float, friction: float, length: float) -> None:
+    """The acceleration is g (sin - mu cos), on all scales."""
+    path = sliding(angle, friction, length)
+    (before, after) = path.states[-3], path.states[-1]
+    found = (speed(after) - speed(before)) / (after.moving.time - before.moving.time)
+    slope = np.radians(angle)
+    assert found == pytest.approx(G * (np.sin(slope) - friction * np.cos(slope)), rel=5e-3)
+    force = after.touches[0].force
+    assert -force[1] == pytest.approx(path.problem.mass.sum() * G * np.cos(slope), rel=5e-3)
+    assert force[0] == pytest.approx(-friction * force[1], rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("length", [1.0, pytest.param(1e-3, marks=LONG)])
+def test_a_block_sticks_to_an_incline(length: float) -> None:
+    """It creeps with at most the speed of the regularisation, 0.001 sqrt(g L), where tan(angle) < mu."""
+    path = sliding(20, 0.5, length)
+    bottom = path.problem.mesh.nodes[:, 1] == 0
+    before, after = path.states[-3], path.states[-1]
+    crept = (after.displacement - before.displacement)[bottom, 0].mean() / (after.moving.time - before.moving.time)
+    assert 0 < crept < 1e-3 * np.sqrt(G * length * np.hypot(1, 0.5))
+
+
+@pytest.mark.parametrize(("scheme", "n"), [pytest.param("midpoint", 320, marks=LONG), ("leapfrog", 640)])
+def test_a_body_falls_on_a_plane_and_keeps_its_energy(scheme: str, n: int) -> None:
+    """Kinetic and elastic energy, loads and contact keep their sum to 1e-3 m g h; the defect falls with the step."""
+    size, drop, young, duration = 0.1, 0.05, 2e4, 0.16
+
+    def defect(n: int) -> float:
+        ground = ts.HalfSpace("ground", (0.0, 1.0), [(0, 0, -drop), (duration, 0, -drop)], stiffness=10 * young / size)
+        problem = ts.Problem(
+            ts.rectangle((size, size), (2, 2)),
+            ts.Material(young, 0.3, density=1000.0),
+            ts.PlaneStress(size),
+            loads=[ts.Gravity((0.0, -G))],
+            tools=[ground],
+            dynamics=ts.Dynamics(duration, step=duration / n, scheme=scheme, record=duration / 40),
+        )
+        path = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(tolerance=1e-10))
+        fallen = problem.mass.sum() * G * drop
+        kept = [state.moving.energies for state in path.states]
+        assert max(one.contact for one in kept) > 0.05 * fallen  # it touches
+        assert path.states[-1].displacement[:, 1].mean() > -0.9 * drop  # and rebounds
+        total = np.array([one.total for one in kept])
+        return float(np.abs(total - total[0]).max()) / fallen
+
+    coarse, fine = defect(n), defect(2 * n)
+    assert fine < 1e-3
+    assert fine < coarse / 3
