@@ -235,7 +235,10 @@ def test_a_plane_compresses_a_block_as_two_springs_in_series(dim: int) -> None:
     assert touch.place[1] == pytest.approx(0.03 - way)
     first = solution.states[3]  # the plate does not touch yet
     assert not solution.applied_force(first).any()
+    assert (first.iterations, first.residual) == (0, 0)
     assert solution.states[4].displacement[:, 1].min() < 0
+    assert not any(state.snapped for state in solution.states)
+    assert not [warning for warning in solution.warnings if "linear" not in warning]
 
 
 @pytest.mark.parametrize("model", [ts.Fem("neo-hookean"), ts.Springs("gaussian")])

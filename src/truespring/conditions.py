@@ -213,9 +213,14 @@ class Loading:
         found = {corner for part in self.parts for corner in part.amplitude.corners}
         return tuple(sorted(found.union(*(one.corners for one in self.interactions))))
 
-    def vanishes(self, level: float) -> bool:
-        """Return whether no load acts at a level, and no prescribed motion."""
-        return not self.interactions and all(one._idle or one.amplitude.at(level) == 0 for one in self.parts)
+    def vanishes(self, level: float, positions: Floats | None = None) -> bool:
+        """Return whether no load acts at a level, and no prescribed motion.
+
+        Tools and grasps count as loads, unless they exert no force at `positions` [m], shape (n_nodes, dim).
+        """
+        if not all(one._idle or one.amplitude.at(level) == 0 for one in self.parts):
+            return False
+        return not any(positions is None or one.gradient(positions, level).any() for one in self.interactions)
 
     @property
     def _idle(self) -> bool:

@@ -243,7 +243,7 @@ class Balance:
 
     def _stable_at_rest(self, state: Equilibrium) -> bool:
         """Return whether a state is the undeformed one without load, and the potential knows that it is stable."""
-        at_rest = self.loading.vanishes(state.load_factor) and state.positions is self.potential.nodes
+        at_rest = state.positions is self.potential.nodes and self.loading.vanishes(state.load_factor, state.positions)
         return at_rest and isinstance(self.potential, Unstressed) and self.potential.semidefinite_at_rest
 
     def ready(self, matrix: SparseMatrix, positions: Floats) -> Tangent:
@@ -317,7 +317,7 @@ class Watch:
         self.residual = np.inf
         #: Whether the unbalanced force is below rounding errors.
         self.below_rounding = False
-        self._size, self._scale, self._size_before = np.inf, 0.0, np.inf
+        self._size, self._scale, self._size_before, self._noise = np.inf, 0.0, np.inf, False
         self._here, self._best_size = self.best, np.inf
 
     def at(self, positions: Floats, iteration: int, held_moved: bool = True) -> bool:
@@ -361,17 +361,21 @@ class Watch:
         """
         below = self._size <= self._balance.rounding(tangent, positions)
         self.below_rounding = below and self.residual <= _NEAR_BEST * self.best.residual
-        unloaded = self._balance.loading.vanishes(self.load_factor)
-        noise = self.below_rounding and (unloaded or self._size > self._size_before / 2)
+        unloaded = self._balance.loading.vanishes(self.load_factor, positions)
+        self._noise = unloaded and self.below_rounding
+        noise = self._noise or (self.below_rounding and self._size > self._size_before / 2)
         self._size_before = self._size if self.below_rounding else np.inf
         return noise or self.within_tolerance
 
     def equilibrium(self) -> Found:
         """Return the last state evaluated, or an earlier one of less unbalanced force, as converged.
 
-        Compares forces, not residuals: if all forces vanish, as in a body moved as a whole, their ratio is noise.
+        Compares forces, not residuals: if all forces vanish, as in a body moved as a whole, their ratio is noise. Where
+        nothing acts the residual is zero.
         """
         state = self.best if self._best_size < self._size else self._here
+        if self._noise:
+            state = replace(state, residual=0.0)
         energy = self._balance.potential.energy(state.positions)
         self._balance.spent += state.iterations
         touches = self._balance.loading.touches(state.positions, state.load_factor)

@@ -94,6 +94,8 @@ class Newton(Solver):
             level = self._next_level(last.state.load_factor, step, loading.corners)
             if previous is not None and any(previous.load_factor < one < level - _SAME for one in loading.corners):
                 previous = None  # the motion before a corner of a history says nothing about that after it
+            if loading.vanishes(last.state.load_factor, last.state.positions):
+                previous = None  # nor that before a tool touches the body
             balance.loading = loading.since(last.state.positions, last.state.load_factor, _CREEP * balance.size)
             reached = _settled(balance, level, self._find(balance, level, last, previous, admissible, jump))
             spent += reached.state.iterations
