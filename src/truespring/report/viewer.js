@@ -1,4 +1,4 @@
-// Draws the model over a reference at each load level. Plain JavaScript without library or network access.
+// Draws the model over a reference at each load level, or over time. Plain JavaScript without library or network access.
 // Bodies in 3D are drawn by truespringScene of scene.min.js.
 "use strict";
 (() => {
@@ -66,7 +66,7 @@
 
     function run() {
       const last = model.levels.length - 1, from = Number(slider.value) >= last ? 0 : Number(slider.value);
-      const began = performance.now(), pace = Math.max(120, 3000 / Math.max(last, 1)); // ms per level
+      const began = performance.now(), pace = Math.max(data.axis.moves ? 30 : 120, 3000 / Math.max(last, 1)); // ms per level
       play.textContent = "Pause";
       const step = (now) => {
         const at = Math.min(last, from + Math.max(0, now - began) / pace);
@@ -113,7 +113,8 @@
     }
 
     function write(level, gone) {
-      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
+      const { name, unit, span } = data.axis;
+      const parts = [`${name} <b>${+(span * model.levels[level]).toPrecision(4)}${unit && " " + unit}</b>`];
       const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
       // Under loads the force is the same for all paths; under a prescribed motion it is not.
       const state = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
@@ -125,7 +126,7 @@
         if (gone) parts.push("the reference leaves the picture");
         if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
         if (other >= 0 && level && reference.most && reference.most[other]) parts.push(`at most <b>${reference.most[other]}</b>`);
-        if (other < 0 && level) parts.push(surface(level) ? "outline only" : "the reference has no result at this level");
+        if (other < 0 && level) parts.push(surface(level) ? "outline only" : `the reference has no result at this ${data.axis.level}`);
       }
       readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
     }

@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.equilibrium import Solution, State
+from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
 from truespring.report.quantity import natural_scale, percent, quantity, times
@@ -35,11 +36,13 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
     extent = upper - lower
     pack = Packing(lower, float(extent.max()), nodes, mesh.n_nodes)
     scale = natural_scale(float(extent.max()), "m")
+    axis = axis_of(result)
     closest = shown.index(result.closest) - 1 if result.closest in shown else 0
     values = {
         "magnified": f"displacements {times(factor)}" if factor != 1 else "",
         "motion": result.problem.stated and not result.problem.loads,
         "unit": scale.unit,
+        "axis": {"name": axis.name, "unit": axis.unit, "span": axis.span, "level": axis.level, "moves": axis.moves},
         "box": [float(value) for value in extent / scale.size],
         "n_nodes": len(nodes),
         "probe": pack.number(result.probe),

@@ -17,7 +17,8 @@ def cause_sentence(result: Result) -> str | None:
     """Return whether the distance to the nearest nonlinear FEM grows with the load or exists from the first level.
 
     A distance at the first level is one of stiffness: moduli, bending, elements. A distance that grows is one of the
-    response of springs and law to large strain. None without nonlinear FEM, without springs, and where the two agree.
+    response of springs and law to large strain. None without nonlinear FEM, without springs, where the two agree, and
+    where the load does not only grow.
     """
     nonlinear = {
         name: one
@@ -25,6 +26,7 @@ def cause_sentence(result: Result) -> str | None:
         if one.reference.element is not None
         and one.reference.finite
         and one.load_factors.size > 1
+        and not one.over_the_way
         and one.rms_errors[-1] > _NO_CAUSE
     }
     if not nonlinear or result.model is None or not result.paths[result.model].has_springs:
