@@ -175,6 +175,7 @@ def test_the_verdict_names_the_largest_error_and_what_reduces_it(
     sentences = verdict_sentences(found)
     (largest,) = [one for one in sentences if "largest error" in one]
     assert in_order(largest, f"The {parts[0]} is the largest", *parts[1:])
+    assert largest.casefold().count(f"the {parts[0]}") == 1
     (listed,) = [one for one in sentences if one.startswith("Errors over the whole motion of 0.4 s: model")]
     shown = [round(100 * value) for value in (model, step, solver)]
     assert [round(float(one)) for one in re.findall(r"([\d.]+) % \(", listed)] == shown

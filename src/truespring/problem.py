@@ -266,6 +266,10 @@ class Problem:
         """The duration of the motion [s], None at rest."""
         return None if self.dynamics is None else self.dynamics.duration
 
+    def where(self, level: float) -> str:
+        """Return a level in words, for messages: "load factor 0.4", in a motion "0.16 s"."""
+        return f"load factor {level:.6g}" if self.duration is None else f"{level * self.duration:.6g} s"
+
     @property
     def returns(self) -> bool:
         """Whether displacements may return to zero on the way: in a motion, and with histories."""

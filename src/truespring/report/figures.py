@@ -116,7 +116,7 @@ def _reels(result: Result) -> dict[str, Reel]:
     """
     if not (result.problem.stated and result.problem.returns):
         return {}
-    names = list(result.comparisons) or [shown_reference(result)]
+    names: list[str | None] = [*result.comparisons] or [shown_reference(result)]
     found = {film_name(result, name or ""): reel_of(result, name, INSTANTS, from_rest=False) for name in names}
     return {name: reel for name, reel in found.items() if reel is not None}
 

@@ -25,9 +25,9 @@ from truespring.report.touching import draw_tools, drawn_tools, entries, near, v
 from truespring.report.words import draw_words
 
 _DASHES = (0, (3, 2))
-# Instants of a strip; largest width and height of a sheet, margin, height of a line of text [inch].
+# Instants of a strip; smallest width of a sheet, largest width and height, margin, height of a line of text [inch].
 INSTANTS = 6
-_WIDTH, _HEIGHT, _SIDE, _ROW = 7.0, 6.4, 0.12, 0.19
+_NARROW, _WIDTH, _HEIGHT, _SIDE, _ROW = 4.6, 7.0, 6.4, 0.12, 0.19
 # Resolution of images in space [pixels/inch].
 _DPI = 150
 
@@ -160,13 +160,13 @@ def sheet_of(reel: Reel, levels: Sequence[float], images: Sequence[Image], title
     """Return a sheet with a picture of each level; `images` from `shots`, none in the plane."""
     at = _layout(reel, len(levels))
     legend = _legend(reel)
-    columns, _ = legend_columns(legend, max(_WIDTH - 2 * _SIDE, at.width))
+    width = at.columns * (at.width + _SIDE) + _SIDE
+    columns, wide = legend_columns(legend, max(width, _NARROW) - 2 * _SIDE)
     remarks = [f"displacements {times(reel.factor)}"] if reel.factor != 1 else []
     remarks += ["the reference leaves the picture"] if reel.leaves else []
     words = [(title, INK, True)] * bool(title) + [(" · ".join(remarks), LOAD, False)] * bool(remarks)
     head = 0.1 + ROW * (len(words) + len(columns[0]))
-    width = at.columns * (at.width + _SIDE) + _SIDE
-    sheet = Sheet(max(width, 4.6), head + at.rows * (at.height + _ROW) + 0.3, title)
+    sheet = Sheet(max(width, _NARROW, wide + 2 * _SIDE), head + at.rows * (at.height + _ROW) + 0.3, title)
     for row, (text, color, bold) in enumerate(words):
         draw_words(sheet, _SIDE, sheet.height - 0.14 - ROW * row, text, 9 if bold else 8, color, bold=bold)
     draw_legend(sheet, columns, _SIDE, sheet.height - head + ROW * len(columns[0]))

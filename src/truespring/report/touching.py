@@ -16,7 +16,7 @@ from truespring.report.style import MOTION
 from truespring.report.surfaces import normals, outline, seen
 
 # Colour of surfaces, width of lines [points], and how far around the body tools are shown, over its size.
-_SURFACE, _WIDTH, _AROUND = "#8fc7b4", 1.3, 0.35
+_SURFACE, _WIDTH, _AROUND = "#8fc7b4", 1.1, 0.35
 _LIGHT = np.array([-0.3, 0.6, 0.74]) / np.linalg.norm([-0.3, 0.6, 0.74])
 
 

@@ -2,7 +2,7 @@
 // Bodies in 3D are drawn by truespringScene of scene.min.js.
 "use strict";
 (() => {
-  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7";
+  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GREEN = "#00795a";
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
@@ -25,8 +25,11 @@
         ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
       },
     }));
+    const tools = data.tools.map((tool) => ({
+      ...tool, lines: pairs(tool.lines), positions: tool.positions.map((text) => places(text, true)),
+    }));
     return {
-      ...data, paths, rest: places(data.rest), outline: pairs(data.outline),
+      ...data, paths, tools, rest: places(data.rest), outline: pairs(data.outline),
       triangles: pairs(data.triangles), edges: pairs(data.edges),
     };
   }
@@ -101,6 +104,7 @@
       if (!canvas.parentElement.clientWidth) return;
       const shown = {
         level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
+        tools: data.tools.map((tool) => ({ lines: tool.lines, points: at(tool, place) })),
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
       };
       paint(shown);
@@ -136,7 +140,7 @@
   function plane(canvas, data) {
     const context = canvas.getContext("2d"), model = data.paths[0];
 
-    return ({ level, reference, outline, mine, theirs, ticked }) => {
+    return ({ level, reference, outline, mine, theirs, tools, ticked }) => {
       const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
       const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
       const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
@@ -181,6 +185,7 @@
       if (outline) stroke(outline.points, outline.lines, INK, 1.8);
       else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
       stroke(mine, model.lines, BLUE, 1);
+      for (const tool of tools) stroke(tool.points, tool.lines, GREEN, 1.6);
       if (theirs && ticked.length) {
         const same = new Uint32Array(2 * data.n_nodes);
         for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;

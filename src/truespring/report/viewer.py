@@ -14,6 +14,7 @@ from truespring.report.quantity import natural_scale, percent, quantity, times
 from truespring.report.result import Result
 from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
 from truespring.report.style import full_name
+from truespring.report.touching import Drawn, drawn_tools, near
 from truespring.report.verdict import drive
 
 
@@ -32,7 +33,10 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         return None
     factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
     first, *others = (_cloud(result.paths[name], factor) for name in shown)
-    lower, upper, leaves = picture_box(np.concatenate([mesh.nodes, first]), others)
+    tools = [drawn_tools(result.problem, level) for level in levels] if mesh.dim == 2 else []
+    inside = np.concatenate([mesh.nodes, first])
+    around = [near(several, inside.min(axis=0), inside.max(axis=0)) for several in tools]
+    lower, upper, leaves = picture_box(np.concatenate([inside, *around]), others)
     extent = upper - lower
     pack = Packing(lower, float(extent.max()), nodes, mesh.n_nodes)
     scale = natural_scale(float(extent.max()), "m")
@@ -53,6 +57,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
             _path(result, name, levels, pack, factor, beyond)
             for name, beyond in zip(shown, [False, *leaves], strict=True)
         ],
+        "tools": [_tool(several, levels, pack) for several in zip(*tools, strict=True)],
     }
     return {**values, **surface_in_scene(mesh, pack)} if mesh.dim == 3 else values
 
@@ -64,6 +69,12 @@ def _shown(result: Result) -> list[str]:
     shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
     shown = [name for name in shown if result.paths[name].states or _only_surface(result.paths[name])]
     return shown if shown and shown[0] == names[0] else []
+
+
+def _tool(several: Sequence[Drawn], levels: Sequence[float], pack: Packing) -> dict[str, Any]:
+    """Return the outline of a tool of a plane body at each level."""
+    places = [pack.points(one.points, beyond=True) for one in several]
+    return {"levels": list(levels), "positions": places, "lines": pack.numbers(several[0].lines)}
 
 
 def _only_surface(path: Solution) -> bool:

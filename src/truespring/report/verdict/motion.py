@@ -34,7 +34,7 @@ def _largest_sentence(result: Result, most: Part) -> str:
     who, error = _SUBJECTS[most.name], percent(most.value or 0.0)
     if (most.value or 0.0) < result.tolerance:
         return f"{who} is the largest error of the motion, {error}, below {tolerance_percent(result.tolerance)}."
-    above = [one for one in parts_of(result) if one is not most and (one.value or 0.0) >= result.tolerance]
+    above = [one for one in parts_of(result) if one.name != most.name and (one.value or 0.0) >= result.tolerance]
     others = listed([f"{_SUBJECTS[one.name]}, {part_words(one)}," for one in above]) if above else ""
     limit = tolerance_percent(result.tolerance)
     further = f"; {others} {'are' if len(above) > 1 else 'is'} above {limit}, too" if above else ""
