@@ -54,8 +54,8 @@ def planned(body: Body, dynamics: Dynamics) -> Plan:
                 raise ProblemError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
             if not stable:
                 raise ProblemError(
-                    "leapfrog has no stable step with friction or a barrier: use euler, bdf2 or midpoint, or tools with "
-                    'contact = "penalty" and without friction'
+                    "leapfrog has no stable step with friction or a barrier: use euler, bdf2 or midpoint, or tools "
+                    'with contact = "penalty" and without friction'
                 )
             if isinstance(step, int | float) and step > stable and dynamics.scheme == "leapfrog":
                 raise ProblemError(
