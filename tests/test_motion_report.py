@@ -19,7 +19,7 @@ from tests.wording import in_order
 from truespring.cli import main
 from truespring.dynamics import Energies, Moving
 from truespring.report.animation import NO_VIDEO, write_animation
-from truespring.report.axis import axis_of
+from truespring.report.axis import axis_of, history_words
 from truespring.report.figures import draw_figures
 from truespring.report.page import render_page
 from truespring.report.result import MotionErrors, Result
@@ -28,6 +28,7 @@ from truespring.report.tables import result_tables
 from truespring.report.timelines import energies_figure
 from truespring.report.touching import drawn_tools
 from truespring.report.verdict import verdict, verdict_sentences
+from truespring.report.viewer import viewer
 from truespring.tools import TOOLS, Tool
 
 __all__ = ["page_of"]  # a fixture
@@ -337,5 +338,22 @@ def test_the_verb_writes_an_animation(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_a_page_shows_the_film_and_the_energies() -> None:
     page = render_page([result(0.02, MotionErrors(0.3, 0.0))], None)
-    for words_of in ("Film strip", "Over time", "Energies of springs", "Separate errors of the motion", "largest"):
+    for words_of in ("Film strip", "Over time", "Energies of springs", "Separate errors over the whole", "largest"):
         assert words_of in page
+
+
+def test_a_history_is_listed_with_its_load() -> None:
+    rows = [[0, 0], [0.05, 1], [0.1, 0]]
+    moving = problem(dynamics=ts.Dynamics(0.4, 0.01), over=rows)
+    assert history_words(moving, rows) == ", times 0 at 0 s, 1 at 0.05 s, 0 at 0.1 s"
+    assert history_words(problem(over=rows), rows) == ", times 0 at 0, 1 at 0.05, 0 at 0.1 of the way"
+    assert (
+        history_words(moving, None) == "" and history_words(moving, [[k, k % 2] for k in range(9)]).count(" at ") == 5
+    )
+
+
+def test_an_unloaded_end_is_not_the_first_view() -> None:
+    data = viewer(result(0.1), 10_000)
+    assert data is not None
+    assert data["start"] == 5 and data["axis"]["unit"] == "s"  # a quarter of the period
+    assert data["paths"][0]["moved"][0] == data["paths"][0]["moved"][-1] == "0 m"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truespring.errors import one_line
 from truespring.report.frame import EDGE
 from truespring.report.reel import Reel, reel_of, sheet_of, shots, shown_reference
 from truespring.report.render import render, rgb
@@ -17,10 +18,10 @@ from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, RED, figure_
 if TYPE_CHECKING:
     from PIL import Image
 
-# Opacities of lines in a GIF, at whose edges colours fade, and number of its further colours.
-_SHADES, _COLORS = (1.0, 0.7, 0.4, 0.2), 24
+# Opacities of lines in a GIF, whose edges fade, and number of its further colours, in the plane and in space.
+_SHADES, _COLORS = (1.0, 0.65, 0.3), {2: 8, 3: 32}
 # Frames, resolution [pixels/inch], duration of all frames [s], shortest and longest of a frame [ms].
-FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 90, 4.0, 40, 400
+FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 80, 4.0, 40, 400
 
 #: What is missing for animation.mp4.
 NO_VIDEO = "no animation.mp4: it needs imageio-ffmpeg: pip install 'truespring[video]'"
@@ -36,10 +37,15 @@ def write_animation(result: Result, folder: Path) -> str:
         return "no animation: fewer than two levels are known"
     frames = _frames(reel)
     pause = int(np.clip(1000 * _LASTS / len(frames), _SHORTEST, _LONGEST)) // 10 * 10  # a GIF counts 10 ms
-    _write_gif(frames, folder / "animation.gif", pause)
+    _write_gif(frames, folder / "animation.gif", pause, _COLORS[reel.mesh.dim])
     if importlib.util.find_spec("imageio_ffmpeg") is None:
         return NO_VIDEO
-    _write_mp4(frames, folder / "animation.mp4", 1000 / pause)
+    film = folder / "animation.mp4"
+    try:
+        _write_mp4(frames, film, 1000 / pause)
+    except (OSError, RuntimeError) as error:  # its program ffmpeg is missing, or failed
+        film.unlink(missing_ok=True)
+        return f"no animation.mp4: ffmpeg failed: {one_line(str(error))}"
     return ""
 
 
@@ -57,25 +63,25 @@ def _drawn(reel: Reel, images: list[Any]) -> Iterator[NDArray[np.uint8]]:
         yield np.ascontiguousarray(pixels[:height, :width])
 
 
-def _write_gif(frames: list[NDArray[np.uint8]], file: Path, pause: int) -> None:
-    """Write frames of `pause` [ms] each; the last one stays longer."""
+def _write_gif(frames: list[NDArray[np.uint8]], file: Path, pause: int, colors: int) -> None:
+    """Write frames of `pause` [ms] each; the last one stays longer. `colors` beyond those of lines are kept."""
     from PIL import Image
 
-    palette = _palette(frames[len(frames) // 2])
+    palette = _palette(frames[len(frames) // 2], colors)
     first, *others = [Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
     pauses = [pause] * (len(frames) - 1) + [max(pause, 800)]
     first.save(file, save_all=True, append_images=others, duration=pauses, loop=0, optimize=True)
 
 
-def _palette(frame: NDArray[np.uint8]) -> "Image.Image":
-    """Return one palette for all frames: the colours of lines, fading to white, and the commonest ones of a frame."""
+def _palette(frame: NDArray[np.uint8], colors: int) -> "Image.Image":
+    """Return one palette for all frames: colours of lines, fading to white, and the `colors` commonest of a frame."""
     from PIL import Image
 
     lines = np.array([255 * rgb(color) for color in (INK, BLUE, RED, LOAD, MOTION, FAINT, EDGE)])
     faded = [255 - share * (255 - lines) for share in _SHADES]
-    common = Image.fromarray(frame).quantize(_COLORS, dither=Image.Dither.NONE).getpalette() or []
+    common = Image.fromarray(frame).quantize(colors, dither=Image.Dither.NONE).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette([255, 255, 255, *np.rint(np.ravel(faded)).astype(int).tolist(), *common[: 3 * _COLORS]])
+    palette.putpalette([255, 255, 255, *np.rint(np.ravel(faded)).astype(int).tolist(), *common[: 3 * colors]])
     return palette
 
 

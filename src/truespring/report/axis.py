@@ -4,8 +4,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from truespring.arrays import Floats
+from truespring.loading import History
+from truespring.problem import Problem
 from truespring.report.quantity import Scale
 from truespring.report.result import Result
+
+# Rows of a history that are listed.
+_MOST_ROWS = 6
 
 _Number = TypeVar("_Number", float, Floats)
 
@@ -86,6 +91,21 @@ def driven_by_motion(result: Result) -> bool:
     return result.problem.stated and result.problem.loading.driven_by_motion
 
 
+def history_words(problem: Problem, over: History | None) -> str:
+    """Return the shares of a load or support along the way, as the end of a clause; empty without a history."""
+    if over is None:
+        return ""
+    if problem.duration is None:
+        rows = [f"{share:g} at {place:g}" for place, share in over]
+        where = " of the way"
+    else:
+        scale = time_scale(problem.duration)
+        rows = [f"{share:g} at {place / scale.size:g} {scale.unit}" for place, share in over]
+        where = ""
+    shown = rows if len(rows) <= _MOST_ROWS else [*rows[: _MOST_ROWS - 2], "...", rows[-1]]
+    return f", times {', '.join(shown)}{where}"
+
+
 def time_scale(duration: float) -> Scale:
     """Return the unit in which times up to `duration` [s] are written: seconds from 0.1 s on."""
     units = (Scale(1.0, "s"), Scale(1e-3, "ms"))
@@ -109,7 +129,7 @@ def _way(at_full: str, up_to_full: str) -> Axis:
         "share of the way",
         "",
         1.0,
-        "place on the way",
+        "share of the way",
         "the end of the way",
         at_full,
         up_to_full,

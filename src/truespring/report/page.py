@@ -14,7 +14,7 @@ from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
 from truespring.potential import Noted
 from truespring.problem import Problem, Region
-from truespring.report.axis import Axis, axis_of
+from truespring.report.axis import Axis, axis_of, history_words
 from truespring.report.figures import distance_name, energies_name, film_name, over_name, render_figures
 from truespring.report.parts import part_rows
 from truespring.report.quantity import input_quantity, percent, quantity, significant, tolerance_percent
@@ -183,8 +183,9 @@ def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
     """Return each support and load, the total force, and the largest prescribed motion."""
     if not problem.stated:
         return [("loads and supports", "not in the file")]
-    facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
-    facts += [("load", load.words()) for load in problem.loads]
+    supports = [support.words(problem.mesh.dim) + history_words(problem, support.over) for support in problem.supports]
+    facts = [("support", words) for words in supports]
+    facts += [("load", load.words() + history_words(problem, load.over)) for load in problem.loads]
     facts += [("tool", tool.words()) for tool in problem.touching]
     loading = problem.loading.full
     forces = loading.force(problem.mesh.nodes)

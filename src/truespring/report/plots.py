@@ -83,7 +83,7 @@ def _is_balanced(result: Result) -> bool:
     if driven_by_motion(result):
         leading = [_of_leading(path, path.states[-1]) for path in result.paths.values() if path.states]
         return not any(one is not None and one.has_force for one in leading)
-    force = result.problem.loading.force(result.problem.mesh.nodes)
+    force = result.problem.loading.full.force(result.problem.mesh.nodes)
     return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
 
 

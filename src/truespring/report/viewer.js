@@ -44,12 +44,13 @@
     if (!paint) return instead(host);
     let reference = others[data.chosen] || null, playing = 0;
     slider.max = model.levels.length - 1;
-    slider.value = slider.max;
+    slider.value = data.start;
+    let chosen = false; // whether a level was chosen, from which to play
 
     for (const choice of host.querySelectorAll("input[type=radio]")) {
       choice.addEventListener("change", () => { reference = others[Number(choice.value)]; draw(); });
     }
-    slider.addEventListener("input", () => { stop(); draw(); });
+    slider.addEventListener("input", () => { chosen = true; stop(); draw(); });
     for (const box of boxes) box.addEventListener("change", () => draw());
     play.addEventListener("click", () => (playing ? stop() : run()));
     let width = 0, asked = 0;
@@ -68,7 +69,8 @@
     }
 
     function run() {
-      const last = model.levels.length - 1, from = Number(slider.value) >= last ? 0 : Number(slider.value);
+      const last = model.levels.length - 1, from = !chosen || Number(slider.value) >= last ? 0 : Number(slider.value);
+      chosen = true;
       const began = performance.now(), pace = Math.max(data.axis.moves ? 30 : 120, 3000 / Math.max(last, 1)); // ms per level
       play.textContent = "Pause";
       const step = (now) => {

@@ -10,7 +10,7 @@ from truespring.equilibrium import Solution, State
 from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
-from truespring.report.quantity import natural_scale, percent, quantity, times
+from truespring.report.quantity import ROUNDING, natural_scale, percent, quantity, times
 from truespring.report.result import Result
 from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
 from truespring.report.style import full_name
@@ -51,6 +51,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         "n_nodes": len(nodes),
         "probe": pack.number(result.probe),
         "chosen": closest,
+        "start": _start(result.paths[shown[0]], levels),
         "rest": pack.places(mesh.nodes),
         "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
         "paths": [
@@ -69,6 +70,15 @@ def _shown(result: Result) -> list[str]:
     shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
     shown = [name for name in shown if result.paths[name].states or _only_surface(result.paths[name])]
     return shown if shown and shown[0] == names[0] else []
+
+
+def _start(path: Solution, levels: Sequence[float]) -> int:
+    """Return the index of the level to show first: the last, or that of the largest displacement if it returns."""
+    if not path.problem.returns:
+        return len(levels) - 1
+    states = [path.at(level) for level in levels]
+    moved = [0.0 if one is None else float(np.linalg.norm(one.displacement, axis=1).max()) for one in states]
+    return int(np.argmax(moved))
 
 
 def _tool(several: Sequence[Drawn], levels: Sequence[float], pack: Packing) -> dict[str, Any]:
@@ -117,6 +127,7 @@ def _path(
     one = result.comparisons.get(name)
     known = dict(zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True)) if one else {}
     errors = [next((error for at, error in known.items() if abs(at - s.load_factor) < 1e-9), None) for s in states]
+    moved = [float(np.linalg.norm(state.displacement[result.probe])) for state in states]
     values: dict[str, Any] = {
         "name": name,
         "label": full_name(result, name),
@@ -125,7 +136,7 @@ def _path(
         "levels": [state.load_factor for state in states],
         "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
         "force": [_force(to.along(path.applied_force(state)), state) for state in states],
-        "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
+        "moved": [quantity(value if value > ROUNDING * max(moved) else 0.0, "m") for value in moved],
         "errors": [None if error is None or np.isnan(error) else percent(error) for error in errors],
         "surface": None,
     }
