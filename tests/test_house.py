@@ -135,6 +135,7 @@ ALLOWED = {
         "dynamics",
     },
     "report": {
+        "tools",
         "comparison",
         "support_errors",
         "refining",
@@ -383,6 +384,7 @@ def test_what_is_imported_is_a_declared_dependency() -> None:
     extras = project["optional-dependencies"]
     declared = [*project["dependencies"], *(one for name in extras.keys() - {"test"} for one in extras[name])]
     modules = {"scikit-fem": "skfem", "lazy-loader": "lazy_loader", "ansys-mapdl-reader": "ansys", "pillow": "PIL"}
+    modules |= {"imageio-ffmpeg": "imageio_ffmpeg"}
     names = [re.split("[<>=]", one)[0] for one in declared]
     allowed = {modules.get(name, name) for name in names} | {"truespring", *sys.stdlib_module_names}
     for files in rooms().values():

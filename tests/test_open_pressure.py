@@ -240,3 +240,58 @@ def test_petsc_is_an_error() -> None:
     problem = strip()
     with pytest.raises(ProblemError, match=r"linear = 'petsc': .*open surface.*multigrid"):
         choose("petsc", problem.mesh.nodes, problem.loading.held, symmetric=False)
+
+
+# --- motion -----------------------------------------------------------------------------------------------------------
+
+
+def beck(load: float) -> complex:
+    """Frequency of Beck's column of length, stiffness and mass 1, of the pair that meets at the load 20.05.
+
+    Root of the characteristic equation (Beck 1952; Bolotin 1963, 2.1) by the secant method, from between the first two
+    frequencies. An imaginary part is a rate of growth.
+    """
+
+    def residual(omega: complex) -> complex:
+        root = np.sqrt(load**2 / 4 + omega**2)
+        one, other = np.sqrt(load / 2 + root), np.sqrt(-load / 2 + root)
+        even = load**2 + 2 * omega**2 * (1 + np.cos(one) * np.cosh(other))
+        return complex(even + load * omega * np.sin(one) * np.sinh(other))
+
+    before, now = 10.0 + 4.0j, 10.0 + 5.0j
+    for _ in range(40):
+        if now == before or residual(now) == residual(before):
+            break
+        before, now = now, now - residual(now) * (now - before) / (residual(now) - residual(before))
+    assert abs(residual(now)) < 1e-9
+    return now
+
+
+@pytest.mark.verification
+def test_a_column_flutters_beyond_becks_load() -> None:
+    """Which no equilibrium shows: its growth and its frequency, by two terms of linear prediction; not below the load.
+
+    The column is stubby by a twentieth, and has 12 elements.
+    """
+    height, young, density, step = 0.05, 1e6, 1000.0, 0.04
+    bending = young * height**3 / 12
+    unit = np.sqrt(bending / (density * height))
+    mesh = ts.rectangle((1.0, height), (12, 1), "triangle")
+    tips = []
+    for load, duration in ((15.0, 2.4), (25.0, 3.2)):
+        motion = ts.Dynamics(duration, step, "midpoint", start="equilibrium", velocity=(0.0, 1e-6), record=step)
+        material, pressure = ts.Material(young, 0.0, density=density), ts.Pressure("right", load * bending / height)
+        problem = ts.Problem(mesh, material, ts.PlaneStress(1.0), ts.Fixed("left"), pressure, dynamics=motion)
+        path = ts.solve(problem, ts.Fem("saint-venant-kirchhoff"))
+        assert path.status is ts.Status.CONVERGED
+        end = mesh.nodes[:, 0] == 1.0
+        tips.append(np.array([float(state.displacement[end, 1].mean()) for state in path.states]))
+    bounded, growing = tips
+    third = len(bounded) // 3
+    assert np.abs(bounded[-third:]).max() < 2 * np.abs(bounded[:third]).max()
+    late = growing[len(growing) // 2 :]
+    terms = np.linalg.lstsq(np.stack([late[1:-1], late[:-2]], axis=1), late[2:], rcond=None)[0]
+    found = np.log(np.roots([1, *-terms]).astype(complex)[0]) / step / unit
+    expected = beck(25.0)
+    assert found.real == pytest.approx(abs(expected.imag), rel=0.05)
+    assert abs(found.imag) == pytest.approx(expected.real, rel=0.03)

@@ -388,6 +388,20 @@ def test_a_stiff_grasp_moves_its_patch_like_a_support(dim: int) -> None:
     assert not solution.applied_force(solution.states[0]).any()
 
 
+def test_a_grasp_holds_a_body_without_supports() -> None:
+    """Its springs bear the weight."""
+    mesh, heavy = body(3), ts.Material(YOUNG, POISSON, 1000.0)
+    grasp = ts.Grasp("forceps", (0.06, 0.015, 0.03), 0.015, [0.06, 0.015, 0.03], stiffness=1e3)
+    gravity = ts.Gravity((0, -1, 0))
+    solution = ts.solve(ts.Problem(mesh, heavy, loads=[gravity], grasps=[grasp]), ts.Fem("neo-hookean"))
+    assert solution.status == ts.Status.CONVERGED
+    weight = 1000 * 0.06 * 0.03 * 0.06
+    force = solution.problem.loading.interactions[0].touch(solution.states[-1].positions, 1.0).force
+    assert force == pytest.approx((0, -weight, 0), abs=1e-8 * weight)
+    with pytest.raises(ProblemError, match="free to move"):
+        ts.Problem(mesh, heavy, loads=[gravity], grasps=[replace(grasp, radius=1e-3)])
+
+
 def test_the_springs_of_a_grasp_share_its_stiffness() -> None:
     """On a body at rest the force is stiffness times motion; by default E times the radius, or the thickness."""
     for dim, stiffness in ((2, YOUNG * 0.01), (3, YOUNG * 0.012)):

@@ -183,14 +183,15 @@ class Comparison:
         return float(self.load_factors[beyond[0] - 1]) if beyond[0] else 0.0
 
     def __str__(self) -> str:
-        """Return the errors at full load in a sentence."""
+        """Return the errors at full load, or over the way, in a sentence."""
         if self.error is None:
             return f"{self.model.label} against {self.reference.label}: no error at full load is known"
         up_to = self.agrees_up_to_load_factor
         within = "" if up_to is None else f", within {self.tolerance:.0%} up to load factor {up_to:g}"
+        where = "over the whole way" if self.over_the_way else "at full load"
         found = [] if self.rms_error is None else [f"{self.rms_error:.1%} rms"]
         found += [] if self.force_error is None else [f"{self.force_error:.1%} in the supports' force or torque"]
-        return f"{self.model.label} against {self.reference.label}: {', '.join(found)} at full load{within}"
+        return f"{self.model.label} against {self.reference.label}: {', '.join(found)} {where}{within}"
 
 
 def compare(
@@ -297,13 +298,17 @@ def closest(comparisons: Mapping[str, Comparison]) -> str | None:
 def most_moved(path: Solution, among: Ints | None = None) -> int:
     """Return the number of the node that moves most at the last level, of all nodes or of those in `among`.
 
+    If displacements may return to zero, as in a motion, it is the node that moves most at any level.
+
     Of nodes that move equally, the one with the smallest coordinates (x first). Nodes prescribed in all directions
     count only if there are no others.
     """
     if not path.states:
         return 0
     prescribed = path.problem.loading.held.all(axis=1)
-    moved = np.linalg.norm(path.states[-1].displacement, axis=1) * (prescribed.all() | ~prescribed)
+    states = path.states if path.problem.returns else path.states[-1:]
+    moved = np.max([np.linalg.norm(state.displacement, axis=1) for state in states], axis=0)
+    moved *= prescribed.all() | ~prescribed
     if among is not None:
         others = np.ones(len(moved), dtype=bool)
         others[among] = False

@@ -85,6 +85,18 @@ class Dynamics:
         if not 0 < self.accuracy < 1:
             raise ProblemError(f"accuracy = {self.accuracy!r}: must be between 0 and 1")
 
+    def words(self) -> str:
+        """Return duration, scheme, step, damping and begin, for tables."""
+        step = "automatic step" if self.step == "auto" else f"step {self.step:g} s"
+        parts = [f"{self.duration:g} s by {self.scheme}, {step}"]
+        parts += [f"{self.iterations} iteration{'s' * (self.iterations != 1)} a step"] if self.iterations else []
+        parts += [f"damping {self.damping.stiffness:g} s by stiffness"] if self.damping.stiffness else []
+        parts += [f"damping {self.damping.mass:g} 1/s by mass"] if self.damping.mass else []
+        parts += ["from the equilibrium at time 0"] if self.start == "equilibrium" else []
+        if self.velocity is not None:
+            parts.append(f"velocity ({', '.join(f'{one:g}' for one in self.velocity)}) m/s at the begin")
+        return ", ".join(parts)
+
     def _check_positive(self, name: str, value: object) -> None:
         """Raise ProblemError if a value is not a positive number."""
         if isinstance(value, bool) or not (isinstance(value, int | float) and math.isfinite(value) and value > 0):

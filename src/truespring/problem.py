@@ -266,6 +266,10 @@ class Problem:
         """The duration of the motion [s], None at rest."""
         return None if self.dynamics is None else self.dynamics.duration
 
+    def where(self, level: float) -> str:
+        """Return a level in words, for messages: "load factor 0.4", in a motion "0.16 s"."""
+        return f"load factor {level:.6g}" if self.duration is None else f"{level * self.duration:.6g} s"
+
     @property
     def returns(self) -> bool:
         """Whether displacements may return to zero on the way: in a motion, and with histories."""
@@ -336,12 +340,17 @@ class Problem:
             )
 
     def _check_rigid_motion(self) -> None:
-        """Raise ProblemError if supports do not prevent a rigid-body motion: no unique equilibrium would exist."""
-        parts = self.mesh.parts
+        """Raise ProblemError if supports and grasps do not prevent a rigid-body motion.
+
+        No unique equilibrium would exist.
+        """
+        parts, held = self.mesh.parts, self.loading.held.copy()
+        for grasp in self.loading.interactions[len(self.tools) :]:
+            held[grasp.largest_stiffness()[: len(held)] > 0] = True
         by_part = np.argsort(parts, kind="stable")
         several = np.split(by_part, np.flatnonzero(np.diff(parts[by_part])) + 1)
         for nodes in several:
-            free = _rigid_freedom(self.mesh.nodes[nodes], self.loading.held[nodes])
+            free = _rigid_freedom(self.mesh.nodes[nodes], held[nodes])
             if free is None:
                 continue
             body = "the body"

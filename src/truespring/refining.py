@@ -305,8 +305,9 @@ def _by_groups(problem: Problem) -> Problem:
 def _solve(finer: _Finer, coarse: Solution, solver: Solver, most_work: float, clock: "_Clock") -> Solution:
     """Solve a finer problem: from the coarse state, else or with friction from no load if the work allows."""
     problem = finer.problem()
-    # Starting from the coarse state saves the load steps and stays on the same branch.
-    nearby = None if problem.loading.dissipates else solver.starting_at(_carrying(coarse), _MOST_ITERATIONS)
+    # Starting from the coarse state saves the load steps and stays on the same branch; errors over the way need all.
+    whole = problem.loading.dissipates or problem.returns
+    nearby = None if whole else solver.starting_at(_carrying(coarse), _MOST_ITERATIONS)
     if nearby is not None:
         path = clock.solve(problem, finer.model, nearby)
         if _sound(path):

@@ -56,7 +56,7 @@ def path_warnings(
         why = _BELOW_ROUNDING if below_rounding else Status.NOT_CONVERGED.advice
         warnings.append(
             best.reason
-            or f"load factor {best.load_factor:.6g} was not reached (relative residual {best.residual:.1e}); "
+            or f"{problem.where(best.load_factor)} was not reached (relative residual {best.residual:.1e}); "
             f"last good load factor: {last}; {why}"
         )
     inverted = [state for state in states if state.area_ratio <= 0]
@@ -64,7 +64,7 @@ def path_warnings(
     if inverted:
         advice = "a linear model does not detect it" if not finite else Status.INVERTED.advice
         warnings.append(
-            f"inverted from load factor {inverted[0].load_factor:.6g} on "
+            f"inverted from {problem.where(inverted[0].load_factor)} on "
             f"(smallest {what} ratio {min(state.area_ratio for state in inverted):.3g}): {advice}"
         )
     for state in states:

@@ -21,6 +21,11 @@ def _add(parser: argparse.ArgumentParser) -> None:
     add_studies(parser)
     add_out(parser)
     add_timeout(parser)
+    parser.add_argument(
+        "--animate",
+        action="store_true",
+        help="also write animation.gif, and animation.mp4 if imageio-ffmpeg is installed (truespring[video])",
+    )
 
 
 def _run(options: argparse.Namespace, comparing: bool) -> int:
@@ -44,7 +49,10 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
             results.append(result)
             with writing(options.out):
                 (options.out / "report.html").unlink(missing_ok=True)  # a report of an earlier command
-                write_rest(result, output, verify_command([result], options.out) if comparing else None)
+                command = verify_command([result], options.out) if comparing else None
+                note = write_rest(result, output, command, options.animate)
+        if note and not options.quiet:
+            say(f"note: {study.stem}: {note}")
         if not screen.quiet:
             screen.print(f"{study.stem}: {verdict(result)}")
             print_moduli(screen, study.stem, realised_moduli(study), options.verbose)
@@ -79,9 +87,12 @@ def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
 
 def print_failures(result: "Result", out: Path, shown: bool) -> None:
     """Print on standard error which models did not converge and, unless `shown` before, their warnings."""
+    from truespring.equilibrium import FINE
+    from truespring.report.axis import axis_of
+
     for name, path in result.paths.items():
-        if str(path.status) not in ("converged", "read"):
-            reached = f"reached load factor {path.load_factor:.6g}, written to {out / result.stem}"
+        if path.status not in FINE:
+            reached = f"reached {axis_of(result).exact(path.load_factor)}, written to {out / result.stem}"
             say(f"{result.stem}: model '{name}' is {path.status}; {reached}")
             for warning in () if shown else path.warnings:
                 say(f"  {warning}")

@@ -84,13 +84,13 @@ class Load(ABC):
     def following(self, body: Body, held: Bools) -> Potential | None:
         """Return the potential, minus the work, of a load that follows the body; None for a dead load.
 
-        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim). Raises ProblemError if the
-        work of the load depends on the path.
+        `held` is true where a displacement of `body` is prescribed, shape (n_nodes, dim). A load whose work may depend
+        on the path returns an Unsymmetric, or raises ProblemError.
         """
         return None
 
     def rim(self, mesh: Mesh) -> Ints:
-        """Return the edges of the loaded surface that a load in 3D needs held, as node numbers, shape (n, 2)."""
+        """Return the edges of the loaded surface that give a load in 3D a potential if held, as nodes, shape (n, 2)."""
         return np.zeros((0, 2), dtype=np.int64)
 
     @abstractmethod
@@ -147,7 +147,7 @@ class FollowingLoad(Load):
 
     @abstractmethod
     def following(self, body: Body, held: Bools) -> Potential:
-        """Return the potential on `body`; raise ProblemError if the work of the load depends on the path."""
+        """Return the potential on `body`; an Unsymmetric, or a ProblemError, if the work may depend on the path."""
 
     def turned(self, rotation: Floats) -> Self:
         """Return the load itself: it turns with the body."""

@@ -21,15 +21,15 @@ def stable_step(body: Body) -> float:
 
     2 / omega of the highest frequency omega, shortened by the dashpots of the material, whose damping ratio there is
     xi = tau omega / 2, to 2 / omega (sqrt(1 + xi^2) - xi) (Belytschko, Liu, Moran, Nonlinear Finite Elements, 6.2).
-    Zero with friction, which is too stiff for an explicit scheme.
+    Zero with friction and barriers, which are too stiff for an explicit scheme.
     """
     from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-    if any(one.dissipates for one in body.loading.interactions):
+    nodes, interactions = body.potential.nodes, body.loading.interactions
+    touched = sum((one.largest_stiffness() for one in interactions), np.zeros(len(nodes)))
+    if any(one.dissipates for one in interactions) or not np.isfinite(touched).all():
         return 0.0
-    nodes = body.potential.nodes
     matrix = sparse.csr_array(body.potential.hessian(nodes))
-    touched = sum((one.largest_stiffness() for one in body.loading.interactions), np.zeros(len(nodes)))
     matrix = matrix + sparse.diags_array(np.repeat(touched, nodes.shape[1]))
     inverse = np.where(body.held, 0.0, 1 / np.sqrt(body.mass)[:, None]).ravel()
     scaled = sparse.csr_array(sparse.diags_array(inverse) @ matrix @ sparse.diags_array(inverse))

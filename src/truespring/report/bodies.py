@@ -22,6 +22,7 @@ from truespring.report.shades import draw_shaded, draw_shaded_dots
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, full_name
 from truespring.report.symbols import ROLLER, draw_dot, draw_drive, draw_loaded, draw_outside, draw_pin, find_arrows
+from truespring.report.touching import draw_tools, drawn_tools, entries, near
 from truespring.report.undeformed import Undeformed, spring_lines
 from truespring.report.verdict import display_name, level_name
 from truespring.report.words import draw_words, text_width
@@ -44,6 +45,8 @@ def path_lines(path: Solution) -> Ints:
 def magnification(result: Result) -> float:
     """Return the round factor by which displacements are magnified in figures; 1 unless they are too small to see."""
     mesh = result.problem.mesh
+    if result.problem.touching:  # tools are not magnified
+        return 1.0
     moved = [
         float(np.linalg.norm(state.displacement, axis=1).max())
         for path in result.paths.values()
@@ -133,7 +136,9 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         return None
     mesh = model.problem.mesh
     positions = rest + factor * mine.displacement
-    lower, upper, (leaves,) = picture_box(np.concatenate([rest, positions]), [points])
+    tools = drawn_tools(result.problem, level)
+    shown = near(tools, np.minimum(rest, positions).min(axis=0), np.maximum(rest, positions).max(axis=0))
+    lower, upper, (leaves,) = picture_box(np.concatenate([rest, positions, shown]), [points])
     margin = 0.04 * float((upper - lower).max())
     remarks = [f"displacements {times(factor)}"] if factor != 1 else []
     remarks += [f"{display_name(result, name)} leaves the picture"] if leaves else []
@@ -142,6 +147,7 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         Entry(full_name(result, name), INK),
         Entry("undeformed", FAINT, linestyle=(0, (3, 2))),
         Entry("probe", RED, "o", ""),
+        *entries(result.problem),
     ]
     title = over_title(result, level, comparison)
     area, scale = _body_figure(title, lower - margin, upper + margin, legend, " · ".join(remarks))
@@ -151,6 +157,7 @@ def over_figure(result: Result, name: str, comparison: Comparison) -> Sheet | No
         _lines(area, points / scale.size, inside, "#8b9299", 0.4, 2, "triangles")
     _lines(area, points / scale.size, lines, INK, 1.3, 3, "reference")
     _lines(area, positions / scale.size, path_lines(model), BLUE, 0.75, 4, "model")
+    draw_tools(area, tools, scale)
     for path, places, color in ((reference, points, INK), (model, positions, BLUE)):
         if path.is_cloud:
             draw_loaded(area, places / scale.size, color)
@@ -230,15 +237,18 @@ def undeformed_figure(body: Undeformed) -> Sheet:
     problem, springs = body.problem, body.springs
     mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
-    arrows = find_arrows(problem, size)
+    arrows, tools = find_arrows(problem, size), drawn_tools(problem, 0.0)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
+    ends = np.concatenate([ends, near(tools, mesh.lower, mesh.upper)])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    area, scale = _body_figure(body.title, lower, upper, body.legend(mesh.element != "line"))
+    legend = (*body.legend(mesh.element != "line"), *entries(problem))
+    area, scale = _body_figure(body.title, lower, upper, legend)
     if mesh.element != "line":
         _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
     if springs is not None:
         _lines(area, mesh.nodes / scale.size, springs, BLUE, 0.6, 3, "springs")
     _supports(area, problem, scale, 0.028 * size)
+    draw_tools(area, tools, scale)
     for arrow in arrows:
         draw_loaded(area, mesh.nodes[arrow.nodes] / scale.size, arrow.color)
         draw_drive(area, arrow, scale)

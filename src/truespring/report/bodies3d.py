@@ -10,6 +10,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.comparison import Comparison
+from truespring.equilibrium import Solution
 from truespring.problem import Problem
 from truespring.report.bar import Bar, bar_of
 from truespring.report.bodies import (
@@ -30,6 +31,7 @@ from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, f
 from truespring.report.supports3d import clamped_nodes, draw_supports
 from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, draw_outside, find_arrows
+from truespring.report.touching import drawn_tools, entries, near, with_tools
 from truespring.report.undeformed import Undeformed
 from truespring.report.verdict import display_name, level_name
 
@@ -53,7 +55,15 @@ def undeformed_picture(body: Undeformed) -> Picture:
         layers.append(_wires(points, facets, springs, 0.6))
     elif not len(facets):
         layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
-    taken = np.concatenate([_spots(points, facets, mesh.edges), *(np.stack([*one.ends, one.room]) for one in arrows)])
+    tools = drawn_tools(problem, 0.0)
+    corners = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    taken = np.concatenate(
+        [
+            _spots(points, facets, mesh.edges),
+            near(tools, *corners),
+            *(np.stack([*one.ends, one.room]) for one in arrows),
+        ]
+    )
 
     def marks(area: Area, scale: Scale) -> None:
         draw_supports(area, problem, scale, 0.028 * size)
@@ -65,7 +75,8 @@ def undeformed_picture(body: Undeformed) -> Picture:
             draw_dot(area, points[body.probe, :2] / scale.size)
 
     lower, upper = taken.min(axis=0) - 0.03 * size, taken.max(axis=0) + 0.03 * size
-    return Picture(body.title, "", body.legend(len(facets) > 0), lower, upper, taken, tuple(layers), marks)
+    legend = (*body.legend(len(facets) > 0), *entries(problem))
+    return Picture(body.title, "", legend, lower, upper, taken, with_tools(layers, tools), marks)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -111,22 +122,32 @@ def over_picture(result: Result, name: str, comparison: Comparison) -> Picture |
     pair = _pair(result, comparison)
     if pair is None:
         return None
-    mesh = comparison.model.problem.mesh
-    facets, lines = facets_of(mesh), path_lines(comparison.reference)
-    if len(facets):
-        black = solid(pair.theirs, facets, one_color(facets, _REFERENCE), lines, INK, 1.2)
-    else:
-        black = _wires(pair.theirs, facets, lines, 1.3, INK)
-    blue = _wires(pair.mine, facets, path_lines(comparison.model), 0.8)
+    layers = over_layers(comparison.model, pair.mine, comparison.reference, pair.theirs)
     legend = (
         Entry(full_name(result, result.model or ""), BLUE),
         Entry(full_name(result, name), INK),
         Entry("undeformed", FAINT, linestyle=_DASHES),
         Entry("probe", RED, "o", ""),
     )
-    return _pair_picture(
-        result, name, comparison, pair, over_title(result, pair.level, comparison), legend, (black, blue)
-    )
+    return _pair_picture(result, name, comparison, pair, over_title(result, pair.level, comparison), legend, layers)
+
+
+def over_layers(model: Solution, mine: Floats, reference: Solution | None, theirs: Floats | None) -> tuple[Layer, ...]:
+    """Return a model in blue over a reference in black, alone a white body with blue lines.
+
+    `mine` and `theirs` are the nodes in the coordinates of `seen` [m], shape (n_nodes, 3).
+    """
+    facets = facets_of(model.problem.mesh)
+    if reference is None or theirs is None:
+        if not len(facets):
+            return (_wires(mine, facets, path_lines(model), 0.8),)
+        return (solid(mine, facets, one_color(facets, _BODY), path_lines(model), BLUE, 0.8),)
+    others, lines = facets_of(reference.problem.mesh), path_lines(reference)
+    if len(others):
+        black = solid(theirs, others, one_color(others, _REFERENCE), lines, INK, 1.2)
+    else:
+        black = _wires(theirs, others, lines, 1.3, INK)
+    return black, _wires(mine, facets, path_lines(model), 0.8)
 
 
 def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
@@ -200,6 +221,9 @@ def _pair_picture(
     mesh = comparison.model.problem.mesh
     facets = facets_of(mesh)
     spots = [_spots(points, facets, mesh.edges) for points in (pair.rest, pair.mine, pair.theirs)]
+    tools = drawn_tools(result.problem, pair.level)
+    spots[1] = np.concatenate([spots[1], near(tools, spots[1].min(axis=0), spots[1].max(axis=0))])
+    legend = (*legend, *entries(result.problem))
     lower, upper, (leaves,) = picture_box(np.concatenate(spots[:2]), spots[2:])
     margin = 0.03 * float((upper - lower).max())
     remarks = [f"displacements {times(pair.factor)}"] if pair.factor != 1 else []
@@ -217,7 +241,15 @@ def _pair_picture(
     if comparison.n_outside:
         legend = (*legend, Entry("outside", LOAD, "x", ""))
     return Picture(
-        title, " · ".join(remarks), legend, lower - margin, upper + margin, np.concatenate(spots), layers, marks, bar
+        title,
+        " · ".join(remarks),
+        legend,
+        lower - margin,
+        upper + margin,
+        np.concatenate(spots),
+        with_tools(layers, tools),
+        marks,
+        bar,
     )
 
 

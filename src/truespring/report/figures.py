@@ -4,7 +4,7 @@ Matplotlib's objects are used directly, without pyplot: no window, no global sta
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -13,10 +13,12 @@ from truespring.report.bodies3d import distance_picture, over_picture, undeforme
 from truespring.report.drawing import Drawing, drawing_of, save_drawings
 from truespring.report.frame3d import figure_of, shot
 from truespring.report.plots import curves_figure, error_figure, has_reactions, moduli_figure, reactions_figure
-from truespring.report.render import render
+from truespring.report.reel import INSTANTS, Reel, reel_of, sheet_of, shots, shown_reference
+from truespring.report.render import Image, render
 from truespring.report.result import Result
 from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
+from truespring.report.timelines import energies_figure, has_touches, moving, tools_figure
 from truespring.report.undeformed import Undeformed, undeformed_of
 
 # Figures of a result, drawn once for its files and its page.
@@ -66,6 +68,16 @@ def distance_name(result: Result, reference: str) -> str:
     return _safe(f"{result.model}_error_{reference}")
 
 
+def film_name(result: Result, reference: str) -> str:
+    """Return the file stem of the film strip of the model over a reference."""
+    return _safe(f"film_{reference}")
+
+
+def energies_name(name: str) -> str:
+    """Return the file stem of the figure of the energies of a path."""
+    return _safe(f"energies_{name}")
+
+
 def _safe(name: str) -> str:
     return re.sub(r"[^\w.-]+", "-", name)
 
@@ -81,6 +93,7 @@ def _draw(result: Result) -> Iterator[_Named]:
         yield "curves", curves_figure(result), ""
         if has_reactions(result):
             yield "reactions", reactions_figure(result), ""
+    yield from _histories(result)
     if any(one.load_factors.size for one in result.comparisons.values()):
         yield "error", error_figure(result), ""
     if any(path.moduli is not None for path in result.paths.values()):
@@ -88,9 +101,39 @@ def _draw(result: Result) -> Iterator[_Named]:
     yield from bodies()
 
 
+def _histories(result: Result) -> Iterator[_Named]:
+    """Yield forces on tools, and energies of a motion."""
+    if has_touches(result):
+        yield "tools", tools_figure(result), ""
+    for name in moving(result):
+        yield energies_name(name), energies_figure(result, name), ""
+
+
+def _reels(result: Result) -> dict[str, Reel]:
+    """Return film strips by name: of the model over each reference, without one of the model; none at rest.
+
+    At rest only where displacements may return to zero, so that the last level does not show what happened.
+    """
+    if not (result.problem.stated and result.problem.returns):
+        return {}
+    names: list[str | None] = [*result.comparisons] or [shown_reference(result)]
+    found = {film_name(result, name or ""): reel_of(result, name, INSTANTS, from_rest=False) for name in names}
+    return {name: reel for name, reel in found.items() if reel is not None}
+
+
+def _film(reel: Reel, images: Sequence[Image] = ()) -> Sheet:
+    model = reel.result.paths[reel.model].label
+    over = "" if reel.reference is None else f" over {reel.result.paths[reel.reference].label}"
+    return sheet_of(reel, reel.levels, images, f"{model}{over}")
+
+
 def _plane_bodies(result: Result) -> Iterator[_Named]:
     yield "undeformed", undeformed_figure(undeformed_of(result)), ""
+    reels = _reels(result)
+    yield from ((name, _film(reel), "") for name, reel in reels.items())
     for name, comparison in result.comparisons.items():
+        if film_name(result, name) in reels:
+            continue
         pictures = {over_name: over_figure} | ({distance_name: distance_figure} if result.in_detail else {})
         for called, draw in pictures.items():
             drawn = draw(result, name, comparison)
@@ -100,16 +143,23 @@ def _plane_bodies(result: Result) -> Iterator[_Named]:
 
 def _bodies_in_space(result: Result) -> Callable[[], Iterator[_Named]]:
     pictures = {"undeformed": undeformed_picture(undeformed_of(result))}
+    reels = _reels(result)
     for name, comparison in result.comparisons.items():
+        if film_name(result, name) in reels:
+            continue
         for called, draw in ((over_name, over_picture), (distance_name, distance_picture)):
             picture = draw(result, name, comparison)
             if picture is not None:
                 pictures[called(result, name)] = picture
-    rendered = render([shot(picture) for picture in pictures.values()])
+    strips = [one for reel in reels.values() for one in shots(reel, len(reel.levels), reel.levels)]
+    rendered = render([*(shot(picture) for picture in pictures.values()), *strips])
 
     def figures() -> Iterator[_Named]:
         images, note = rendered()
-        for (name, picture), image in zip(pictures.items(), images, strict=True):
-            yield name, figure_of(picture, image), note
+        drawn = iter(images)
+        for name, picture in pictures.items():
+            yield name, figure_of(picture, next(drawn)), note
+        for name, reel in reels.items():
+            yield name, _film(reel, [next(drawn) for _ in reel.levels]), note
 
     return figures

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from truespring.comparison import Comparison
-from truespring.equilibrium import FINE, Solution
+from truespring.equilibrium import FINE, Solution, Status
 from truespring.material import Material
 from truespring.mesh import Box, select_elements
 from truespring.models import Moduli
 from truespring.potential import Noted
 from truespring.problem import Problem, Region
-from truespring.report.figures import distance_name, over_name, render_figures
+from truespring.report.axis import Axis, axis_of, history_words
+from truespring.report.figures import distance_name, energies_name, film_name, over_name, render_figures
+from truespring.report.parts import part_rows
 from truespring.report.quantity import input_quantity, percent, quantity, significant, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.shell import picture, render
@@ -27,7 +29,6 @@ from truespring.report.verdict import (
     deep,
     display_name,
     force_sentence,
-    level_name,
     linear_fem,
     material_name,
     mesh_sentence,
@@ -97,19 +98,28 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
             for drawn in (over_name(result, name), distance_name(result, name))
             if drawn in pictures
         ],
+        "films": [pictures[drawn] for drawn in _films(result) if drawn in pictures],
+        "parts": part_rows(result),
+        "histories": ["curves", "reactions", "tools", *map(energies_name, result.paths), "error"],
         "viewer": moving,
         "model": result.model,
-        "full": level_name(result, 1.0),
+        "axis": axis_of(result),
         "tolerance": tolerance_percent(result.tolerance),
         "measures": _measures(result),
         "supports": list(support_rows(result)),
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
-        "models": [_model_row(name, path) for name, path in result.paths.items()],
+        "models": [_model_row(name, path, axis_of(result)) for name, path in result.paths.items()],
         "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],
         "own_errors": {name: own_errors(result, name) for name in result.comparisons} if result.standings else {},
         "moduli_note": _section_note(result.problem),
         "source": result.source,
     }
+
+
+def _films(result: Result) -> Iterator[str]:
+    """Yield the names that film strips may have, the nearest reference first."""
+    names = sorted(result.paths, key=lambda name: name != result.closest)
+    yield from (film_name(result, name) for name in [*names, ""])
 
 
 _SENTENCES = (carrying_sentence, closest_sentence, cause_sentence, force_sentence, mesh_sentence)
@@ -133,6 +143,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     if problem.section is not None and problem.section.key:
         facts.append(("section", f"{problem.section.words}, {input_quantity(problem.section.thickness, 'm')} thick"))
     facts += _drive_facts(problem)
+    facts += [("motion", problem.dynamics.words())] if problem.dynamics is not None else []
     facts += _element_facts(result)
     at = ", ".join(input_quantity(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
     facts.append(("probe", f"node {result.probe} at ({at}), the red dot"))
@@ -172,8 +183,9 @@ def _drive_facts(problem: Problem) -> list[tuple[str, str]]:
     """Return each support and load, the total force, and the largest prescribed motion."""
     if not problem.stated:
         return [("loads and supports", "not in the file")]
-    facts = [("support", support.words(problem.mesh.dim)) for support in problem.supports]
-    facts += [("load", load.words()) for load in problem.loads]
+    supports = [support.words(problem.mesh.dim) + history_words(problem, support.over) for support in problem.supports]
+    facts = [("support", words) for words in supports]
+    facts += [("load", load.words() + history_words(problem, load.over)) for load in problem.loads]
     facts += [("tool", tool.words()) for tool in problem.touching]
     loading = problem.loading.full
     forces = loading.force(problem.mesh.nodes)
@@ -243,7 +255,7 @@ def _share(error: float | None) -> str:
     return "–" if error is None else percent(error)
 
 
-def _model_row(name: str, path: Solution) -> dict[str, Any]:
+def _model_row(name: str, path: Solution, axis: Axis) -> dict[str, Any]:
     """Return cost, status and stability of a path; a dash for what a path from a file does not have."""
     solved = path.solved
     stretches = [state.stretch for state in path.states if state.stretch is not None]
@@ -256,8 +268,9 @@ def _model_row(name: str, path: Solution) -> dict[str, Any]:
         "label": path.label,
         "status": str(path.status),
         "sound": path.status in FINE,
+        "advised": path.status is not Status.CONVERGED,
         "advice": path.status.advice if solved else "read from a file, not solved here",
-        "load_factor": f"{path.load_factor:.4g}" if path.states else "–",
+        "load_factor": axis.number(path.load_factor) if path.states else "–",
         "iterations": str(path.newton_iterations) if solved else "–",
         "effort": _effort(path),
         "fields": path.potential.cell_note if isinstance(path.potential, Noted) else None,
@@ -265,7 +278,7 @@ def _model_row(name: str, path: Solution) -> dict[str, Any]:
         "unknowns": str(path.n_unknowns) if solved else "–",
         "area": f"{min(areas):.3f}" if areas else "–",
         "stretch": stretch,
-        "stability": _stability(path) if solved else "–",
+        "stability": _stability(path) if solved and not axis.moves else "–",
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.equilibrium import Solution, State
 from truespring.reactions import SupportForce, leading_support, moved_supports
+from truespring.report.axis import axis_of, driven_by_motion
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
 from truespring.report.result import Result
@@ -38,22 +39,23 @@ class Curve:
 def curves_figure(result: Result) -> Sheet:
     """Return the displacement of the probe against the force, both along the main direction of the loads or motion.
 
-    Against the load factor if the loads have no total, such as a moment.
+    Against time in a motion; against the load factor if the loads have no total, such as a moment.
     """
-    to, balanced = drive(result), _is_balanced(result)
+    to, axis = drive(result), axis_of(result)
+    by_level = axis.moves or _is_balanced(result)
     styles = path_styles(result)
     forces, moves = {}, {}
     for name, path in result.paths.items():
         if path.states:
             forces[name] = to.sign * np.array([path.applied_force(state)[to.axis] for state in path.states])
-            forces[name] = path.load_factors if balanced else forces[name]
+            forces[name] = axis.value(path.load_factors) if by_level else forces[name]
             moves[name] = to.sign * np.array([state.displacement[result.probe, to.axis] for state in path.states])
     x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), "N")
     y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
-    name_of_x = "load factor" if balanced else f"total force along {to.name} [{x_scale.unit}]"
+    name_of_x = axis.label if by_level else f"total force along {to.name} [{x_scale.unit}]"
     curves = [
         Curve(
-            forces[name] / (1.0 if balanced else x_scale.size),
+            forces[name] / (1.0 if by_level else x_scale.size),
             moves[name] / y_scale.size,
             *styles[name],
             label=_two_lines(result, name),
@@ -64,7 +66,7 @@ def curves_figure(result: Result) -> Sheet:
         for name in forces
     ]
     return plot(
-        f"Displacement of the probe against {'load factor' if balanced else 'force'}",
+        f"Displacement of the probe against {axis.name if by_level else 'force'}",
         name_of_x,
         f"displacement along {to.name} [{y_scale.unit}]",
         curves,
@@ -78,10 +80,10 @@ def _is_balanced(result: Result) -> bool:
         return True
     if not result.problem.stated:
         return False
-    if result.problem.loading.driven_by_motion:
+    if driven_by_motion(result):
         leading = [_of_leading(path, path.states[-1]) for path in result.paths.values() if path.states]
         return not any(one is not None and one.has_force for one in leading)
-    force = result.problem.loading.force(result.problem.mesh.nodes)
+    force = result.problem.loading.full.force(result.problem.mesh.nodes)
     return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
 
 
@@ -144,15 +146,17 @@ def reactions_figure(result: Result) -> Sheet:
 
 
 def error_figure(result: Result) -> Sheet:
-    """Return the error, of displacement or of force if larger, against every reference by load level."""
+    """Return the error, of displacement or of force if larger, against every reference by level."""
     from matplotlib.patches import Rectangle
 
-    styles = path_styles(result)
+    styles, axis = path_styles(result), axis_of(result)
     forced = any(np.isfinite(one.force_errors).any() for one in result.comparisons.values())
     name_of_y = "rms error or error of a force, the larger [%]" if forced else "rms error [%]"
+    if any(one.over_the_way for one in result.comparisons.values()):
+        name_of_y = "rms distance [% of the displacement over the way]"
     curves = [
         Curve(
-            one.load_factors,
+            axis.value(one.load_factors),
             100 * one.errors,
             *styles[name],
             label=_two_lines(result, name),
@@ -161,12 +165,12 @@ def error_figure(result: Result) -> Sheet:
         for name, one in result.comparisons.items()
         if one.load_factors.size
     ]
-    tolerance = 100 * result.tolerance
+    tolerance, end = 100 * result.tolerance, 1.02 * axis.span
     within = f"within {tolerance_percent(result.tolerance)}"
-    curves.append(Curve(np.array([0, 1.02]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
+    curves.append(Curve(np.array([0, end]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
     who = result.paths[result.model].label if result.model else "the model"
-    area = plot(f"Error of {who} against each reference", "load factor", name_of_y, curves, to_right=1.02)
-    area.add(Rectangle((0, 0), 1.02, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
+    area = plot(f"Error of {who} against each reference", axis.label, name_of_y, curves, to_right=end)
+    area.add(Rectangle((0, 0), end, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
     return area.sheet
 
 
@@ -246,6 +250,10 @@ def _span(several: Sequence[Floats]) -> tuple[float, float]:
     return low - room, high + room
 
 
+# About so many points of a curve have markers.
+_MARKERS = 20
+
+
 def _look(curve: Curve) -> dict[str, Any]:
     return {
         "color": curve.color,
@@ -253,6 +261,7 @@ def _look(curve: Curve) -> dict[str, Any]:
         "lw": 2.2 if curve.strong else 1.3 if curve.marker else 1,
         "marker": curve.marker,
         "ms": 4.2 if curve.strong else 3.6,
+        "markevery": max(1, len(curve.x) // _MARKERS),
         "mfc": curve.color if curve.strong else "white",
         "mew": 0.9,
         "zorder": 4 if curve.strong else 3,
@@ -277,7 +286,7 @@ def _name_ends(area: Area, curves: Sequence[Curve]) -> None:
         if index in led:
             area.sheet.add(Line2D([x, at], [y, place], color=FAINT, lw=0.7, zorder=2))
         sample = [at, at + _SAMPLE / 2, at + _SAMPLE]
-        area.sheet.add(Line2D(sample, [place] * 3, markevery=[1], **_look(curve)))
+        area.sheet.add(Line2D(sample, [place] * 3, **_look(curve) | {"markevery": [1]}))
         first, _, second = curve.label.partition("\n")
         beside, up = sample[-1] + _GAP, 5 * POINT if second else 0.0
         draw_words(area.sheet, beside, place + up, first, color=curve.color, bold=curve.strong)

@@ -53,7 +53,7 @@ def _text(name: str) -> str:
 
 def close(text: str) -> str:
     """Return a text with no-break spaces between numbers and units."""
-    return re.sub(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Pa|N|m))(?:\W|$))", "\N{NO-BREAK SPACE}", text)
+    return re.sub(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Pa|N|m|s|J))(?:\W|$))", "\N{NO-BREAK SPACE}", text)
 
 
 def versions() -> list[tuple[str, str]]:

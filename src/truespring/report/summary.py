@@ -10,6 +10,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 from truespring.models import Moduli
 from truespring.reactions import moved_supports
+from truespring.report.parts import largest, parts_of
 from truespring.report.result import Result
 from truespring.support_errors import SupportError
 
@@ -28,11 +29,15 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def _splits(result: Result) -> dict[str, Any]:
-    """Return the errors of the time step and of the solver of a motion; empty at rest."""
+    """Return the errors of the model, of the time step and of the solver of a motion; empty at rest."""
     splits = result.splits
     if splits is None:
         return {}
-    return {"motion": {"step_error": splits.step, "solver_error": splits.solver, "notes": list(splits.notes)}}
+    parts = parts_of(result)
+    most = largest(parts)
+    model = next((one.value for one in parts if one.name == "model"), None)
+    errors = {"model_error": model, "step_error": splits.step, "solver_error": splits.solver}
+    return {"motion": errors | {"largest": most.name if most else None, "notes": list(splits.notes)}}
 
 
 def _model(path: Solution, probe: int) -> dict[str, Any]:

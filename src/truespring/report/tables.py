@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from truespring.models import Moduli
+from truespring.report.axis import axis_of
+from truespring.report.parts import PartRow, part_rows
 from truespring.report.quantity import natural_scale
 from truespring.report.result import Result
 from truespring.report.standing import own_errors
@@ -91,13 +93,18 @@ def rules_table(rules: Mapping[str, Mapping[str, Any]]) -> "Table":
 
 def result_tables(result: Result) -> "Iterator[Table | str]":
     """Yield tables and texts: status of every model, errors, notes and warnings of a study."""
-    table = new_table(f"{result.stem}: {result.title}", "model", "", "status", "load", "iterations", "seconds")
+    axis = axis_of(result)
+    head = axis.label if axis.moves else "load"
+    table = new_table(f"{result.stem}: {result.title}", "model", "", "status", head, "iterations", "seconds")
     for name, path in result.paths.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
-        table.add_row(name, path.label, str(path.status), f"{path.load_factor:.6g}", *spent)
+        table.add_row(name, path.label, str(path.status), axis.number(path.load_factor, 6), *spent)
     yield table
     if result.comparisons:
         yield _error_table(result)
+        parts = part_rows(result)
+        if parts:
+            yield _part_table(result, parts)
         supports = support_table(result)
         if supports is not None:
             yield supports
@@ -110,15 +117,31 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
 
 def _error_table(result: Result) -> "Table":
     forced = any(one.force_error is not None for one in result.comparisons.values())
+    axis = axis_of(result)
     by = ("by",) if forced else ()
-    columns = ("probe", "rms", "largest", *(("force",) if forced else ()), "agrees up to", *by, "own error")
+    columns = (
+        "probe",
+        "rms",
+        "largest",
+        *(("force",) if forced else ()),
+        f"agrees up to{f' [{axis.unit}]' if axis.unit else ''}",
+        *by,
+        "own error",
+    )
     table = new_table(f"'{result.model}' against", "reference", "", *columns)
     for name, one in result.comparisons.items():
         errors = (one.probe_error, one.rms_error, one.max_error, *((one.force_error,) if forced else ()))
         up_to = one.agrees_up_to_load_factor
-        shown = [*map(_share, errors), "-" if up_to is None else f"{up_to:.6g}"]
+        shown = [*map(_share, errors), "-" if up_to is None else axis.number(up_to, 6)]
         shown += [one.decided_by or "-"] if forced else []
         table.add_row(name, one.reference.label, *shown, own_errors(result, name)[0])
+    return table
+
+
+def _part_table(result: Result, parts: list[PartRow]) -> "Table":
+    table = new_table(f"Separate errors {axis_of(result).at_full}", "error of", "", "error")
+    for row in parts:
+        table.add_row(row.name, row.against, f"{row.error}{', largest' if row.largest else ''}")
     return table
 
 

@@ -1,8 +1,8 @@
-// Draws the model over a reference at each load level. Plain JavaScript without library or network access.
+// Draws the model over a reference at each load level, or over time. Plain JavaScript without library or network access.
 // Bodies in 3D are drawn by truespringScene of scene.min.js.
 "use strict";
 (() => {
-  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7";
+  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GREEN = "#00795a";
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
@@ -25,8 +25,11 @@
         ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
       },
     }));
+    const tools = data.tools.map((tool) => ({
+      ...tool, lines: pairs(tool.lines), positions: tool.positions.map((text) => places(text, true)),
+    }));
     return {
-      ...data, paths, rest: places(data.rest), outline: pairs(data.outline),
+      ...data, paths, tools, rest: places(data.rest), outline: pairs(data.outline),
       triangles: pairs(data.triangles), edges: pairs(data.edges),
     };
   }
@@ -41,12 +44,13 @@
     if (!paint) return instead(host);
     let reference = others[data.chosen] || null, playing = 0;
     slider.max = model.levels.length - 1;
-    slider.value = slider.max;
+    slider.value = data.start;
+    let chosen = false; // whether a level was chosen, from which to play
 
     for (const choice of host.querySelectorAll("input[type=radio]")) {
       choice.addEventListener("change", () => { reference = others[Number(choice.value)]; draw(); });
     }
-    slider.addEventListener("input", () => { stop(); draw(); });
+    slider.addEventListener("input", () => { chosen = true; stop(); draw(); });
     for (const box of boxes) box.addEventListener("change", () => draw());
     play.addEventListener("click", () => (playing ? stop() : run()));
     let width = 0, asked = 0;
@@ -65,8 +69,9 @@
     }
 
     function run() {
-      const last = model.levels.length - 1, from = Number(slider.value) >= last ? 0 : Number(slider.value);
-      const began = performance.now(), pace = Math.max(120, 3000 / Math.max(last, 1)); // ms per level
+      const last = model.levels.length - 1, from = !chosen || Number(slider.value) >= last ? 0 : Number(slider.value);
+      chosen = true;
+      const began = performance.now(), pace = Math.max(data.axis.moves ? 30 : 120, 3000 / Math.max(last, 1)); // ms per level
       play.textContent = "Pause";
       const step = (now) => {
         const at = Math.min(last, from + Math.max(0, now - began) / pace);
@@ -101,6 +106,7 @@
       if (!canvas.parentElement.clientWidth) return;
       const shown = {
         level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
+        tools: data.tools.map((tool) => ({ lines: tool.lines, points: at(tool, place) })),
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
       };
       paint(shown);
@@ -113,7 +119,8 @@
     }
 
     function write(level, gone) {
-      const parts = [`load factor <b>${+model.levels[level].toPrecision(4)}</b>`];
+      const { name, unit, span } = data.axis;
+      const parts = [`${name} <b>${+(span * model.levels[level]).toPrecision(4)}${unit && " " + unit}</b>`];
       const force = (path, at) => `force <b>${path.force[at]}</b>`, moved = (path, at) => `probe moved <b>${path.moved[at]}</b>`;
       // Under loads the force is the same for all paths; under a prescribed motion it is not.
       const state = (path, at) => (data.motion ? `${force(path, at)}, ` : "") + moved(path, at);
@@ -125,7 +132,7 @@
         if (gone) parts.push("the reference leaves the picture");
         if (other >= 0 && reference.errors[other]) parts.push(`<b>${reference.errors[other]}</b> apart`);
         if (other >= 0 && level && reference.most && reference.most[other]) parts.push(`at most <b>${reference.most[other]}</b>`);
-        if (other < 0 && level) parts.push(surface(level) ? "outline only" : "the reference has no result at this level");
+        if (other < 0 && level) parts.push(surface(level) ? "outline only" : `the reference has no result at this ${data.axis.level}`);
       }
       readout.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
     }
@@ -135,7 +142,7 @@
   function plane(canvas, data) {
     const context = canvas.getContext("2d"), model = data.paths[0];
 
-    return ({ level, reference, outline, mine, theirs, ticked }) => {
+    return ({ level, reference, outline, mine, theirs, tools, ticked }) => {
       const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
       const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
       const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
@@ -180,6 +187,7 @@
       if (outline) stroke(outline.points, outline.lines, INK, 1.8);
       else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
       stroke(mine, model.lines, BLUE, 1);
+      for (const tool of tools) stroke(tool.points, tool.lines, GREEN, 1.6);
       if (theirs && ticked.length) {
         const same = new Uint32Array(2 * data.n_nodes);
         for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;

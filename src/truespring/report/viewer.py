@@ -7,12 +7,14 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.equilibrium import Solution, State
+from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
-from truespring.report.quantity import natural_scale, percent, quantity, times
+from truespring.report.quantity import ROUNDING, natural_scale, percent, quantity, times
 from truespring.report.result import Result
 from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
 from truespring.report.style import full_name
+from truespring.report.touching import Drawn, drawn_tools, near
 from truespring.report.verdict import drive
 
 
@@ -31,25 +33,32 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         return None
     factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
     first, *others = (_cloud(result.paths[name], factor) for name in shown)
-    lower, upper, leaves = picture_box(np.concatenate([mesh.nodes, first]), others)
+    tools = [drawn_tools(result.problem, level) for level in levels] if mesh.dim == 2 else []
+    inside = np.concatenate([mesh.nodes, first])
+    around = [near(several, inside.min(axis=0), inside.max(axis=0)) for several in tools]
+    lower, upper, leaves = picture_box(np.concatenate([inside, *around]), others)
     extent = upper - lower
     pack = Packing(lower, float(extent.max()), nodes, mesh.n_nodes)
     scale = natural_scale(float(extent.max()), "m")
+    axis = axis_of(result)
     closest = shown.index(result.closest) - 1 if result.closest in shown else 0
     values = {
         "magnified": f"displacements {times(factor)}" if factor != 1 else "",
         "motion": result.problem.stated and not result.problem.loads,
         "unit": scale.unit,
+        "axis": {"name": axis.name, "unit": axis.unit, "span": axis.span, "level": axis.level, "moves": axis.moves},
         "box": [float(value) for value in extent / scale.size],
         "n_nodes": len(nodes),
         "probe": pack.number(result.probe),
         "chosen": closest,
+        "start": _start(result.paths[shown[0]], levels),
         "rest": pack.places(mesh.nodes),
         "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
         "paths": [
             _path(result, name, levels, pack, factor, beyond)
             for name, beyond in zip(shown, [False, *leaves], strict=True)
         ],
+        "tools": [_tool(several, levels, pack) for several in zip(*tools, strict=True)],
     }
     return {**values, **surface_in_scene(mesh, pack)} if mesh.dim == 3 else values
 
@@ -61,6 +70,21 @@ def _shown(result: Result) -> list[str]:
     shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
     shown = [name for name in shown if result.paths[name].states or _only_surface(result.paths[name])]
     return shown if shown and shown[0] == names[0] else []
+
+
+def _start(path: Solution, levels: Sequence[float]) -> int:
+    """Return the index of the level to show first: the last, or that of the largest displacement if it returns."""
+    if not path.problem.returns:
+        return len(levels) - 1
+    states = [path.at(level) for level in levels]
+    moved = [0.0 if one is None else float(np.linalg.norm(one.displacement, axis=1).max()) for one in states]
+    return int(np.argmax(moved))
+
+
+def _tool(several: Sequence[Drawn], levels: Sequence[float], pack: Packing) -> dict[str, Any]:
+    """Return the outline of a tool of a plane body at each level."""
+    places = [pack.points(one.points, beyond=True) for one in several]
+    return {"levels": list(levels), "positions": places, "lines": pack.numbers(several[0].lines)}
 
 
 def _only_surface(path: Solution) -> bool:
@@ -103,6 +127,7 @@ def _path(
     one = result.comparisons.get(name)
     known = dict(zip(one.load_factors.tolist(), one.rms_errors.tolist(), strict=True)) if one else {}
     errors = [next((error for at, error in known.items() if abs(at - s.load_factor) < 1e-9), None) for s in states]
+    moved = [float(np.linalg.norm(state.displacement[result.probe])) for state in states]
     values: dict[str, Any] = {
         "name": name,
         "label": full_name(result, name),
@@ -111,7 +136,7 @@ def _path(
         "levels": [state.load_factor for state in states],
         "positions": [pack.places(rest + factor * state.displacement, beyond) for state in states],
         "force": [_force(to.along(path.applied_force(state)), state) for state in states],
-        "moved": [quantity(float(np.linalg.norm(state.displacement[result.probe])), "m") for state in states],
+        "moved": [quantity(value if value > ROUNDING * max(moved) else 0.0, "m") for value in moved],
         "errors": [None if error is None or np.isnan(error) else percent(error) for error in errors],
         "surface": None,
     }

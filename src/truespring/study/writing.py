@@ -35,10 +35,11 @@ def write_model(path: Solution, output: Output, name: str) -> None:
     write_stl(path, output.staging / f"deformed_{name}.stl")
 
 
-def write_rest(result: Result, output: Output, command: str | None) -> None:
-    """Write the files that cover all models and publish the output.
+def write_rest(result: Result, output: Output, command: str | None, animate: bool = False) -> str:
+    """Write the files that cover all models and publish the output; return a note on an animation that is missing.
 
-    Figures and report are written only with `command`, the command line that the report shows.
+    Figures and report are written only with `command`, the command line that the report shows, animation.gif and
+    animation.mp4 only with `animate`.
     """
     folder = output.staging
     write_curves(result, folder / "curves.csv")
@@ -53,9 +54,15 @@ def write_rest(result: Result, output: Output, command: str | None) -> None:
 
         save_figures(result, folder / "figures")
         write_page([result], folder / "report.html", command)
+    note = ""
+    if animate:
+        from truespring.report.animation import write_animation
+
+        note = write_animation(result, folder)
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     output.publish()
+    return note
 
 
 def write_overview(results: Sequence[Result], out: Path) -> None:

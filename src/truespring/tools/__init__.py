@@ -7,6 +7,7 @@ from truespring.tools.shapes import Block as Block
 from truespring.tools.shapes import Capsule as Capsule
 from truespring.tools.shapes import HalfSpace as HalfSpace
 from truespring.tools.shapes import Sphere as Sphere
+from truespring.tools.skins import Skin as Skin
 from truespring.tools.stl import StlTool as StlTool
 from truespring.tools.table import TOOLS as TOOLS
 from truespring.tools.tool import Tool as Tool

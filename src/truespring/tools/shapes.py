@@ -10,6 +10,7 @@ from truespring.arrays import Bools, Floats
 from truespring.errors import ToolError
 from truespring.loading import vector_words
 from truespring.tools.path import Path
+from truespring.tools.skins import Skin, cuboid, flat, rounded
 from truespring.tools.tool import Tool
 from truespring.tools.values import positive, vector
 
@@ -70,6 +71,10 @@ class Sphere(_Round):
         """Return shape and dimensions."""
         return f"sphere of radius {self.radius:g} m"
 
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return the surface."""
+        return rounded(self.radius, np.zeros(len(centre)), np.zeros(len(centre)))
+
     def core(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the places and identity matrices."""
         n, dim = places.shape
@@ -110,6 +115,10 @@ class Capsule(_Round):
         """Return shape and dimensions."""
         return f"capsule of radius {self.radius:g} m from {vector_words(self.start)} to {vector_words(self.end)} m"
 
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return the surface."""
+        return rounded(self.radius, np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float))
+
     def core(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the vectors from the nearest points of the line; between its ends they follow the places along it."""
         start, end = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
@@ -142,6 +151,10 @@ class HalfSpace(Tool):
     def form(self) -> str:
         """Return shape and dimensions."""
         return f"plane with normal {vector_words(self.normal)}"
+
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return a part of the flat surface."""
+        return flat(np.asarray(self.normal, dtype=float), centre, size)
 
     def gaps(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the distance from the surface [m], and the normal."""
@@ -186,6 +199,10 @@ class Block(Tool):
     def form(self) -> str:
         """Return shape and dimensions."""
         return f"box of {vector_words(self.size)} m"
+
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return the surface."""
+        return cuboid(np.asarray(self.size, dtype=float))
 
     def _outside(self, places: Floats) -> tuple[Floats, Bools]:
         """Return how far places are beyond the faces along each axis [m], and whether any is; (n, dim) and (n,)."""

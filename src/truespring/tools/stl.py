@@ -8,6 +8,7 @@ from truespring.errors import MeshError, ToolError
 from truespring.mesh.files.stl import parse_stl
 from truespring.opening import read_file
 from truespring.tools.path import Path
+from truespring.tools.skins import Skin, triangulated
 from truespring.tools.solid import Solid
 from truespring.tools.tool import Tool
 from truespring.units import unit_of
@@ -45,6 +46,10 @@ class StlTool(Tool):
     def form(self) -> str:
         """Return shape and dimensions."""
         return f"solid of {len(self.solid.triangles)} triangles from {self.file}"
+
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return the triangles."""
+        return triangulated(self.solid.corners, self.solid.triangles)
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:

@@ -14,6 +14,7 @@ from truespring.mesh import Selection
 from truespring.tools.contact import Contact
 from truespring.tools.laws import CONTACTS, Law
 from truespring.tools.path import Path, path_words, track_of
+from truespring.tools.skins import Skin
 from truespring.tools.surface import surface, within
 from truespring.tools.values import positive
 
@@ -86,6 +87,15 @@ class Tool(Touching, ABC):
     @abstractmethod
     def form(self) -> str:
         """Return shape and dimensions: "sphere of radius 0.01 m"."""
+
+    def skin(self, centre: Floats, size: float) -> Skin | None:
+        """Return the surface for pictures, relative to the place of the tool; None if it is not drawn.
+
+        Args:
+            centre: centre of the picture relative to the place of the tool [m], shape (dim,).
+            size: size of the picture [m], to which an unbounded tool is cut.
+        """
+        return None
 
     def words(self) -> str:
         """Return name, form and path, for tables."""

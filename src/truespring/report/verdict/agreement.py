@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from truespring.comparison import Comparison
+from truespring.report.axis import axis_of
 from truespring.report.quantity import percent, quantity, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.standing import equally_wrong_sentence, own_error_sentence
-from truespring.report.verdict.naming import display_name, everyone, full_level, level_name, listed, subject
-from truespring.report.verdict.reach import NEVER, rank, reach, starts_within
+from truespring.report.verdict.naming import display_name, everyone, level_name, listed, subject
+from truespring.report.verdict.reach import never, rank, reach, starts_within
 from truespring.support_errors import decisive
 
 
@@ -20,7 +21,7 @@ def agreement_sentences(result: Result) -> Iterator[str]:
         where, beyond = _where_it_agrees(result, measured)
         errors = _errors(result, measured)
         if beyond and errors:
-            yield f"{where}; beyond, {errors}."
+            yield f"{where}; {'' if _over_the_way(measured) else 'beyond, '}{errors}."
         else:
             yield f"{where}."
             if errors:
@@ -50,20 +51,21 @@ def _where_it_agrees(result: Result, measured: dict[str, Comparison]) -> tuple[s
         return f"{who} {verb} within {tolerance_percent(result.tolerance)} {listed(clauses, ', and ')}", False
     ((where, names),) = groups.items()
     references = everyone(result, names) if len(names) > 1 else _named(result, measured, names[0])
-    if where == NEVER:
+    axis = axis_of(result)
+    if where == never(axis):
         do = "do" if plural else "does"
         some = references if len(names) == 1 else "any reference"
-        return f"at no load level {do} {who} come {within} {some}", False
-    if where.startswith("up to"):
-        comma = "," if "," in where else ""
-        return f"{where}{comma} {who} {verb} {within} {references}", not where.startswith(f"up to {full_level(result)}")
+        return f"{where} {do} {who} come {within} {some}", False
+    if where.startswith(("up to", axis.up_to_full)):
+        comma = "," if "," in where or where.startswith("over") else ""
+        return f"{where}{comma} {who} {verb} {within} {references}", not where.startswith(axis.up_to_full)
     return f"{who} {verb} {within} {references} {where}", False
 
 
 def _named(result: Result, measured: dict[str, Comparison], name: str) -> str:
     """Return a reference by its name, with the errors at full load if `_is_complete`."""
     shown, one = display_name(result, name), measured[name]
-    return f"{shown} ({_off(one)} at {full_level(result)})" if _is_complete(one) else shown
+    return f"{shown} ({_off(one)} {axis_of(result).at_full})" if _is_complete(one) else shown
 
 
 def _is_complete(one: Comparison) -> bool:
@@ -81,12 +83,20 @@ def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
     ]
     # The errors of one reference may be separated by commas.
     between = "; " if any(np.isfinite(one.force_errors[-1]) for one in measured.values()) else ", "
-    return f"at {full_level(result)}: {between.join(parts)}"
+    return f"{_what(measured)}{axis_of(result).at_full}: {between.join(parts)}"
+
+
+def _over_the_way(measured: dict[str, Comparison]) -> bool:
+    return any(one.over_the_way for one in measured.values())
+
+
+def _what(measured: dict[str, Comparison]) -> str:
+    return "root mean square " if _over_the_way(measured) else ""
 
 
 def _off(one: Comparison) -> str:
-    """Return the errors at the last level, the larger first, each with its quantity if forces are compared too."""
-    displacement = float(one.rms_errors[-1])
+    """Return the errors at the last level or over the way, the larger first, with the quantity if forces are known."""
+    displacement = float(one.rms_errors[-1]) if one.rms_error is None else one.rms_error
     found = [(displacement, "in displacement")] if np.isfinite(displacement) else []
     several = len({error.mine.support for error in one.support_errors[-1]}) > 1
     largest = decisive(np.nan, one.support_errors[-1])
@@ -98,17 +108,17 @@ def _off(one: Comparison) -> str:
 
 def _short_of_full_load(result: Result, name: str, one: Comparison) -> str:
     """Return how a comparison ends that does not reach full load, or has surfaces only."""
-    who = display_name(result, name)
+    who, axis = display_name(result, name), axis_of(result)
     if one.load_factors.size:
         level = float(one.load_factors[-1])
         if one.agrees_up_to_load_factor is None:
-            return f"{who} is known at load factor {level:.4g} only, there {_off(one)}."
-        return f"with {who} the comparison ends at load factor {level:.4g}, there {_off(one)}."
+            return f"{who} is known at {axis.exact(level)} only, there {_off(one)}."
+        return f"with {who} the comparison ends at {axis.exact(level)}, there {_off(one)}."
     if one.surface is None and one.hausdorff is not None:
         distances = quantity(one.hausdorff.rms, "m", 2), quantity(one.hausdorff.max, "m", 2)
         return "the distance between the surfaces is {} (root mean square), {} at most.".format(*distances)
     if one.surface is None:
-        return f"{who} and {subject(result)[0]} have no load level in common."
+        return f"{who} and {subject(result)[0]} have no {axis.level} in common."
     level = one.reference.surface.load_factor if one.reference.surface else 1.0
     return (
         f"the outline is {quantity(one.surface.outline_rms, 'm', 2)} (root mean square), at most "

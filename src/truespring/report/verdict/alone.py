@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truespring.equilibrium import Solution, Status
+from truespring.equilibrium import FINE, Solution, Status
+from truespring.report.axis import axis_of
 from truespring.report.quantity import quantity
 from truespring.report.result import Result
 from truespring.report.verdict.naming import full_level, level_name, listed, subject
@@ -15,12 +16,15 @@ _CRITICAL = ("limit point", "bifurcation")
 def alone_sentences(result: Result) -> Iterator[str]:
     """Yield how far the model went, through which equilibria, and how far the probe moved."""
     if result.model is None:
-        done = sum(path.status is Status.CONVERGED for path in result.paths.values())
+        done = sum(path.status in FINE for path in result.paths.values())
         yield f"{done} of {len(result.paths)} models reached {full_level(result)}; nothing was compared."
         return
     path = result.paths[result.model]
     who, plural = subject(result)
-    if path.status is Status.CONVERGED:
+    if path.status in FINE and axis_of(result).moves:
+        were = "were" if plural else "was"
+        yield f"{who} {were} followed {axis_of(result).up_to_full}{_fixed(path)}; nothing was compared with them."
+    elif path.status is Status.CONVERGED:
         verb = "reach" if plural else "reaches"
         yield f"{who} {verb} {full_level(result)} through {_way(path)}; nothing was compared with them."
     else:
@@ -29,6 +33,11 @@ def alone_sentences(result: Result) -> Iterator[str]:
         moved = float(np.linalg.norm(path.states[-1].displacement[result.probe]))
         at = full_level(result) if path.complete else level_name(result, path.load_factor)
         yield f"At {at} the displacement of the probe is {quantity(moved, 'm')}."
+
+
+def _fixed(path: Solution) -> str:
+    """Return how the steps of a motion ended unless they were solved, as the end of a clause."""
+    return ", in steps that are not converged" if path.status is Status.FIXED_ITERATIONS else ""
 
 
 def _way(path: Solution) -> str:

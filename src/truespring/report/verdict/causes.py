@@ -17,7 +17,8 @@ def cause_sentence(result: Result) -> str | None:
     """Return whether the distance to the nearest nonlinear FEM grows with the load or exists from the first level.
 
     A distance at the first level is one of stiffness: moduli, bending, elements. A distance that grows is one of the
-    response of springs and law to large strain. None without nonlinear FEM, without springs, and where the two agree.
+    response of springs and law to large strain. None without nonlinear FEM, without springs, where the two agree, with
+    tools, and where the load does not only grow.
     """
     nonlinear = {
         name: one
@@ -25,9 +26,12 @@ def cause_sentence(result: Result) -> str | None:
         if one.reference.element is not None
         and one.reference.finite
         and one.load_factors.size > 1
+        and not one.over_the_way
         and one.rms_errors[-1] > _NO_CAUSE
     }
     if not nonlinear or result.model is None or not result.paths[result.model].has_springs:
+        return None
+    if result.problem.touching:  # the area of contact grows, too
         return None
     name = min(nonlinear, key=lambda one: float(nonlinear[one].rms_errors[-1]))
     levels, errors = nonlinear[name].load_factors, nonlinear[name].rms_errors

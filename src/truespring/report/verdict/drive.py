@@ -7,8 +7,8 @@ import numpy as np
 from truespring.arrays import Floats
 from truespring.mesh.selections import AXES
 from truespring.reactions import leading_support
+from truespring.report.axis import driven_by_motion
 from truespring.report.result import Result
-from truespring.report.verdict.naming import driven_by_motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,8 @@ class Drive:
 def drive(result: Result) -> Drive:
     """Return the main direction of the total force; without loads, that of the prescribed motion.
 
-    Of results from files, whose loads are unknown, return the direction in which the probe moves.
+    Of results from files, whose loads are unknown, and without loads and moved supports, return the direction in which
+    the probe moves furthest.
     """
     if not result.problem.stated:
         return _of_probe(result)
@@ -41,6 +42,8 @@ def drive(result: Result) -> Drive:
         held = result.problem.held[leading]
         return _largest(held.motion[None] if held.motion.any() else loading.motion()[held.nodes])
     force = loading.force(result.problem.mesh.nodes)
+    if not force.any():  # tools, or a velocity at the begin
+        return _of_probe(result)
     total = force.sum(axis=0)
     # Balanced loads have no total: take the largest nodal force.
     return _largest(force if np.abs(total).max() <= 1e-9 * np.abs(force).max() else total[None])
@@ -55,11 +58,9 @@ def axis_name(vector: Floats) -> str:
 
 
 def _of_probe(result: Result) -> Drive:
-    moved = next((path.states[-1].displacement[result.probe] for path in result.paths.values() if path.states), None)
-    if moved is None or not moved.any():
-        return Drive(0, 1.0)
-    axis = int(np.abs(moved).argmax())
-    return Drive(axis, float(np.sign(moved[axis])))
+    path = next((path for path in result.paths.values() if path.states), None)
+    moved = np.zeros((1, 1)) if path is None else np.array([one.displacement[result.probe] for one in path.states])
+    return _largest(moved) if moved.any() else Drive(0, 1.0)
 
 
 def _largest(vectors: Floats) -> Drive:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from truespring.equilibrium import Solution
+from truespring.report.axis import axis_of
 from truespring.report.result import Result
 
 #: First-order elements by the element of the mesh.
@@ -46,28 +47,13 @@ def everyone(result: Result, names: Sequence[str]) -> str:
 
 
 def level_name(result: Result, load_factor: float) -> str:
-    """Return a load level in words: full load (or full motion, full displacement), or its load factor."""
-    if load_factor == 1:
-        return full_level(result)
-    return f"{load_factor:.4g} of the displacement" if _by_displacement(result) else f"load factor {load_factor:.4g}"
+    """Return a level in words, see `Axis`: full load, load factor 0.4, 0.16 s."""
+    return axis_of(result).words(load_factor)
 
 
 def full_level(result: Result) -> str:
-    """Return the name of load level 1: full load, without loads full motion, full displacement if controlled."""
-    if _by_displacement(result):
-        return "full displacement"
-    return "full motion" if driven_by_motion(result) else "full load"
-
-
-def driven_by_motion(result: Result) -> bool:
-    """Return whether supports move and no load acts."""
-    return result.problem.stated and result.problem.loading.driven_by_motion
-
-
-def _by_displacement(result: Result) -> bool:
-    """Return whether the displacement was controlled and the load factor is part of the solution."""
-    states = [state for path in result.paths.values() for state in path.states if not state.critical]
-    return any(state.level is not None and abs(state.level - state.load_factor) > 1e-9 for state in states)
+    """Return the name of level 1: full load, without loads full motion, the duration of a motion."""
+    return axis_of(result).full
 
 
 def linear_fem(path: Solution) -> str:

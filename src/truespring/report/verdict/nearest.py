@@ -1,8 +1,9 @@
 """The reference nearest to the model."""
 
+from truespring.report.axis import axis_of
 from truespring.report.quantity import percent
 from truespring.report.result import Result
-from truespring.report.verdict.naming import display_name, full_level
+from truespring.report.verdict.naming import display_name
 from truespring.report.verdict.trouble import path_trouble
 
 
@@ -21,4 +22,4 @@ def closest_sentence(result: Result) -> str | None:
     error = result.comparisons[name].rms_error
     assert error is not None  # Result.closest compares these
     what = " in displacement" if result.comparisons[name].force_error is not None else ""
-    return f"Nearest{what} at {full_level(result)} is {display_name(result, name)}, {percent(error)} off."
+    return f"Nearest{what} {axis_of(result).at_full} is {display_name(result, name)}, {percent(error)} off."

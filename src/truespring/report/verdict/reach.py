@@ -1,26 +1,33 @@
 """The load levels at which a model is within the tolerance of a reference."""
 
 from truespring.comparison import Comparison
+from truespring.report.axis import Axis, axis_of
 from truespring.report.result import Result
-from truespring.report.verdict.naming import level_name, listed
-
-#: What `reach` returns for a model that is never within the tolerance.
-NEVER = "at no load level"
+from truespring.report.verdict.naming import listed
 
 
 def reach(result: Result, one: Comparison) -> str:
-    """Return at which levels the model is within the tolerance of a reference, such as "up to load factor 0.4"."""
+    """Return at which levels the model is within the tolerance of a reference, such as "up to load factor 0.4".
+
+    `never` if at no level.
+    """
+    axis = axis_of(result)
     levels, runs = one.load_factors, runs_within(one)
     if not runs:
-        return NEVER
+        return never(axis)
     if one.agrees_up_to_load_factor is None:
-        return f"at {level_name(result, levels[0])}, the only level it is known at"
+        return f"at {axis.words(levels[0])}, the only level it is known at"
     first, *more = runs
     if first[0] == levels[0]:
         last = ", the last level that both reached" if first[1] == levels[-1] != 1 else ""
-        again = f" and again {listed([_span(result, run, levels[-1]) for run in more])}" if more else ""
-        return f"up to {level_name(result, first[1])}{last}{again}"
-    return f"only {listed([_span(result, run, levels[-1]) for run in runs])}"
+        again = f" and again {listed([_span(axis, run, levels[-1]) for run in more])}" if more else ""
+        return axis.up_to_full if first[1] == 1 else f"up to {axis.words(first[1])}{last}{again}"
+    return f"only {listed([_span(axis, run, levels[-1]) for run in runs])}"
+
+
+def never(axis: Axis) -> str:
+    """Return what `reach` returns for a model that is never within the tolerance."""
+    return f"at no {axis.level}"
 
 
 def runs_within(one: Comparison) -> list[tuple[float, float]]:
@@ -47,10 +54,8 @@ def rank(one: Comparison) -> tuple[float, bool, float]:
     return -from_zero, not runs, float(one.errors[-1])
 
 
-def _span(result: Result, run: tuple[float, float], last: float) -> str:
+def _span(axis: Axis, run: tuple[float, float], last: float) -> str:
     start, end = run
     if start == end:
-        return f"at {level_name(result, start)}"
-    if end == last:
-        return f"from load factor {start:.4g} on"
-    return f"between load factors {start:.4g} and {end:.4g}"
+        return f"at {axis.words(start)}"
+    return f"from {axis.exact(start)} on" if end == last else f"between {axis.both(start, end)}"

@@ -1,0 +1,98 @@
+"""animation.gif and animation.mp4: the model over a reference, frame by frame."""
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truespring.errors import one_line
+from truespring.report.frame import EDGE
+from truespring.report.reel import Reel, reel_of, sheet_of, shots, shown_reference
+from truespring.report.render import render, rgb
+from truespring.report.result import Result
+from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, RED, figure_style
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+# Opacities of lines in a GIF, whose edges fade, and number of its further colours, in the plane and in space.
+_SHADES, _COLORS = (1.0, 0.65, 0.3), {2: 8, 3: 32}
+# Frames, resolution [pixels/inch], duration of all frames [s], shortest and longest of a frame [ms].
+FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 80, 4.0, 40, 400
+
+#: What is missing for animation.mp4.
+NO_VIDEO = "no animation.mp4: it needs imageio-ffmpeg: pip install 'truespring[video]'"
+
+
+def write_animation(result: Result, folder: Path) -> str:
+    """Write animation.gif, and animation.mp4 if imageio-ffmpeg is installed; return a note on what is missing.
+
+    Frames show the recorded states, at most FRAMES of them.
+    """
+    reel = reel_of(result, shown_reference(result), FRAMES, from_rest=True)
+    if reel is None:
+        return "no animation: fewer than two levels are known"
+    frames = _frames(reel)
+    pause = int(np.clip(1000 * _LASTS / len(frames), _SHORTEST, _LONGEST)) // 10 * 10  # a GIF counts 10 ms
+    _write_gif(frames, folder / "animation.gif", pause, _COLORS[reel.mesh.dim])
+    if importlib.util.find_spec("imageio_ffmpeg") is None:
+        return NO_VIDEO
+    film = folder / "animation.mp4"
+    try:
+        _write_mp4(frames, film, 1000 / pause)
+    except (OSError, RuntimeError) as error:  # its program ffmpeg is missing, or failed
+        film.unlink(missing_ok=True)
+        return f"no animation.mp4: ffmpeg failed: {one_line(str(error))}"
+    return ""
+
+
+def _frames(reel: Reel) -> list[NDArray[np.uint8]]:
+    """Return the frames, shape (height, width, 3) each, all of one size with even numbers of pixels."""
+    images, _ = render(found)() if (found := shots(reel, 1, reel.levels, _DPI)) else ([], "")
+    with figure_style():
+        return list(_drawn(reel, images))
+
+
+def _drawn(reel: Reel, images: list[Any]) -> Iterator[NDArray[np.uint8]]:
+    for number, level in enumerate(reel.levels):
+        pixels = sheet_of(reel, [level], images[number : number + 1], "").pixels(_DPI)[..., :3]
+        height, width = (length - length % 2 for length in pixels.shape[:2])
+        yield np.ascontiguousarray(pixels[:height, :width])
+
+
+def _write_gif(frames: list[NDArray[np.uint8]], file: Path, pause: int, colors: int) -> None:
+    """Write frames of `pause` [ms] each; the last one stays longer. `colors` beyond those of lines are kept."""
+    from PIL import Image
+
+    palette = _palette(frames[len(frames) // 2], colors)
+    first, *others = [Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
+    pauses = [pause] * (len(frames) - 1) + [max(pause, 800)]
+    first.save(file, save_all=True, append_images=others, duration=pauses, loop=0, optimize=True)
+
+
+def _palette(frame: NDArray[np.uint8], colors: int) -> "Image.Image":
+    """Return one palette for all frames: colours of lines, fading to white, and the `colors` commonest of a frame."""
+    from PIL import Image
+
+    lines = np.array([255 * rgb(color) for color in (INK, BLUE, RED, LOAD, MOTION, FAINT, EDGE)])
+    faded = [255 - share * (255 - lines) for share in _SHADES]
+    common = Image.fromarray(frame).quantize(colors, dither=Image.Dither.NONE).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([255, 255, 255, *np.rint(np.ravel(faded)).astype(int).tolist(), *common[: 3 * colors]])
+    return palette
+
+
+def _write_mp4(frames: list[NDArray[np.uint8]], file: Path, per_second: float) -> None:
+    import imageio_ffmpeg
+
+    height, width = frames[0].shape[:2]
+    writer = imageio_ffmpeg.write_frames(
+        str(file), (width, height), fps=per_second, codec="libx264", quality=7, macro_block_size=2
+    )
+    writer.send(None)
+    for one in frames:
+        writer.send(one.tobytes())
+    writer.close()

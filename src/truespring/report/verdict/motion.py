@@ -1,0 +1,41 @@
+"""Sentences on the separate errors of a motion."""
+
+from collections.abc import Iterator
+
+from truespring.report.axis import axis_of
+from truespring.report.parts import Part, largest, part_words, parts_of
+from truespring.report.quantity import percent, tolerance_percent
+from truespring.report.result import Result
+from truespring.report.verdict.naming import listed
+
+_SUBJECTS = {"model": "the model", "time step": "the time step", "solver": "the solver"}
+
+
+def motion_sentences(result: Result) -> Iterator[str]:
+    """Yield the largest error of a motion and what reduces it, then all three with what each is measured against."""
+    parts = parts_of(result)
+    if not parts:
+        return
+    most = largest(parts)
+    if most is not None:
+        yield _largest_sentence(result, most)
+    shown = [f"{one.name} {part_words(one)} ({one.against})" for one in parts]
+    yield f"errors {axis_of(result).at_full}: {', '.join(shown)}."
+    for note in result.splits.notes if result.splits else ():
+        yield f"not every error is known: {note}."
+
+
+def integration_dominates(result: Result) -> bool:
+    """Return whether the error of the time step or of the solver is not below the tolerance."""
+    return any(one.name != "model" and (one.value or 0.0) >= result.tolerance for one in parts_of(result))
+
+
+def _largest_sentence(result: Result, most: Part) -> str:
+    who, error = _SUBJECTS[most.name], percent(most.value or 0.0)
+    if (most.value or 0.0) < result.tolerance:
+        return f"{who} is the largest error of the motion, {error}, below {tolerance_percent(result.tolerance)}."
+    above = [one for one in parts_of(result) if one.name != most.name and (one.value or 0.0) >= result.tolerance]
+    others = listed([f"{_SUBJECTS[one.name]}, {part_words(one)}," for one in above]) if above else ""
+    limit = tolerance_percent(result.tolerance)
+    further = f"; {others} {'are' if len(above) > 1 else 'is'} above {limit}, too" if above else ""
+    return f"{who} is the largest error of the motion, {error}: {most.remedy}{further}."
