@@ -17,6 +17,7 @@ from truespring.motion.step import Step, step_of
 from truespring.potential import Potential, Stressed
 from truespring.solvers import mixed
 from truespring.solvers.balance import Balance, Equilibrium
+from truespring.solvers.fixed import iterated
 from truespring.solvers.line_search import descend
 
 
@@ -83,7 +84,7 @@ class Implicit:
         if not np.isfinite(balance.total_energy(start, level)[0]):
             start = other
         if self._iterations:
-            return descend(balance, level, start, self._iterations).state
+            return iterated(balance, level, start, self._iterations)
         spent, found = 0, None
         if isinstance(potential, Stressed):
             found = mixed.converge(balance, level, mixed.Start(start, potential.stress(start))).state

@@ -381,6 +381,11 @@ class Watch:
         touches = self._balance.loading.touches(state.positions, state.load_factor)
         return self._balance.judged(replace(state, energy=energy, converged=True, touches=touches))
 
+    def last(self) -> Equilibrium:
+        """Return the last state evaluated, as not converged."""
+        self._balance.spent += self._here.iterations
+        return self._here
+
     def failure(self) -> Found:
         """Return the state of least residual, as not converged."""
         self._balance.spent += self.best.iterations
