@@ -142,6 +142,10 @@ class Interaction(Protocol):
         """Return the action with the normal forces of a state, for friction; the step begins where it did."""
         ...
 
+    def rubbed(self, force: Floats) -> "Interaction":
+        """Return the action with friction on the nodes that a scheme has found [N], shape (n_nodes, dim)."""
+        ...
+
     def slide(self, positions: Floats, level: float) -> Slide:
         """Return the largest friction at a state; without nodes if there is none."""
         ...

@@ -1,11 +1,13 @@
 """The explicit scheme: leapfrog, or velocity Verlet, and its largest stable step."""
 
 from copy import copy
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Floats
+from truespring.conditions import Loading
 from truespring.motion.advance import Advance
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
@@ -21,13 +23,13 @@ def stable_step(body: Body) -> float:
 
     2 / omega of the highest frequency omega, shortened by the dashpots of the material, whose damping ratio there is
     xi = tau omega / 2, to 2 / omega (sqrt(1 + xi^2) - xi) (Belytschko, Liu, Moran, Nonlinear Finite Elements, 6.2).
-    Zero with friction and barriers, which are too stiff for an explicit scheme.
+    Zero with barriers, which have no largest stiffness. Friction does not shorten it.
     """
     from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
     nodes, interactions = body.potential.nodes, body.loading.interactions
     touched = sum((one.largest_stiffness() for one in interactions), np.zeros(len(nodes)))
-    if any(one.dissipates for one in interactions) or not np.isfinite(touched).all():
+    if not np.isfinite(touched).all():
         return 0.0
     matrix = sparse.csr_array(body.potential.hessian(nodes))
     matrix = matrix + sparse.diags_array(np.repeat(touched, nodes.shape[1]))
@@ -49,8 +51,42 @@ def stable_step(body: Body) -> float:
     return 2 / omega * float(np.sqrt(1 + xi**2) - xi)
 
 
+@dataclass
+class _Rubbed:
+    """Friction in a part of a step.
+
+    Attributes:
+        plain: the loading without it.
+        h: the time [s].
+        forces: force on the nodes by each tool [N], shape (n_nodes, dim).
+        velocities: velocity of each tool [m/s], shape (dim,).
+    """
+
+    plain: Loading
+    h: float
+    forces: list[Floats] = field(default_factory=list)
+    velocities: list[Floats] = field(default_factory=list)
+
+    def dissipated(self, velocity: Floats) -> float:
+        """Return the work against friction [J] at a velocity of the nodes [m/s], shape (n_nodes, dim)."""
+        several = zip(self.forces, self.velocities, strict=True)
+        return -self.h * sum(float((force * (velocity - of_tool)).sum()) for force, of_tool in several)
+
+    @property
+    def loading(self) -> Loading:
+        """The loading with the friction."""
+        if not self.forces:
+            return self.plain
+        several = zip(self.plain.interactions, self.forces, strict=True)
+        return replace(self.plain, interactions=tuple(one.rubbed(force) for one, force in several))
+
+
 class Leapfrog:
-    """Steps of the leapfrog scheme, with half a kick at both ends: order 2, symmetric in time."""
+    """Steps of the leapfrog scheme, with half a kick at both ends: order 2, symmetric in time.
+
+    Friction takes from the tangential velocity of a node what its limit allows, at most all: without regularisation,
+    a node that sticks is at rest.
+    """
 
     def __init__(self, body: Body) -> None:
         """Store the body."""
@@ -65,6 +101,8 @@ class Leapfrog:
         if self._force is None:
             self._force = self._forces(last.positions, levels[0])
         half = last.velocity + h / 2 * (self._force / mass - alpha * last.velocity)
+        half, rubbed = self._rubbed(half, last.positions, levels[0], h / 2)
+        account.damped += rubbed.dissipated(half)
         positions = body.placed(last.positions + h * half, levels[1])
         moved = positions - last.positions
         half = np.where(held, moved / h, half)
@@ -76,7 +114,10 @@ class Leapfrog:
                 force = force - drag
                 account.damped += float((drag * moved).sum())
         velocity = np.where(held, half, (half + h / 2 * force / mass) / (1 + h / 2 * alpha))
-        account.step(body.loading, last.positions, positions, levels[1])
+        velocity, rubbed = self._rubbed(velocity, positions, levels[1], h / 2)
+        account.damped += rubbed.dissipated(half)
+        loading = rubbed.loading
+        account.step(loading, last.positions, positions, levels[1])
         inertia = mass * (velocity - last.velocity) / h
         reaction = np.where(held, inertia - (self._force + force) / 2, 0.0)
         account.support(reaction, moved)
@@ -85,7 +126,32 @@ class Leapfrog:
         self._force = force
         moment, still = Moment(last.time + h, positions, velocity), np.zeros_like(positions)
         state = Equilibrium(levels[1], positions, reaction, still, 0.0, 0, 0.0, converged=True)
-        return Advance(moment, state, body.loading, np.where(held, 0.0, force / mass), account, 0)
+        return Advance(moment, state, loading, np.where(held, 0.0, force / mass), account, 0)
+
+    def _rubbed(self, velocity: Floats, positions: Floats, level: float, h: float) -> tuple[Floats, "_Rubbed"]:
+        """Return the velocity after the friction of a time h [s], and that friction.
+
+        `velocity` [m/s] and `positions` [m] have shape (n_nodes, dim).
+        """
+        body, loading = self.body, self.body.loading
+        found = _Rubbed(loading, h)
+        if not loading.dissipates:
+            return velocity, found
+        velocity = velocity.copy()
+        for one in loading.interactions:
+            slide = one.slide(positions, level)
+            slip = velocity[slide.nodes] - slide.velocity
+            slip -= (slip * slide.normals).sum(axis=1)[:, None] * slide.normals
+            slip[body.held[slide.nodes]] = 0.0
+            size = np.linalg.norm(slip, axis=1)
+            mass = body.mass[slide.nodes]
+            change = -(np.minimum(1.0, h * slide.limit / (mass * np.where(size > 0, size, np.inf))))[:, None] * slip
+            velocity[slide.nodes] += change
+            force = np.zeros_like(velocity)
+            force[slide.nodes] = mass[:, None] * change / h
+            found.forces.append(force)
+            found.velocities.append(slide.velocity)
+        return velocity, found
 
     def _forces(self, positions: Floats, level: float) -> Floats:
         """Return loads minus internal force [N], shape (n_nodes, dim)."""

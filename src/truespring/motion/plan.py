@@ -54,8 +54,7 @@ def planned(body: Body, dynamics: Dynamics) -> Plan:
                 raise ProblemError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
             if not stable:
                 raise ProblemError(
-                    "leapfrog has no stable step with friction or a barrier: use euler, bdf2 or midpoint, or tools "
-                    'with contact = "penalty" and without friction'
+                    'leapfrog has no stable step with a barrier: use euler, bdf2 or midpoint, or contact = "penalty"'
                 )
             if isinstance(step, int | float) and step > stable and dynamics.scheme == "leapfrog":
                 raise ProblemError(
@@ -74,7 +73,7 @@ def _chosen(dynamics: Dynamics, stable: float) -> tuple[str, str]:
     ratio = implicit / (SAFE * stable) if stable else np.inf
     if dynamics.iterations or ratio > _CHEAPER:
         why = "a fixed number of iterations is asked" if dynamics.iterations else f"{ratio:.3g} explicit steps each"
-        why = "friction and barriers have no stable step" if not stable else why
+        why = "a barrier has no stable step" if not stable else why
         return "bdf2", f"scheme bdf2: {why} (the largest stable step of leapfrog is {stable:.3g} s)"
     return "leapfrog", f"scheme leapfrog: its largest stable step is {stable:.3g} s, half of it is taken"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Slide, Touch
-from truespring.tools.friction import Friction
+from truespring.tools.friction import Friction, Given, Rubbing
 from truespring.tools.laws import Law
 from truespring.tools.path import Track
 
@@ -57,7 +57,7 @@ class Contact:
     areas: Floats
     n_nodes: int
     coefficient: float = 0.0
-    friction: Friction | None = None
+    friction: Rubbing | None = None
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -134,7 +134,11 @@ class Contact:
         if self.friction is None:
             return self
         limit, normals = self._limit(positions, level)
-        return replace(self, friction=replace(self.friction, limit=limit, normals=normals))
+        return replace(self, friction=self.friction.renewed(normals, limit))
+
+    def rubbed(self, force: Floats) -> Self:
+        """Return the contact with friction on the nodes that a scheme has found [N], shape (n_nodes, dim)."""
+        return replace(self, friction=Given(force[self.nodes]))
 
     def _limit(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
         """Return the largest friction of each node [N], shape (n,), and the normals, shape (n, dim)."""

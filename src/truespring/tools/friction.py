@@ -1,11 +1,73 @@
-"""Coulomb friction, regularised: a dissipation of the slip in a step, with the normal forces of an earlier state."""
+"""Coulomb friction: regularised, a dissipation of the slip in a step; or given by a scheme that applies it itself."""
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+
+
+class Rubbing(Protocol):
+    """Friction on nodes in a step; `positions` [m] have shape (n, dim), `place` is that of the tool [m]."""
+
+    @property
+    def limit(self) -> Floats:
+        """Coefficient of friction times normal force of nodes whose friction depends on the slip [N], shape (n,)."""
+        ...
+
+    def renewed(self, normals: Floats, limit: Floats) -> Self:
+        """Return the friction with other normals and limits."""
+        ...
+
+    def among(self, which: Ints) -> Self:
+        """Return the friction of some of the nodes, shape (m,)."""
+        ...
+
+    def energy(self, positions: Floats, place: Floats) -> float:
+        """Return the dissipation since the begin of the step [J]."""
+        ...
+
+    def gradient(self, positions: Floats, place: Floats) -> Floats:
+        """Return minus the friction on the nodes [N], shape (n, dim)."""
+        ...
+
+    def blocks(self, positions: Floats, place: Floats) -> Floats:
+        """Return the second derivatives [N/m], shape (n, dim, dim), positive semidefinite."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Friction that a scheme has found, with its dissipation: constant forces on the nodes [N], shape (n, dim)."""
+
+    force: Floats
+
+    @property
+    def limit(self) -> Floats:
+        """Zeros."""
+        return np.zeros(len(self.force))
+
+    def renewed(self, normals: Floats, limit: Floats) -> Self:
+        """Return the friction itself."""
+        return self
+
+    def among(self, which: Ints) -> Self:
+        """Return the friction of some of the nodes, shape (m,)."""
+        return replace(self, force=self.force[which])
+
+    def energy(self, positions: Floats, place: Floats) -> float:
+        """Return zero: the scheme accounts for the dissipation."""
+        return 0.0
+
+    def gradient(self, positions: Floats, place: Floats) -> Floats:
+        """Return minus the forces [N]."""
+        return -self.force
+
+    def blocks(self, positions: Floats, place: Floats) -> Floats:
+        """Return zeros."""
+        n, dim = self.force.shape
+        return np.zeros((n, dim, dim))
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +90,10 @@ class Friction:
     normals: Floats
     limit: Floats
     creep: float
+
+    def renewed(self, normals: Floats, limit: Floats) -> Self:
+        """Return the friction with the normals and limits of another state; the step begins where it did."""
+        return replace(self, normals=normals, limit=limit)
 
     def among(self, which: Ints) -> Self:
         """Return the friction of some of the nodes, shape (m,)."""

@@ -138,6 +138,10 @@ class Springs:
         """Return the springs themselves."""
         return self
 
+    def rubbed(self, force: Floats) -> Self:
+        """Return the springs themselves."""
+        return self
+
     def slide(self, positions: Floats, level: float) -> Slide:
         """Return no friction."""
         dim = positions.shape[1]
