@@ -389,3 +389,11 @@ def test_in_space_tools_hide_what_is_behind_them() -> None:
     assert second.colors is None and last.colors is None
     silhouette = np.linalg.norm(last.lines[..., :2] - seen(np.array([0.03, 0.03, 0.01]))[:2], axis=-1)
     assert len(last.lines) > 20 and silhouette.min() > 0.95 * 0.01  # a circle in the picture
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_grasp_is_drawn_by_its_radius(dim: int) -> None:
+    skin = ts.Grasp("forceps", (0.0,) * dim, 0.012, (0.0,) * dim).skin(np.zeros(dim), 0.1)
+    assert np.linalg.norm(skin.points, axis=1) == pytest.approx(0.012)
+    along = np.linalg.norm(np.diff(skin.points[skin.lines], axis=1)[:, 0], axis=1)
+    assert along.sum() == pytest.approx((1 if dim == 2 else 3) * 2 * np.pi * 0.012, rel=2e-3)

@@ -72,8 +72,9 @@ def near(tools: Sequence[Drawn], lower: Floats, upper: Floats) -> Floats:
 
 def entries(problem: Problem) -> tuple[Entry, ...]:
     """Return the entry of a legend; none without tools and grasps."""
-    several = "s" * (len(problem.touching) > 1)
-    return (Entry(f"tool{several}", MOTION),) if problem.stated and problem.touching else ()
+    counts = {"tool": len(problem.tools), "grasp": len(problem.grasps)}
+    names = [f"{name}{'s' * (count > 1)}" for name, count in counts.items() if count]
+    return (Entry(" and ".join(names), MOTION),) if problem.stated and names else ()
 
 
 def draw_tools(area: Area, tools: Sequence[Drawn], scale: Scale) -> None:
