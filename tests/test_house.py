@@ -135,6 +135,7 @@ ALLOWED = {
         "dynamics",
     },
     "report": {
+        "dynamics",
         "tools",
         "comparison",
         "support_errors",

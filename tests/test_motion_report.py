@@ -20,13 +20,16 @@ from truespring.cli import main
 from truespring.dynamics import Energies, Moving
 from truespring.report.animation import NO_VIDEO, write_animation
 from truespring.report.axis import axis_of, history_words
+from truespring.report.bodies3d import one_color, solid
 from truespring.report.figures import draw_figures
 from truespring.report.page import render_page
+from truespring.report.render import Layer
 from truespring.report.result import MotionErrors, Result
 from truespring.report.summary import summary
+from truespring.report.surfaces import seen
 from truespring.report.tables import result_tables
 from truespring.report.timelines import energies_figure
-from truespring.report.touching import drawn_tools
+from truespring.report.touching import drawn_tools, with_tools
 from truespring.report.verdict import verdict, verdict_sentences
 from truespring.report.viewer import viewer
 from truespring.tools import TOOLS, Tool
@@ -357,3 +360,40 @@ def test_an_unloaded_end_is_not_the_first_view() -> None:
     assert data is not None
     assert data["start"] == 5 and data["axis"]["unit"] == "s"  # a quarter of the period
     assert data["paths"][0]["moved"][0] == data["paths"][0]["moved"][-1] == "0 m"
+
+
+def test_in_space_tools_hide_what_is_behind_them() -> None:
+    """Their faces are in every layer, coloured where those of the body are, and their lines are drawn last."""
+    ball = ts.Sphere("ball", 0.01, [[0, 0.03, 0.04, 0.01], [0.4, 0.03, 0.02, 0.01]])
+    body = ts.Problem(
+        ts.box((0.04, 0.02, 0.02), (2, 1, 1)),
+        ts.Material(young=10e3, poisson=0.3, density=1000.0),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.0, -0.1, 0.0))],
+        dynamics=ts.Dynamics(DURATION, 0.004, "bdf2"),
+        tools=[ball],
+    )
+    skin = ball.skin(np.zeros(3), 0.1)
+    (drawn,) = drawn_tools(body, 0.5)
+    assert seen(np.array([0.03, 0.03, 0.01]) + skin.points) == pytest.approx(drawn.points)
+    facets = body.mesh.boundary
+    points = seen(body.mesh.nodes)
+    layers = (
+        solid(points, facets, one_color(facets, "#ffffff"), facets[:, :2], "#000000", 1.0),
+        Layer(points[facets], None, points[facets[:, :2]], np.zeros((0, 2), dtype=int), "#0072b2", 1.0),
+    )
+    first, second, last = with_tools(layers, [drawn])
+    n = len(facets) + len(skin.facets)
+    assert [one.faces.shape for one in (first, second, last)] == [(n, 4, 3)] * 3
+    assert first.colors is not None and first.colors.shape == (n, 4, 3)
+    assert second.colors is None and last.colors is None
+    silhouette = np.linalg.norm(last.lines[..., :2] - seen(np.array([0.03, 0.03, 0.01]))[:2], axis=-1)
+    assert len(last.lines) > 20 and silhouette.min() > 0.95 * 0.01  # a circle in the picture
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_grasp_is_drawn_by_its_radius(dim: int) -> None:
+    skin = ts.Grasp("forceps", (0.0,) * dim, 0.012, (0.0,) * dim).skin(np.zeros(dim), 0.1)
+    assert np.linalg.norm(skin.points, axis=1) == pytest.approx(0.012)
+    along = np.linalg.norm(np.diff(skin.points[skin.lines], axis=1)[:, 0], axis=1)
+    assert along.sum() == pytest.approx((1 if dim == 2 else 3) * 2 * np.pi * 0.012, rel=2e-3)

@@ -34,7 +34,7 @@ import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js
 
 ColorManagement.enabled = false; // colours are those of the page's other pictures
 
-const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GREY = "#e6e9ec", SOFT = "#3d4248";
+const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GREY = "#e6e9ec", SOFT = "#3d4248", GREEN = "#00795a", PALE = "#8fc7b4";
 const YAW = Math.atan2(0.55, 1), PITCH = Math.atan2(0.5, Math.hypot(0.55, 1)); // where the still pictures look from
 const SIDE = 24, ABOVE = 50, BELOW = 34; // pixels around the body
 const PUSHED = { polygonOffset: true, polygonOffsetFactor: 1.5, polygonOffsetUnits: 2 }; // behind lines on the surface
@@ -111,6 +111,18 @@ window.truespringScene = (canvas, data, bar) => {
     return mesh;
   }
 
+  // The surface of a tool about the middle; it moves without turning.
+  function solid(tool) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(metric(tool.points), 3));
+    geometry.setIndex(new BufferAttribute(tool.triangles, 1));
+    geometry.computeVertexNormals();
+    const mesh = new Mesh(geometry, new MeshLambertMaterial({ color: PALE, flatShading: true, ...PUSHED }));
+    mesh.frustumCulled = false;
+    mesh.visible = tool.triangles.length > 0;
+    return mesh;
+  }
+
   const hiding = () => new MeshBasicMaterial({ colorWrite: false, side: DoubleSide, ...PUSHED });
   const ghost = surface(
     new BufferAttribute(rest, 3), new MeshBasicMaterial({ color: FAINT, transparent: true, opacity: 0.13, depthWrite: false }),
@@ -134,7 +146,8 @@ window.truespringScene = (canvas, data, bar) => {
   const inside = new Strokes(model.inside, BLUE, 0.7, { opacity: 0.3, depthTest: false });
   const elements = new Strokes(data.edges, INK, 0.6, { opacity: 0.5 });
   const rim = new Strokes(new Uint32Array(), INK, 1.6);
-  const strokes = [...black.values(), blue, inside, elements, rim];
+  const tools = data.tools.map((tool) => ({ mesh: solid(tool), edges: new Strokes(tool.lines, GREEN, 1), at: metric(tool.points) }));
+  const strokes = [...black.values(), blue, inside, elements, rim, ...tools.map((tool) => tool.edges)];
 
   const [back, front, top] = [0, 1, 2].map(() => {
     const scene = new Scene(), sun = new DirectionalLight(0xffffff, 0.2 * Math.PI);
@@ -144,7 +157,7 @@ window.truespringScene = (canvas, data, bar) => {
   });
   back.add(ghost, before, grey, ...black.values());
   [ghost, before, grey, ...black.values()].forEach((one, order) => { one.renderOrder = order; });
-  front.add(hidesModel, coloured, elements, inside, blue);
+  front.add(hidesModel, coloured, ...tools.flatMap((tool) => [tool.mesh, tool.edges]), elements, inside, blue);
   top.add(hidesOutline, rim);
   const camera = new OrthographicCamera();
 
@@ -163,17 +176,25 @@ window.truespringScene = (canvas, data, bar) => {
   // The half height of the view, and its middle, that hold everything at the start.
   const hold = (() => {
     const { right, up } = axes(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    const include = (points) => {
+      for (let i = 0; i < points.length / 3; i++) {
+        [right, up].forEach((axis, k) => {
+          const at = dot(axis, points, i);
+          low[k] = Math.min(low[k], at);
+          high[k] = Math.max(high[k], at);
+        });
+      }
+    };
+    include(rest);
     for (const path of data.paths) {
       if (path.beyond || !path.positions.length) continue;
-      for (const points of [rest, metric(path.positions[path.positions.length - 1])]) {
-        for (let i = 0; i < data.n_nodes; i++) {
-          [right, up].forEach((axis, k) => {
-            const at = dot(axis, points, i);
-            low[k] = Math.min(low[k], at);
-            high[k] = Math.max(high[k], at);
-          });
-        }
-      }
+      const last = path.positions.length - 1;
+      for (const level of [Math.min(data.start, last), last]) include(metric(path.positions[level]));
+    }
+    for (const tool of data.tools) { // not planes, nor tools much larger than the body
+      const points = metric(tool.points), far = points.some((value) => Math.abs(value) > 1.5);
+      const shift = tool.shifts[data.start];
+      if (tool.triangles.length && !far) include(points.map((value, i) => value + shift[i % 3] / 65535));
     }
     return { middle: low.map((one, k) => (one + high[k]) / 2), extent: high.map((one, k) => Math.max(one - low[k], 1e-3) / 2) };
   })();
@@ -226,6 +247,11 @@ window.truespringScene = (canvas, data, bar) => {
     inside.visible = !apart && shown.ticked.includes("inside") && inside.lines.length > 0;
     elements.visible = apart;
     for (const lines of [blue, inside, elements]) lines.place(mine.array);
+    tools.forEach((tool, k) => {
+      const moved = shown.shifts[k].map((value) => value / 65535);
+      tool.mesh.position.set(...moved);
+      tool.edges.place(tool.at.map((value, i) => value + moved[i % 3]));
+    });
     shown.apart = apart;
     draw();
   }

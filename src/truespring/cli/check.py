@@ -101,7 +101,10 @@ def _print_plan(screen: "Console", plan: dict[str, Any]) -> None:
         screen.print(f"tool: {tool}", soft_wrap=True)
     force = ", ".join(f"{component:g}" for component in plan["total_force"])
     motion = f", prescribed motion up to {plan['largest_motion']:g} m" if plan["largest_motion"] else ""
-    screen.print(f"total force ({force}) N{motion}, in {plan['load_steps']} load steps")
+    steps = "" if plan["motion"] else f", in {plan['load_steps']} load steps"
+    screen.print(f"total force ({force}) N{motion}{steps}")
+    if plan["motion"]:
+        screen.print(f"motion: {plan['motion']}")
     probe = "the node that moves most" if plan["probe"] is None else f"the node at {plan['probe']} m"
     screen.print(f"probe: {probe}")
     for name, model in plan["models"].items():

@@ -49,7 +49,7 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
             results.append(result)
             with writing(options.out):
                 (options.out / "report.html").unlink(missing_ok=True)  # a report of an earlier command
-                command = verify_command([result], options.out) if comparing else None
+                command = verify_command([result], options.out, options.animate) if comparing else None
                 note = write_rest(result, output, command, options.animate)
         if note and not options.quiet:
             say(f"note: {study.stem}: {note}")
@@ -60,7 +60,7 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
             screen.print(part)
     if comparing:
         with writing(options.out):
-            write_overview(results, options.out)
+            write_overview(results, options.out, options.animate)
         print_file(options, "report", options.out / "report.html")
     if options.json:
         print_each({result.stem: summary(result) for result in results})

@@ -1,9 +1,9 @@
 """animation.gif and animation.mp4: the model over a reference, frame by frame."""
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truespring.errors import one_line
 from truespring.report.frame import EDGE
 from truespring.report.reel import Reel, reel_of, sheet_of, shots, shown_reference
-from truespring.report.render import render, rgb
+from truespring.report.render import Shot, render, rgb
 from truespring.report.result import Result
 from truespring.report.style import BLUE, FAINT, INK, LOAD, MOTION, RED, figure_style
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 _SHADES, _COLORS = (1.0, 0.65, 0.3), {2: 8, 3: 32}
 # Frames, resolution [pixels/inch], duration of all frames [s], shortest and longest of a frame [ms].
 FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 80, 4.0, 40, 400
+
+# Largest size of the bodies in space that are rendered at once [bytes].
+_MOST = 200_000_000
 
 #: What is missing for animation.mp4.
 NO_VIDEO = "no animation.mp4: it needs imageio-ffmpeg: pip install 'truespring[video]'"
@@ -51,13 +54,25 @@ def write_animation(result: Result, folder: Path) -> str:
 
 def _frames(reel: Reel) -> list[NDArray[np.uint8]]:
     """Return the frames, shape (height, width, 3) each, all of one size with even numbers of pixels."""
-    images, _ = render(found)() if (found := shots(reel, 1, reel.levels, _DPI)) else ([], "")
+    each = _size(shots(reel, 1, reel.levels[:1], _DPI))
+    many = max(1, _MOST // each) if each else len(reel.levels)
     with figure_style():
-        return list(_drawn(reel, images))
+        return [
+            frame
+            for start in range(0, len(reel.levels), many)
+            for frame in _drawn(reel, reel.levels[start : start + many])
+        ]
 
 
-def _drawn(reel: Reel, images: list[Any]) -> Iterator[NDArray[np.uint8]]:
-    for number, level in enumerate(reel.levels):
+def _size(several: Sequence[Shot]) -> int:
+    """Return the size of jobs [bytes]."""
+    return sum(layer.faces.nbytes + layer.lines.nbytes for shot in several for layer in shot.layers)
+
+
+def _drawn(reel: Reel, levels: Sequence[float]) -> Iterator[NDArray[np.uint8]]:
+    jobs = shots(reel, 1, levels, _DPI)
+    images = render(jobs)()[0] if jobs else []
+    for number, level in enumerate(levels):
         pixels = sheet_of(reel, [level], images[number : number + 1], "").pixels(_DPI)[..., :3]
         height, width = (length - length % 2 for length in pixels.shape[:2])
         yield np.ascontiguousarray(pixels[:height, :width])

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from truespring.dynamics import Dynamics
 from truespring.report.axis import Axis, axis_of
 from truespring.report.quantity import percent
 from truespring.report.result import Result
@@ -28,6 +29,22 @@ class Part:
 def parts_of(result: Result) -> list[Part]:
     """Return the errors of the compared model in a motion; empty at rest, and if none of them was computed."""
     return list(_parts(result, axis_of(result)))
+
+
+def _alike(dynamics: Dynamics) -> str:
+    """Return what two models have in common in a motion, as the end of a clause: an automatic choice may differ."""
+    same = [name for name in ("scheme", "step") if getattr(dynamics, name) != "auto"]
+    return f", same {' and '.join(same)}" if same else ""
+
+
+def _finer(dynamics: Dynamics) -> str:
+    """Return what reduces the error of the time step."""
+    # The automatic step of leapfrog is that of its stability, of other schemes that of `accuracy`.
+    automatic = dynamics.step == "auto"
+    ways = ["a smaller accuracy"] if automatic and dynamics.scheme != "leapfrog" else []
+    ways += ["a shorter step"] if not automatic or dynamics.scheme in ("auto", "leapfrog") else []
+    ways += ["bdf2 instead of euler"] if dynamics.scheme == "euler" else []
+    return f"take {', or '.join(ways)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,18 +90,15 @@ def _parts(result: Result, axis: Axis) -> Iterator[Part]:
         yield Part(
             "model",
             result.comparisons[name].rms_error,
-            f"{result.paths[result.model].label} against {reference}, same scheme and step",
+            f"{result.paths[result.model].label} against {reference}{_alike(dynamics)}",
             "a shorter step and more iterations do not reduce it",
         )
     if splits is None:
         return
-    # The automatic step of an explicit scheme is that of its stability, of an implicit one that of `accuracy`.
-    shorter = "take a smaller accuracy" if dynamics.step == "auto" else "take a shorter step"
-    other = ", or bdf2 instead of euler" if dynamics.scheme == "euler" else ""
     # Of order 1, steps half as long are as far from the exact motion as from the whole ones, of order 2 a third of it.
     half = "against steps half as long"
     half += ", which are themselves about as far from the exact motion" if dynamics.scheme == "euler" else ""
-    yield Part("time step", splits.step, half, f"{shorter}{other}")
+    yield Part("time step", splits.step, half, _finer(dynamics))
     few = dynamics.iterations
     counted = f"{few} iteration{'s' * (few != 1)} a step" if few else "steps are solved"
     yield Part(

@@ -1,6 +1,6 @@
 """Tools and grasps in pictures: outlines in the plane, surfaces in space."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from truespring.report.render import Layer, rgb
 from truespring.report.sheet import Area
 from truespring.report.style import MOTION
 from truespring.report.surfaces import normals, outline, seen
+from truespring.tools import Skin
 
 # Colour of surfaces, width of lines [points], and how far around the body tools are shown, over its size.
 _SURFACE, _WIDTH, _AROUND = "#8fc7b4", 1.1, 0.35
@@ -35,20 +36,24 @@ class Drawn:
     facets: Ints
 
 
-def drawn_tools(problem: Problem, level: float) -> list[Drawn]:
-    """Return the tools and grasps of a problem at a level that have a surface to draw."""
-    if not problem.stated or not problem.touching:
-        return []
+def skins_at(problem: Problem, level: float) -> Iterator[tuple[Floats, Skin]]:
+    """Yield place [m], shape (dim,), and surface of the tools and grasps at a level that have one to draw."""
     mesh = problem.mesh
     centre, size = (mesh.lower + mesh.upper) / 2, float(np.linalg.norm(mesh.upper - mesh.lower))
-    found = []
-    touches = problem.loading.touches(mesh.nodes, level)
-    for one, touch in zip(problem.touching, touches, strict=True):
+    touches = problem.loading.touches(mesh.nodes, level) if problem.stated and problem.touching else ()
+    for one, touch in zip(problem.touching, touches, strict=False):  # none of results that were read
         skin = one.skin(centre - touch.place, size)
         if skin is not None:
-            points = view(touch.place + skin.points)
-            edges = outline(points, skin.facets, silhouette=True) if len(skin.facets) else skin.lines
-            found.append(Drawn(points, edges, skin.facets))
+            yield touch.place, skin
+
+
+def drawn_tools(problem: Problem, level: float) -> list[Drawn]:
+    """Return the tools and grasps of a problem at a level that have a surface to draw."""
+    found = []
+    for place, skin in skins_at(problem, level):
+        points = view(place + skin.points)
+        edges = outline(points, skin.facets, silhouette=True) if len(skin.facets) else skin.lines
+        found.append(Drawn(points, edges, skin.facets))
     return found
 
 
@@ -67,8 +72,9 @@ def near(tools: Sequence[Drawn], lower: Floats, upper: Floats) -> Floats:
 
 def entries(problem: Problem) -> tuple[Entry, ...]:
     """Return the entry of a legend; none without tools and grasps."""
-    several = "s" * (len(problem.touching) > 1)
-    return (Entry(f"tool{several}", MOTION),) if problem.stated and problem.touching else ()
+    counts = {"tool": len(problem.tools), "grasp": len(problem.grasps)}
+    names = [f"{name}{'s' * (count > 1)}" for name, count in counts.items() if count]
+    return (Entry(" and ".join(names), MOTION),) if problem.stated and names else ()
 
 
 def draw_tools(area: Area, tools: Sequence[Drawn], scale: Scale) -> None:

@@ -26,7 +26,7 @@
       },
     }));
     const tools = data.tools.map((tool) => ({
-      ...tool, lines: pairs(tool.lines), positions: tool.positions.map((text) => places(text, true)),
+      ...tool, lines: pairs(tool.lines), triangles: pairs(tool.triangles), points: places(tool.points, true),
     }));
     return {
       ...data, paths, tools, rest: places(data.rest), outline: pairs(data.outline),
@@ -91,6 +91,12 @@
       return share ? Float64Array.from(p, (value, i) => value + share * (q[i] - value)) : p;
     }
 
+    // How far a tool has moved, interpolated like positions.
+    function shift(tool, place) {
+      const a = tool.shifts[Math.floor(place)], b = tool.shifts[Math.ceil(place)], share = place - Math.floor(place);
+      return a.map((value, i) => value + share * (b[i] - value));
+    }
+
     function index(path, level) {
       const sought = model.levels[level];
       return path.positions.length ? path.levels.findIndex((one) => Math.abs(one - sought) < 1e-9) : -1;
@@ -106,7 +112,7 @@
       if (!canvas.parentElement.clientWidth) return;
       const shown = {
         level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
-        tools: data.tools.map((tool) => ({ lines: tool.lines, points: at(tool, place) })),
+        shifts: data.tools.map((tool) => shift(tool, place)),
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
       };
       paint(shown);
@@ -142,7 +148,7 @@
   function plane(canvas, data) {
     const context = canvas.getContext("2d"), model = data.paths[0];
 
-    return ({ level, reference, outline, mine, theirs, tools, ticked }) => {
+    return ({ level, reference, outline, mine, theirs, shifts, ticked }) => {
       const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
       const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
       const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
@@ -187,7 +193,7 @@
       if (outline) stroke(outline.points, outline.lines, INK, 1.8);
       else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
       stroke(mine, model.lines, BLUE, 1);
-      for (const tool of tools) stroke(tool.points, tool.lines, GREEN, 1.6);
+      data.tools.forEach((tool, k) => stroke(tool.points.map((value, i) => value + shifts[k][i % 2]), tool.lines, GREEN, 1.6));
       if (theirs && ticked.length) {
         const same = new Uint32Array(2 * data.n_nodes);
         for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;

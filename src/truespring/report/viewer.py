@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.equilibrium import Solution, State
+from truespring.mesh.facets import triangles_of
 from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
@@ -14,7 +15,8 @@ from truespring.report.quantity import ROUNDING, natural_scale, percent, quantit
 from truespring.report.result import Result
 from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
 from truespring.report.style import full_name
-from truespring.report.touching import Drawn, drawn_tools, near
+from truespring.report.surfaces import outline
+from truespring.report.touching import drawn_tools, near, skins_at
 from truespring.report.verdict import drive
 
 
@@ -33,9 +35,8 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         return None
     factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
     first, *others = (_cloud(result.paths[name], factor) for name in shown)
-    tools = [drawn_tools(result.problem, level) for level in levels] if mesh.dim == 2 else []
     inside = np.concatenate([mesh.nodes, first])
-    around = [near(several, inside.min(axis=0), inside.max(axis=0)) for several in tools]
+    around = _around(result, levels, inside) if mesh.dim == 2 else []  # in space the camera holds them
     lower, upper, leaves = picture_box(np.concatenate([inside, *around]), others)
     extent = upper - lower
     pack = Packing(lower, float(extent.max()), nodes, mesh.n_nodes)
@@ -58,7 +59,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
             _path(result, name, levels, pack, factor, beyond)
             for name, beyond in zip(shown, [False, *leaves], strict=True)
         ],
-        "tools": [_tool(several, levels, pack) for several in zip(*tools, strict=True)],
+        "tools": _tools(result, levels, pack),
     }
     return {**values, **surface_in_scene(mesh, pack)} if mesh.dim == 3 else values
 
@@ -81,10 +82,28 @@ def _start(path: Solution, levels: Sequence[float]) -> int:
     return int(np.argmax(moved))
 
 
-def _tool(several: Sequence[Drawn], levels: Sequence[float], pack: Packing) -> dict[str, Any]:
-    """Return the outline of a tool of a plane body at each level."""
-    places = [pack.points(one.points, beyond=True) for one in several]
-    return {"levels": list(levels), "positions": places, "lines": pack.numbers(several[0].lines)}
+def _around(result: Result, levels: Sequence[float], inside: Floats) -> list[Floats]:
+    """Return the points of tools of a plane body at each level that are not far from points `inside` [m], (n, 2)."""
+    box = inside.min(axis=0), inside.max(axis=0)
+    return [near(drawn_tools(result.problem, level), *box) for level in levels]
+
+
+def _tools(result: Result, levels: Sequence[float], pack: Packing) -> list[dict[str, Any]]:
+    """Return the surface of each tool at the first level, and its shift since then at each level, in packed steps."""
+    places = [[place for place, _ in skins_at(result.problem, level)] for level in levels]
+    found = []
+    for number, (place, skin) in enumerate(skins_at(result.problem, levels[0])):
+        edges = outline(skin.points, skin.facets) if len(skin.facets) else skin.lines
+        shifts = [[round(pack.steps(float(value)), 1) for value in at[number] - place] for at in places]
+        found.append(
+            {
+                "points": pack.points(place + skin.points, beyond=True),
+                "lines": pack.numbers(edges),
+                "triangles": pack.numbers(triangles_of(skin.facets)),
+                "shifts": shifts,
+            }
+        )
+    return found
 
 
 def _only_surface(path: Solution) -> bool:

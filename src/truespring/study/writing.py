@@ -21,12 +21,15 @@ def output(study: Study | Result, out: Path) -> Output:
     return Output(out / study.stem, "summary.json")
 
 
-def write(result: Result, out: Path, report: bool = True) -> None:
-    """Write curves, summary, VTU series and STL of a study to out/STEM; with `report` also figures and report.html."""
+def write(result: Result, out: Path, report: bool = True, animate: bool = False) -> None:
+    """Write curves, summary, VTU series and STL of a study to out/STEM.
+
+    With `report` also figures and report.html, with `animate` animation.gif and, with imageio-ffmpeg, animation.mp4.
+    """
     with output(result, out) as own:
         for name, path in result.paths.items():
             write_model(path, own, name)
-        write_rest(result, own, verify_command([result], out) if report else None)
+        write_rest(result, own, verify_command([result], out, animate) if report else None, animate)
 
 
 def write_model(path: Solution, output: Output, name: str) -> None:
@@ -65,17 +68,18 @@ def write_rest(result: Result, output: Output, command: str | None, animate: boo
     return note
 
 
-def write_overview(results: Sequence[Result], out: Path) -> None:
+def write_overview(results: Sequence[Result], out: Path, animate: bool = False) -> None:
     """Write out/report.html over several studies that were written before; for one study, copy its report."""
     from truespring.report.page import render_page
 
     if len(results) == 1:
         page = (out / results[0].stem / "report.html").read_bytes()
     else:
-        page = render_page(results, verify_command(results, out)).encode()
+        page = render_page(results, verify_command(results, out, animate)).encode()
     write_whole(out / "report.html", page)
 
 
-def verify_command(studies: Sequence[Study | Result], out: Path) -> str:
+def verify_command(studies: Sequence[Study | Result], out: Path, animate: bool = False) -> str:
     """Return the command line that runs `verify` on the studies."""
-    return command_line(["verify", *(str(study.file) for study in studies), "--out", str(out)])
+    more = ["--animate"] if animate else []
+    return command_line(["verify", *(str(study.file) for study in studies), "--out", str(out), *more])

@@ -11,7 +11,7 @@ from truespring.conditions import Interaction, Slide, Touch
 from truespring.errors import ToolError
 from truespring.loading import Body, vector_words
 from truespring.tools.path import Path, Track, path_words, track_of
-from truespring.tools.skins import Skin, rounded
+from truespring.tools.skins import Skin, circles
 from truespring.tools.surface import surface
 from truespring.tools.values import positive, vector
 
@@ -43,9 +43,9 @@ class Grasp:
         where = f"grasp within {self.radius:g} m of {vector_words(self.at)} m"
         return f"'{self.name}': {where}, {path_words(self.path)}"
 
-    def skin(self, centre: Floats, size: float) -> Skin | None:
-        """Return a circle in the plane, nothing in space; see `Tool.skin`."""
-        return rounded(self.radius, np.zeros(2), np.zeros(2)) if len(centre) == 2 else None
+    def skin(self, centre: Floats, size: float) -> Skin:
+        """Return the circle, in space three circles, of the places within the radius; see `Tool.skin`."""
+        return circles(self.radius, len(centre))
 
     def acting_on(self, body: Body, young: float | None, span: float) -> Interaction:
         """Return the springs of the grasp on a body; arguments and errors as `Tool.acting_on`."""

@@ -58,6 +58,16 @@ def rounded(radius: float, start: Floats, end: Floats) -> Skin:
     return Skin(np.concatenate(points), _no_lines(), facets)
 
 
+def circles(radius: float, dim: int) -> Skin:
+    """Return a circle of a radius [m] about the origin, in space one about each axis."""
+    around = 2 * np.pi * np.arange(_ROUND) / _ROUND
+    ring = np.zeros((_ROUND, dim))
+    ring[:, 0], ring[:, 1] = radius * np.cos(around), radius * np.sin(around)
+    several = [closed(np.roll(ring, axis, axis=1)) for axis in range(dim if dim > 2 else 1)]
+    lines = np.concatenate([number * _ROUND + one.lines for number, one in enumerate(several)])
+    return Skin(np.concatenate([one.points for one in several]), lines, _no_facets())
+
+
 def cuboid(size: Floats) -> Skin:
     """Return the surface of a box along the axes about the origin, in the plane a rectangle; `size` [m], (dim,)."""
     if len(size) == 2:
