@@ -202,7 +202,8 @@ def _motion(
         own = potential.mass if isinstance(potential, Massive) else np.zeros(0)
         mass = own if len(own) else problem.mass
     damper = damper_of(problem, potential, model.finite) if dynamics.damping.stiffness else None
-    return follow_motion(potential, loading, dynamics, mass, damper, solver, report, geometry)
+    crossing = problem.crossing_time
+    return follow_motion(potential, loading, dynamics, mass, damper, solver, report, geometry, crossing)
 
 
 def _coarse_body(model: Model, body: CoarseBody) -> Coarse | None:

@@ -26,7 +26,7 @@ from truespring.loading import (
 )
 from truespring.material import Material, Section, Solid
 from truespring.memory import slices
-from truespring.mesh import MIXED, Mesh, Selection, select_elements
+from truespring.mesh import MIXED, Mesh, Selection, element_corner_measures, select_elements
 from truespring.mesh.selections import AXES
 from truespring.rigid_modes import centred, modes_at, n_modes
 from truespring.tools import TOOLS, Grasp, Tool
@@ -128,6 +128,15 @@ class Problem:
         Raises ProblemError without a density.
         """
         return self.mass_on(self.body)
+
+    @property
+    def crossing_time(self) -> float | None:
+        """The time in which a longitudinal wave crosses the smallest element [s]; None without a material or density."""
+        if self.body.density is None or self.mesh.element == "line":
+            return None
+        stiffness = self.of_elements(lambda material: material.lame.lam + 2 * material.lame.mu)
+        sizes = np.abs(element_corner_measures(self.mesh).sum(axis=1)) ** (1 / self.mesh.dim)
+        return float((sizes * np.sqrt(self.body.density / stiffness)).min())
 
     def mass_on(self, body: Body) -> Floats:
         """Return the lumped mass of the nodes of `body`, which may have mid-edge nodes [kg], shape (n_nodes,)."""

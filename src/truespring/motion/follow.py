@@ -42,6 +42,7 @@ def follow_motion(
     newton: Newton,
     report: Reporter | None = None,
     geometry: Geometry | None = None,
+    crossing: float | None = None,
 ) -> Iterator[Equilibrium]:
     """Yield the recorded states of a motion in the order of time, that at time 0 first.
 
@@ -57,6 +58,7 @@ def follow_motion(
         newton: solver of each implicit step, and of the equilibrium at the begin.
         report: called after each iteration with load factor, iteration and relative residual.
         geometry: functions of the mesh.
+        crossing: time in which a wave crosses the smallest element [s], see `planned`.
 
     Raises ProblemError if the scheme cannot be used, as with a step that is not stable.
     """
@@ -64,7 +66,7 @@ def follow_motion(
     creep = creep_speed(dynamics, potential.nodes)
     acting = damper if dynamics.damping.stiffness else None
     body = Body(potential, loading, mass, dynamics.damping, acting, dynamics.duration, creep)
-    plan = planned(body, dynamics)
+    plan = planned(body, dynamics, crossing)
     begin = _begin(body, dynamics, newton, report, geometry)
     if not begin.converged:
         yield begin

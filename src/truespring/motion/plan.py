@@ -38,8 +38,11 @@ class Plan:
     note: str = ""
 
 
-def planned(body: Body, dynamics: Dynamics) -> Plan:
+def planned(body: Body, dynamics: Dynamics, crossing: float | None = None) -> Plan:
     """Return the scheme and the times of a motion.
+
+    `crossing` [s] is the time in which a wave crosses an element, by which "auto" chooses the same scheme for all models
+    of a problem; None to choose by the stable step.
 
     Raises ProblemError for leapfrog with a step that is not stable, and for a fixed number of iterations with it.
     """
@@ -48,7 +51,7 @@ def planned(body: Body, dynamics: Dynamics) -> Plan:
         stable = stable_step(body)
         safe = SAFE * stable
         if scheme == "auto":
-            scheme, note = _chosen(dynamics, stable)
+            scheme, note = _chosen(dynamics, stable, stable if crossing is None else crossing)
         if scheme == "leapfrog":
             if dynamics.iterations:
                 raise ProblemError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
@@ -67,12 +70,14 @@ def planned(body: Body, dynamics: Dynamics) -> Plan:
     return Plan(scheme, fixed, *_times(body, dynamics, fixed), note)
 
 
-def _chosen(dynamics: Dynamics, stable: float) -> tuple[str, str]:
-    """Return the scheme that costs less, and why."""
+def _chosen(dynamics: Dynamics, stable: float, crossing: float) -> tuple[str, str]:
+    """Return the scheme that costs less, by a time that the stable step is about as long as [s]; and why."""
     implicit = dynamics.step if isinstance(dynamics.step, int | float) else dynamics.duration / _EXPECTED
-    ratio = implicit / (SAFE * stable) if stable else np.inf
+    ratio = implicit / (SAFE * crossing) if stable else np.inf
     if dynamics.iterations or ratio > _CHEAPER:
-        why = "a fixed number of iterations is asked" if dynamics.iterations else f"{ratio:.3g} explicit steps each"
+        why = (
+            "a fixed number of iterations is asked" if dynamics.iterations else f"about {ratio:.2g} explicit steps each"
+        )
         why = "a barrier has no stable step" if not stable else why
         return "bdf2", f"scheme bdf2: {why} (the largest stable step of leapfrog is {stable:.3g} s)"
     return "leapfrog", f"scheme leapfrog: its largest stable step is {stable:.3g} s, half of it is taken"
