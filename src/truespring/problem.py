@@ -131,7 +131,7 @@ class Problem:
 
     @property
     def crossing_time(self) -> float | None:
-        """The time in which a longitudinal wave crosses the smallest element [s]; None without a material or density."""
+        """The time in which a longitudinal wave crosses the smallest element [s]; None without material and density."""
         if self.body.density is None or self.mesh.element == "line":
             return None
         stiffness = self.of_elements(lambda material: material.lame.lam + 2 * material.lame.mu)

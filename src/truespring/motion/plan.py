@@ -41,8 +41,8 @@ class Plan:
 def planned(body: Body, dynamics: Dynamics, crossing: float | None = None) -> Plan:
     """Return the scheme and the times of a motion.
 
-    `crossing` [s] is the time in which a wave crosses an element, by which "auto" chooses the same scheme for all models
-    of a problem; None to choose by the stable step.
+    `crossing` [s] is the time in which a wave crosses an element, by which "auto" chooses the same scheme for all
+    models of a problem; None to choose by the stable step.
 
     Raises ProblemError for leapfrog with a step that is not stable, and for a fixed number of iterations with it.
     """
@@ -75,10 +75,9 @@ def _chosen(dynamics: Dynamics, stable: float, crossing: float) -> tuple[str, st
     implicit = dynamics.step if isinstance(dynamics.step, int | float) else dynamics.duration / _EXPECTED
     ratio = implicit / (SAFE * crossing) if stable else np.inf
     if dynamics.iterations or ratio > _CHEAPER:
-        why = (
-            "a fixed number of iterations is asked" if dynamics.iterations else f"about {ratio:.2g} explicit steps each"
-        )
-        why = "a barrier has no stable step" if not stable else why
+        why = f"about {ratio:.2g} explicit steps each"
+        if dynamics.iterations or not stable:
+            why = "a fixed number of iterations is asked" if dynamics.iterations else "a barrier has no stable step"
         return "bdf2", f"scheme bdf2: {why} (the largest stable step of leapfrog is {stable:.3g} s)"
     return "leapfrog", f"scheme leapfrog: its largest stable step is {stable:.3g} s, half of it is taken"
 
