@@ -33,7 +33,7 @@ def energies_figure(result: Result, name: str) -> Sheet:
     low, high = _limits(result)
     scale = natural_scale(max(abs(low), high), "J")
     shown = [band for band, one in values.items() if np.abs(one).max() > _NONE * (high or 1.0)]
-    legend = [Entry(band, _BANDS[band]) for band in shown] + [Entry("work done on the body", INK)]
+    legend = [Entry(band, _BANDS[band]) for band in shown] + [Entry(_work_words(work), INK)]
     columns, _ = legend_columns(legend, _WIDTH - _LEFT)
     top = 0.4 + ROW * len(columns[0])
     sheet = Sheet(_WIDTH, _BOTTOM + _HEIGHT + top, _energy_title(result, name, values, work))
@@ -48,6 +48,12 @@ def energies_figure(result: Result, name: str) -> Sheet:
     draw_words(sheet, _LEFT, sheet.height - 0.19, sheet.title, 9, bold=True)
     draw_legend(sheet, columns, _LEFT, sheet.height - 0.34)
     return sheet
+
+
+def _work_words(work: Floats) -> str:
+    """Return what the line of work is; at the begin the body may have energy."""
+    begins = abs(float(work[0])) > _NONE * float(np.abs(work).max())
+    return "energy at the begin and work done" if begins else "work done on the body"
 
 
 def moving(result: Result) -> list[str]:
