@@ -158,7 +158,6 @@ ALLOWED = {
         "potential",
         "problem",
         "program",
-        "loading",
         "conditions",
         "report",
         "rigid_modes",

@@ -240,6 +240,7 @@ def test_the_stack_of_energies_is_the_work() -> None:
     (work,) = called(figure, "work")
     assert work.get_ydata()[-1] == pytest.approx(5)
     assert "the scheme added 20 % of the work" in figure.title
+    assert "The scheme itself added 20 % of the energy" in verdict(result(0.02, MotionErrors(0.01, 0.0)))
 
 
 # --- tools ----------------------------------------------------------------------------------------

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import truespring as ts
+from tests.test_petsc import Rank
 from truespring.arrays import Floats
 from truespring.conditions import Interaction
 from truespring.errors import ExportError, MeshError, ProblemError, StudyError
@@ -15,6 +17,9 @@ from truespring.exports.decks import check_fem
 from truespring.mesh import SecondOrder
 from truespring.mesh.facets import triangles_of
 from truespring.mesh.files.stl import stl_bytes
+from truespring.piecewise import Piece
+from truespring.potential import with_diagonal
+from truespring.ranks import Layout, bisected
 from truespring.refining import refined_problem
 from truespring.study import plan, read_study
 from truespring.tools import TOOLS, Tool
@@ -412,6 +417,23 @@ def test_the_springs_of_a_grasp_share_its_stiffness() -> None:
         assert touch.force[0] == pytest.approx(-stiffness * 0.001)
         assert touch.depth == pytest.approx(0.001)
         assert one.loading.interactions[0].largest_stiffness().sum() == pytest.approx(stiffness)
+
+
+def test_processes_share_the_stiffness_of_a_contact() -> None:
+    """Each adds the rows of its own nodes."""
+    one, model = problem(body(2), BALL), ts.Fem("neo-hookean")
+    summed = model.on_pieces(one)
+    assert summed is not None
+    owner = bisected(one.mesh.nodes, 3)
+    pieces = [Piece(summed, one, Layout(Rank(rank, 3), owner)) for rank in range(3)]
+    nodes, blocks = one.loading.interactions[0].blocks(one.mesh.nodes, 1.0)
+
+    def tangent(potential: Any) -> Floats:
+        return np.asarray(with_diagonal(potential.hessian(one.mesh.nodes), blocks, nodes).toarray())
+
+    whole = tangent(model.potential(one))
+    assert np.abs(whole).max() > 2 * np.abs(model.potential(one).hessian(one.mesh.nodes).toarray()).max()
+    assert sum(map(tangent, pieces)) == pytest.approx(whole, abs=1e-12 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("target", TARGETS)

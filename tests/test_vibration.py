@@ -119,7 +119,7 @@ def test_second_order_nodes_have_mass() -> None:
     problem = body(ts.box((0.2, 0.1, 0.1), (3, 1, 1), "tetrahedron"))
     model = replace(SVK, element="quadratic")
     potential: Any = model.potential(problem)
-    mass = problem.mass_on(potential.body)
+    mass = potential.lumped_mass()
     assert mass.sum() == pytest.approx(2.0)
     expected = dense(problem, potential, mass, potential.loading.held)
     assert ts.modes(problem, model, 5).eigenvalues == near(expected[6:11], rel=1e-8)

@@ -17,16 +17,20 @@ SparseMatrix = sparse.bsr_array[Any]
 
 
 def with_diagonal(matrix: SparseMatrix, blocks: Floats, nodes: Ints | None = None) -> SparseMatrix:
-    """Return a matrix plus blocks on its diagonal, of the sparsity of the matrix, which has all diagonal blocks.
+    """Return a matrix plus blocks on its diagonal, of the sparsity of the matrix.
 
-    `blocks` has shape (n, dim, dim), `nodes` (n,), in any order, each once; None for all nodes.
+    The matrix has all diagonal blocks, or those of the rows of one process; others are left out. `blocks` has shape
+    (n, dim, dim), `nodes` (n,), in any order, each once; None for all nodes.
     """
     if not len(blocks):
         return matrix
     rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
     diagonal = np.flatnonzero(matrix.indices == rows)
     data = matrix.data.copy()  # the matrix may belong to the potential
-    data[diagonal if nodes is None else diagonal[nodes]] += blocks
+    place = np.full(len(matrix.indptr) - 1, -1)
+    place[rows[diagonal]] = diagonal
+    place = place if nodes is None else place[nodes]
+    data[place[place >= 0]] += blocks[place >= 0]
     return sparse.bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 

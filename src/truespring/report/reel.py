@@ -79,7 +79,7 @@ def shown_reference(result: Result) -> str | None:
 def reel_of(result: Result, reference: str | None, most: int, from_rest: bool) -> Reel | None:
     """Return a reel of at most `most` instants, evenly spaced; None if fewer than two levels are known.
 
-    `from_rest` tells whether the first level, that of the undeformed body, is one of them.
+    `from_rest`: whether the first level, that of the undeformed body, is one of them.
     """
     model = result.model or next(iter(result.paths))
     path, other = result.paths[model], None if reference is None else result.paths[reference]

@@ -7,6 +7,7 @@ from truespring.equilibrium import Solution
 from truespring.report.axis import axis_of
 from truespring.report.frame import draw_frame
 from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
+from truespring.report.parts import by_scheme
 from truespring.report.plots import Curve, plot
 from truespring.report.quantity import natural_scale, percent
 from truespring.report.result import Result
@@ -33,10 +34,10 @@ def energies_figure(result: Result, name: str) -> Sheet:
     low, high = _limits(result)
     scale = natural_scale(max(abs(low), high), "J")
     shown = [band for band, one in values.items() if np.abs(one).max() > _NONE * (high or 1.0)]
-    legend = [Entry(band, _BANDS[band]) for band in shown] + [Entry("work done on the body", INK)]
+    legend = [Entry(band, _BANDS[band]) for band in shown] + [Entry(_work_words(work), INK)]
     columns, _ = legend_columns(legend, _WIDTH - _LEFT)
     top = 0.4 + ROW * len(columns[0])
-    sheet = Sheet(_WIDTH, _BOTTOM + _HEIGHT + top, _energy_title(result, name, values, work))
+    sheet = Sheet(_WIDTH, _BOTTOM + _HEIGHT + top, _energy_title(result, name))
     span = 0.05 * (high - low) or 0.05
     limits = (low - span if low < 0 else 0.0, high + span)
     y = limits[0] / scale.size, limits[1] / scale.size
@@ -48,6 +49,12 @@ def energies_figure(result: Result, name: str) -> Sheet:
     draw_words(sheet, _LEFT, sheet.height - 0.19, sheet.title, 9, bold=True)
     draw_legend(sheet, columns, _LEFT, sheet.height - 0.34)
     return sheet
+
+
+def _work_words(work: Floats) -> str:
+    """Return what the line of work is; at the begin the body may have energy."""
+    begins = abs(float(work[0])) > _NONE * float(np.abs(work).max())
+    return "energy at the begin and work done" if begins else "work done on the body"
 
 
 def moving(result: Result) -> list[str]:
@@ -92,13 +99,13 @@ def _fill(area: Area, x: Floats, below: Floats, above: Floats, color: str, name:
     area.add(Polygon(corners, closed=True, fc=color, ec="white", lw=0.3, zorder=3, gid=name))
 
 
-def _energy_title(result: Result, name: str, values: dict[str, Floats], work: Floats) -> str:
+def _energy_title(result: Result, name: str) -> str:
     title = f"Energies of {display_name(result, name)}"
-    given, taken = float(np.abs(work).max()), float(values["numerical"][-1])
-    if not given or abs(taken) < 1e-4 * given:
+    taken = by_scheme(result.paths[name])
+    if taken is None or abs(taken) < 1e-4:
         return title
     verb = "dissipated" if taken > 0 else "added"
-    return f"{title}; the scheme {verb} {percent(abs(taken) / given)} of the work"
+    return f"{title}; the scheme {verb} {percent(abs(taken))} of the work"
 
 
 def has_touches(result: Result) -> bool:

@@ -41,8 +41,6 @@ def modes(problem: Problem, model: Model | Potential, count: int = 6, linear: st
     check_fibres(problem, model)
     if not can_vibrate(model):
         raise ModelError(f"{model.label}: modes need a potential, and another program has none: use another model")
-    if problem.body.density is None:
-        raise ProblemError("modes need a mass: set density [kg/m^3] of the material and of each region")
     started = time.perf_counter()
     potential = model.potential(problem)
     system = system_of(problem, potential)

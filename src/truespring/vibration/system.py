@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
@@ -14,7 +13,6 @@ from truespring.errors import ModelError, ProblemError
 from truespring.linear import LinearSolver, choose
 from truespring.linear.direct import SingularMatrixError
 from truespring.linear.gradients import IndefiniteError, SlowError
-from truespring.loading import Body
 from truespring.potential import Potential, SparseMatrix, volumes_of, with_diagonal
 from truespring.problem import Problem
 from truespring.rigid_modes import centred, modes_at
@@ -26,16 +24,6 @@ _ZERO = 1e-8
 _SHIFT = 1e-10
 # Accuracy of linear systems that precondition.
 _ACCURACY = 0.03
-
-
-@runtime_checkable
-class _Bodied(Refined, Protocol):
-    """A potential with further nodes that knows the body of all nodes."""
-
-    @property
-    def body(self) -> Body:
-        """The body with all nodes."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +114,13 @@ def system_of(problem: Problem, potential: Potential) -> System:
     Raises ProblemError without a density, or if all directions are held; ModelError if a node has no mass, or if the
     stiffness is not finite.
     """
-    body = potential.body if isinstance(potential, _Bodied) else problem.body
-    if body.density is None:
+    if problem.body.density is None:
         raise ProblemError("modes need a mass: set density [kg/m^3] of the material and of each region")
-    loading = potential.loading if isinstance(potential, Refined) else problem.loading
-    nodes, held, mass = potential.nodes, loading.held, problem.mass_on(body)
+    if isinstance(potential, Refined):
+        held, mass = potential.loading.held, potential.lumped_mass()
+    else:
+        held, mass = problem.loading.held, problem.mass
+    nodes = potential.nodes
     if mass.shape != (len(nodes),):
         raise ModelError(f"the potential has {len(nodes)} nodes, the body {len(mass)}: their mass is not known")
     if held.all():

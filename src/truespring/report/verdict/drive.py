@@ -31,8 +31,8 @@ class Drive:
 def drive(result: Result) -> Drive:
     """Return the main direction of the total force; without loads, that of the prescribed motion.
 
-    Of results from files, whose loads are unknown, and without loads and moved supports, return the direction in which
-    the probe moves furthest.
+    Of results from files, whose loads are unknown, with tools, and without loads and moved supports, return the
+    direction in which the probe moves furthest.
     """
     if not result.problem.stated:
         return _of_probe(result)
@@ -42,7 +42,7 @@ def drive(result: Result) -> Drive:
         held = result.problem.held[leading]
         return _largest(held.motion[None] if held.motion.any() else loading.motion()[held.nodes])
     force = loading.force(result.problem.mesh.nodes)
-    if not force.any():  # tools, or a velocity at the begin
+    if result.problem.touching or not force.any():  # or a velocity at the begin
         return _of_probe(result)
     total = force.sum(axis=0)
     # Balanced loads have no total: take the largest nodal force.

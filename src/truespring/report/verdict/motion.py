@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from truespring.report.axis import axis_of
-from truespring.report.parts import Part, largest, part_words, parts_of
+from truespring.report.parts import Part, by_scheme, largest, part_words, parts_of
 from truespring.report.quantity import percent, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.verdict.naming import listed
@@ -12,7 +12,10 @@ _SUBJECTS = {"model": "the model", "time step": "the time step", "solver": "the 
 
 
 def motion_sentences(result: Result) -> Iterator[str]:
-    """Yield the largest error of a motion and what reduces it, then all three with what each is measured against."""
+    """Yield the largest error of a motion and what reduces it, then all three with what each is measured against.
+
+    Also the energy that the scheme dissipated, if that is not below the tolerance.
+    """
     parts = parts_of(result)
     if not parts:
         return
@@ -21,6 +24,10 @@ def motion_sentences(result: Result) -> Iterator[str]:
         yield _largest_sentence(result, most)
     shown = [f"{one.name} {part_words(one)} ({one.against})" for one in parts]
     yield f"errors {axis_of(result).at_full}: {', '.join(shown)}."
+    taken = by_scheme(result.paths[result.model or ""])
+    if taken is not None and abs(taken) >= result.tolerance:
+        did = "dissipated" if taken > 0 else "added"
+        yield f"the scheme itself {did} {percent(abs(taken))} of the energy given to the body."
     for note in result.splits.notes if result.splits else ():
         yield f"not every error is known: {note}."
 
