@@ -57,7 +57,7 @@ ROWS = {
     (9, 0.01): (
         *(Row(scheme, steps) for scheme in ("euler", "bdf2", "midpoint") for steps in (1, 2, 4)),
         *(Row(scheme, 1, 1) for scheme in ("euler", "bdf2")),
-        Row("leapfrog", 60),
+        Row("leapfrog", 220),
     ),
     (20, 0.0): (Row("bdf2", 1), Row("bdf2", 4), Row("bdf2", 1, 1), Row("leapfrog", 44)),
 }
