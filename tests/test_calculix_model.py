@@ -406,6 +406,13 @@ def test_without_ccx_the_install_lines_are_told(
 CCX = '[models.calculix]\nkind = "calculix"\n'
 VOLUME = 'kind = "springs"\nrule = "isotropic"\nvolume = true'
 PRESSED = '[[support]]\non = "right"\n\n[[load]]\non = "top"\npressure = "1 Pa"\n\n[solver]'
+BALL = """[[tool]]
+name = "ball"
+shape = "sphere"
+radius = "2 mm"
+path = [[0, "20 mm", "13 mm"], [1, "20 mm", "11 mm"]]
+on = "top"
+"""
 REFUSED: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "unknown key": (CCX + 'lwa = "linear"', (), ("models.calculix.lwa", "did you mean 'law'", "springs")),
     "unknown law": (CCX + 'law = "hencky"', (), ("models.calculix.law", "'linear' or 'saint-venant-kirchhoff'")),
@@ -428,6 +435,22 @@ REFUSED: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         (('force = ["0 N", "-0.01 N"]', 'moment = "1 N mm"'),),
         ("models.calculix", "rotation of a support"),
     ),
+    "motion": (
+        CCX,
+        (("[solver]", '[dynamics]\nduration = "1 s"\n\n[solver]'), ("poisson = 0.3", "poisson = 0.3\ndensity = 1e3")),
+        ("models.calculix", "a motion", "leave [dynamics] out"),
+    ),
+    "history": (
+        CCX,
+        (("[solver]", "over = [[0, 0], [0.5, 1], [1, 0]]\n\n[solver]"),),
+        ("models.calculix", "the history of force (0, -0.01) N", "leave over out"),
+    ),
+    "history on springs": (
+        CCX + 'springs = "springs"',
+        (("[solver]", "over = [[0, 0], [0.5, 1], [1, 0]]\n\n[solver]"),),
+        ("models.calculix", "the history of force (0, -0.01) N", "leave over out"),
+    ),
+    "tool": (CCX, (("[solver]", f"{BALL}\n\n[solver]"),), ("models.calculix", "tools and grasps, such as 'ball'")),
     "control": (
         CCX,
         (("load_steps = 2", 'load_steps = 2\ncontrol = "displacement"\non = "right"\ndirection = "y"\nto = "-1 mm"'),),

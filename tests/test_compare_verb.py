@@ -407,3 +407,26 @@ def test_options_go_to_the_files_that_can_take_them(
 def test_a_probe_off_the_body_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     error = refused(capsys, folder, folder, "--probe", "5, 5", "--out", tmp_path)
     assert "from the nearest node" in error and "(0.16, 0.04)" in error
+
+
+def test_a_motion_is_compared_at_equal_times(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its folder and its series, whose times are seconds, are the motion itself; so is a series that ends early."""
+    dynamics = '[dynamics]\nduration = "40 ms"\nstep = "10 ms"\nscheme = "bdf2"\nrecord = "10 ms"\n\n[solver]'
+    text = changed(("poisson = 0.3", "poisson = 0.3\ndensity = 1e3"), ("[solver]", dynamics))
+    study = written(tmp_path, text)
+    assert main(["solve", str(study), "--out", str(tmp_path), "--quiet"]) == 0
+    capsys.readouterr()
+    folder = tmp_path / "study"
+    series = folder / "springs.pvd"
+    lines = series.read_text().splitlines(keepends=True)
+    early = folder / "early.pvd"
+    early.write_text("".join(line for line in lines if "springs_0004" not in line))
+    for result, last in ((f"{folder}:springs", 1.0), (series, 1.0), (early, 0.75)):
+        found = values(capsys, f"{study}:springs", result, "--out", tmp_path / "compared")
+        assert [level["load_factor"] for level in found["levels"]] == pytest.approx(np.arange(0.25, last + 0.1, 0.25))
+        assert found["load_factor"] == pytest.approx(last)
+        assert found["max_error"] < 1e-5  # the digits of the series
+    assert json.loads((folder / "summary.json").read_text())["duration"] == pytest.approx(0.04)
+    assert "after the duration of the motion, 0.02" in refused(
+        capsys, written(tmp_path, text.replace("40 ms", "20 ms"), "short.toml"), series, "--out", tmp_path / "compared"
+    )

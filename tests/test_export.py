@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -31,6 +32,7 @@ from truespring.arrays import Floats
 from truespring.cli import main
 from truespring.errors import ExportError
 from truespring.exports import TARGETS, Exported, check_targets, solve_springs, target_files
+from truespring.exports.calculix import fem_deck, spring_deck
 from truespring.exports.features import Feature, features
 from truespring.models.spring_data import SpringData
 
@@ -602,6 +604,50 @@ def test_a_target_takes_what_it_names_and_no_more(
         assert in_order(str(raised.value), *named)
         with pytest.raises(ExportError, match=words):
             target_files(solved, [name])
+    assert not list(tmp_path.iterdir())
+
+
+_RISE = [[0, 0], [0.5, 1], [1, 0]]
+_BALL = ts.Sphere("ball", 0.01, [[0, 0.04, 0.06, 0.02], [1, 0.04, 0.05, 0.02]], on="top")
+_HAND = ts.Grasp("hand", (0.08, 0.04, 0.02), 0.03, [[0, 0.08, 0.04, 0.02], [1, 0.09, 0.04, 0.02]])
+#: What no target has: changes to a pulled body, and words of the error.
+_UNWRITTEN: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "motion": (
+        {"dynamics": ts.Dynamics(1.0), "material": ts.Material(10e3, 0.25, density=1e3)},
+        ("a motion", "leave [dynamics] out"),
+    ),
+    "load history": (
+        {"loads": [ts.Force("right", (0.01, 0.0, 0.0), over=_RISE)]},
+        ("history of force (0.01, 0, 0) N", "leave over out"),
+    ),
+    "history of a support": (
+        {"supports": [*_CLAMPED, ts.Fixed("right", fix="x", displacement=(0.01, 0.0, 0.0), over=_RISE)], "loads": []},
+        ("history of 'right' held along x", "leave over out"),
+    ),
+    "tool": ({"tools": [_BALL]}, ("tools and grasps", "'ball'")),
+    "grasp": ({"grasps": [_HAND]}, ("tools and grasps", "'hand'")),
+}
+
+
+@pytest.mark.parametrize("name", _UNWRITTEN)
+def test_what_no_target_has_is_an_error_before_anything_is_solved(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes, words = _UNWRITTEN[name]
+    problem, springs = replace(_pulled(), **changes), ts.Springs("isotropic")
+    assert problem.loading.held.any()  # the problem itself is sound
+    monkeypatch.setattr("truespring.exports.exported.solve", None)
+    for target in TARGETS:
+        with pytest.raises(ExportError) as raised:
+            ts.export(problem, springs, target, tmp_path)
+        assert in_order(str(raised.value), TARGETS[target].program, *words)
+    for write in (
+        lambda: fem_deck(problem, [1.0], "saint-venant-kirchhoff"),
+        lambda: spring_deck(problem, springs.potential(problem), [1.0]),
+    ):
+        with pytest.raises(ExportError) as raised:
+            write()
+        assert in_order(str(raised.value), *words)
     assert not list(tmp_path.iterdir())
 
 

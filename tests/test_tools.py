@@ -355,6 +355,20 @@ def test_below_the_limit_a_plate_sticks() -> None:
     assert np.median(np.abs(slip)) < 2 * creep
 
 
+def test_second_order_elements_touch_like_first_order() -> None:
+    """A first touch in the middle of the way is no snap-through."""
+    forces = []
+    for element in ("quadrilateral", "triangle"):
+        one = problem(
+            ts.rectangle((0.06, 0.03), (16, 8), element), replace(BALL, path=[[0, 0.03, 0.043], [1, 0.03, 0.037]])
+        )
+        solution = ts.solve(one, ts.Fem("neo-hookean"), ts.Newton(4))
+        assert (solution.status, solution.warnings) == (ts.Status.CONVERGED, ())
+        forces.append(solution.states[-1].applied_force[1])
+    assert solution.element == "quadratic"
+    assert forces[0] == pytest.approx(forces[1], rel=0.03)
+
+
 def test_friction_of_a_node_at_a_state() -> None:
     """As an explicit scheme needs it: coefficient times normal force, and the tool's velocity in a motion of 2 s."""
     mesh = body(3)

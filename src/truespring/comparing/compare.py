@@ -87,9 +87,10 @@ def _named(source: Source, folders: int) -> str:
 def _opened(sources: Sequence[Source], progress: Progress | None, timeout: float | None) -> list[Solution]:
     """Return the paths of all sources; STL files are read last, because they need another body."""
     opened: dict[int, Solution] = {}
+    duration = next((one.duration for one in sources if one.duration is not None), None)
     for number, source in sorted(enumerate(sources), key=lambda one: one[1].is_stl):
         other = opened[min(opened)].problem if opened and source.is_stl else None
-        opened[number] = open_source(source, other, progress, timeout)
+        opened[number] = open_source(source, other, progress, timeout, duration)
     return [opened[number] for number in range(len(sources))]
 
 

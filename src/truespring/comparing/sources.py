@@ -60,6 +60,14 @@ class Source:
         return None
 
     @property
+    def duration(self) -> float | None:
+        """The duration of the motion of a study or folder [s]; None at rest, and of a file."""
+        if self.study is not None:
+            return self.study.problem.duration
+        found = _json(self.file / "summary.json").get("duration") if self.file.is_dir() else None
+        return None if found is None else float(found)
+
+    @property
     def is_file(self) -> bool:
         """Whether it is a file of another program, whose unit and axes may differ."""
         return self.study is None and not self.file.is_dir()
@@ -113,9 +121,16 @@ def find_source(text: str, options: FileOptions) -> Source:
 
 
 def open_source(
-    source: Source, other: Problem | None, progress: Progress | None, timeout: float | None = None
+    source: Source,
+    other: Problem | None,
+    progress: Progress | None,
+    timeout: float | None = None,
+    duration: float | None = None,
 ) -> Solution:
-    """Return the path of a source, read or solved; `other` is the problem of another source, for STL files."""
+    """Return the path of a source, read or solved.
+
+    `other` is the problem of another source, for STL files; `duration` [s] that of its motion, for the times of files.
+    """
 
     def advance(share: float) -> None:
         if progress:
@@ -134,7 +149,8 @@ def open_source(
     elif source.is_stl and options.undeformed is None:
         path = read_shell(source.file, options.placing, other)
     else:
-        path = placed(_record(source.file, options, advance), options.placing, source.file.name)
+        placing = replace(options.placing, duration=duration)
+        path = placed(_record(source.file, options, advance), placing, source.file.name)
     advance(1.0)
     return path
 
@@ -160,7 +176,7 @@ def _of_folder(source: Source, advance: Callable[[float], None]) -> Solution:
     if elements.is_file():  # a series of springs holds lines; the body has elements
         mesh = read_mesh(elements)
         record = replace(record, cells=mesh.cells) if mesh.n_nodes == len(record.points) else record
-    path = placed(record, Placing(), f"{saved['label']} of {folder.name}")
+    path = placed(record, Placing(full_time=source.duration), f"{saved['label']} of {folder.name}")
     energies = {float(level): float(energy) for level, energy in saved.get("energies", [])}
     states = [
         replace(state, energy=energies.get(state.load_factor, state.energy))

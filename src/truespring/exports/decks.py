@@ -17,7 +17,7 @@ from truespring.arrays import Floats, Ints
 from truespring.conditions import Loading
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
-from truespring.exports.features import Feature, refuse_fibres, refuse_others, refuse_tools
+from truespring.exports.features import Feature, refuse_fibres, refuse_others, refuse_unwritten
 from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
 from truespring.mesh import Mesh, plural
 from truespring.mesh.facets import facet_keys
@@ -241,11 +241,11 @@ def second_order(problem: Problem, element: str) -> QuadraticPotential | None:
 
 
 def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
-    """Raise ExportError for a problem without continuum, fibres, a load without keyword, or an unknown `element`."""
+    """Raise ExportError for no continuum, an unknown `element`, and what decks of finite elements do not support."""
     if problem.material is None or problem.section is None:
         raise ExportError("a spring network has no continuum: finite elements need a mesh of elements and a material")
     refuse_fibres(problem, "decks of finite elements")
-    refuse_tools(problem, "decks of finite elements")
+    refuse_unwritten(problem, "decks of finite elements")
     for load in problem.loads:
         if law != "linear" and load.follows and not load.cards(problem.mesh):
             raise ExportError(

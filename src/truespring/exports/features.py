@@ -79,9 +79,9 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:
     """Raise UntakenError for the first feature of springs or loads that is not in `takes`.
 
-    Raises ExportError for fibres, tools and grasps.
+    Raises ExportError for fibres, and for what `refuse_unwritten` does.
     """
-    refuse_tools(problem, program)
+    refuse_unwritten(problem, program)
     if springs.beyond != PRESSURE:  # the arrays of these contain the fibres
         refuse_fibres(problem, program)
     for feature, where in features(problem, springs):
@@ -89,10 +89,28 @@ def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Featu
             raise UntakenError(feature, f"{program} does not support {feature}: {where}")
 
 
-def refuse_tools(problem: Problem, program: str) -> None:
-    """Raise ExportError if tools or grasps act on the body."""
+def refuse_unwritten(problem: Problem, program: str) -> None:
+    """Raise ExportError for what no target has: a motion, load histories, tools and grasps."""
+    for what in _unwritten(problem):
+        raise ExportError(f"{program}: {what}")
+
+
+def _unwritten(problem: Problem) -> Iterator[str]:
+    """Yield what no target has, and what to do instead."""
+    if problem.dynamics is not None:
+        yield (
+            "a motion is not exported, only an equilibrium: leave [dynamics] out, or use models that truespring solves"
+        )
+    loads = [(load.over, load.words()) for load in problem.loads]
+    supports = [(support.over, support.words(problem.mesh.dim)) for support in problem.supports]
+    for over, words in (*loads, *supports):
+        if over is not None:
+            yield (
+                f"the history of {words} is not exported, only loads in proportion to the load factor: leave over "
+                "out, or use models that truespring solves"
+            )
     for one in problem.touching:
-        raise ExportError(f"{program}: tools and grasps, such as '{one.name}', are not exported: solve it here")
+        yield f"tools and grasps, such as '{one.name}', are not exported: use models that truespring solves"
 
 
 def refuse_fibres(problem: Problem, program: str) -> None:

@@ -93,7 +93,7 @@ def read_markers(file: Path, reading: Reading | None = None, undeformed: Path | 
         levels.append(Level(load_factor, _in_space(data, axes, "u")[rows]))
     if reading:
         reading(1.0)
-    return checked(Record(file, "csv", points, {}, tuple(levels), names, notes))
+    return checked(Record(file, "csv", points, {}, tuple(levels), names, notes, in_load_factors=True))
 
 
 def _columns(file: Path) -> Columns:

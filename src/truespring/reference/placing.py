@@ -31,6 +31,8 @@ class Placing:
         load_factor: load factor of a file with one level; None means full load.
         full_time: time of full load in the file; None means 1, or the last time if that is later.
         force_unit: unit of force in the file, such as "N"; None omits energies, unless the file has them in J.
+        duration: duration of the motion that the file belongs to [s], None at rest: the time of full load of a file of
+            several levels for which no other is set.
     """
 
     unit: str = "m"
@@ -39,6 +41,7 @@ class Placing:
     load_factor: float | None = None
     force_unit: str | None = None
     full_time: float | None = None
+    duration: float | None = None
 
     def __post_init__(self) -> None:
         letters = [axis.removeprefix("-") for axis in self.axes]
@@ -155,11 +158,11 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
         return factors, [f"its {len(times)} levels have no ascending times and count as equal fractions of the load"]
     last = times[-1]
     if placing.full_time is not None:
-        if last > placing.full_time * (1 + 1e-6):
-            raise ReferenceFileError(
-                f"{record.file} ends at time {last:g}, after the time of full load, {placing.full_time:g}"
-            )
-        return [_rounded(time / placing.full_time) for time in times], []
+        return _over(times, placing.full_time, f"{record.file} ends", "time of full load"), []
+    if placing.duration is not None and len(times) > 1 and not record.in_load_factors:
+        return _over(times, placing.duration, f"{record.file} ends", "duration of the motion"), [
+            f"its times are over the duration of the motion, {placing.duration:g} s; change this by --full-time"
+        ]
     if last <= 1 + 1e-6:
         short = (
             [] if last >= 1 - 1e-6 else [f"it ends at time {last:.6g}, which is used as load factor: full load is 1"]
@@ -171,6 +174,13 @@ def _load_factors(record: Record, placing: Placing) -> tuple[list[float], list[s
         f"its times {times[0]:.6g} to {last:.6g} are used as load factors {times[0] / last:.6g} to 1, the last as "
         "full load; change this by --full-time"
     ]
+
+
+def _over(times: list[float], whole: float, file_ends: str, name: str) -> list[float]:
+    """Return times as shares of a time; raise ReferenceFileError if they end after it."""
+    if times[-1] > whole * (1 + 1e-6):
+        raise ReferenceFileError(f"{file_ends} at time {times[-1]:g}, after the {name}, {whole:g}: set --full-time")
+    return [_rounded(time / whole) for time in times]
 
 
 def _rounded(load_factor: float) -> float:

@@ -40,6 +40,7 @@ class Record:
         levels: at least one level, in the order of the file; the undeformed state only if the file has it.
         names: number or name of each point in the file, of length n_points, or empty.
         stopped: whether the run stopped early, according to the file.
+        in_load_factors: whether the times are load factors, not seconds.
         notes: remarks on the file.
     """
 
@@ -51,3 +52,4 @@ class Record:
     names: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
     stopped: bool = False
+    in_load_factors: bool = False

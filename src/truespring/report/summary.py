@@ -25,19 +25,24 @@ def summary(result: Result) -> dict[str, Any]:
         "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
         "comparison": {name: _comparison(one) | _standing(result, name) for name, one in result.comparisons.items()},
         "closest": result.closest,
-    } | _splits(result)
+    } | _motion(result)
 
 
-def _splits(result: Result) -> dict[str, Any]:
-    """Return the errors of the model, of the time step and of the solver of a motion; empty at rest."""
-    splits = result.splits
-    if splits is None:
+def _motion(result: Result) -> dict[str, Any]:
+    """Return duration [s], and errors of the model, of the time step and of the solver of a motion; empty at rest."""
+    duration, splits = result.problem.duration, result.splits
+    if duration is None:
         return {}
+    if splits is None:
+        return {"duration": duration}
     parts = parts_of(result)
     most = largest(parts)
     model = next((one.value for one in parts if one.name == "model"), None)
     errors = {"model_error": model, "step_error": splits.step, "solver_error": splits.solver}
-    return {"motion": errors | {"largest": most.name if most else None, "notes": list(splits.notes)}}
+    return {
+        "duration": duration,
+        "motion": errors | {"largest": most.name if most else None, "notes": list(splits.notes)},
+    }
 
 
 def _model(path: Solution, probe: int) -> dict[str, Any]:

@@ -359,9 +359,12 @@ class Watch:
         A force below rounding errors ends the iteration only if the residual is near the best one (else it has
         diverged), and if another step does not reduce it (else it may be the force of a small load).
         """
-        below = self._size <= self._balance.rounding(tangent, positions)
+        rounding = self._balance.rounding(tangent, positions)
+        below = self._size <= rounding
         self.below_rounding = below and self.residual <= _NEAR_BEST * self.best.residual
-        unloaded = self._balance.loading.vanishes(self.load_factor, positions)
+        loading = self._balance.loading
+        unloaded = loading.vanishes(self.load_factor, positions)
+        unloaded |= bool(loading.interactions) and self._scale <= rounding  # a tool that only just touches
         self._noise = unloaded and self.below_rounding
         noise = self._noise or (self.below_rounding and self._size > self._size_before / 2)
         self._size_before = self._size if self.below_rounding else np.inf

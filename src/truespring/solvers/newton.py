@@ -92,10 +92,7 @@ class Newton(Solver):
         smallest, strict, ever_refused = step / 2**self.max_cutbacks, admissible(potential.nodes), False
         while last.state.converged and last.state.load_factor < 1.0:
             level = self._next_level(last.state.load_factor, step, loading.corners)
-            if previous is not None and any(previous.load_factor < one < level - _SAME for one in loading.corners):
-                previous = None  # the motion before a corner of a history says nothing about that after it
-            if loading.vanishes(last.state.load_factor, last.state.positions):
-                previous = None  # nor that before a tool touches the body
+            previous = _before(loading, previous, last.state, level)
             balance.loading = loading.since(last.state.positions, last.state.load_factor, _CREEP * balance.size)
             reached = _settled(balance, level, self._find(balance, level, last, previous, admissible, jump))
             spent += reached.state.iterations
@@ -248,6 +245,17 @@ def _find_by_search(balance: Balance, level: float, last: Found, previous: Equil
         return Found(replace(state, load_factor=level, iterations=0, residual=np.inf, converged=False))
     start = min(guesses, key=lambda guess: balance.norm(balance.force(guess, level)))
     return stabilised(balance, descend(balance, level, start))
+
+
+def _before(loading: Loading, previous: Equilibrium | None, last: Equilibrium, level: float) -> Equilibrium | None:
+    """Return the state before the last one, None if their difference says nothing about the step to `level`.
+
+    It does not beyond a corner of a history, and while or before a tool touches the body for the first time.
+    """
+    if previous is None or any(previous.load_factor < corner < level - _SAME for corner in loading.corners):
+        return None
+    idle = loading.interactions and any(loading.vanishes(one.load_factor, one.positions) for one in (previous, last))
+    return None if idle else previous
 
 
 def _settled(balance: Balance, level: float, found: Found) -> Found:

@@ -1,7 +1,7 @@
 """Contact of a tool with the surface of a body: forces on its nodes by their gaps, and friction."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -31,6 +31,26 @@ class Shape(Protocol):
     def bends(self, places: Floats) -> Floats:
         """Return the second derivatives of the gap [1/m], shape (n, dim, dim); symmetric."""
         ...
+
+
+class Near(NamedTuple):
+    """Nodes near a tool.
+
+    Attributes:
+        rows: their places among the nodes of a contact, shape (n,).
+        gaps: [m], shape (n,).
+        normals: shape (n, dim).
+    """
+
+    rows: Ints
+    gaps: Floats
+    normals: Floats
+
+    def on_all(self, n_nodes: int, dim: int) -> tuple[Floats, Floats]:
+        """Return gaps and normals of all nodes of the contact; others have an infinite gap and no normal."""
+        gaps, normals = np.full(n_nodes, np.inf), np.zeros((n_nodes, dim))
+        gaps[self.rows], normals[self.rows] = self.gaps, self.normals
+        return gaps, normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +89,15 @@ class Contact:
         """Whether there is friction."""
         return self.coefficient > 0
 
-    def gaps(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
-        """Return the gaps of the nodes [m], shape (n,), and the normals [-], shape (n, dim).
-
-        Nodes out of reach of the tool's bounds have an infinite gap and no normal.
-        """
-        places = positions[self.nodes] - self.track.at(level)
+    def near(self, positions: Floats, level: float) -> Near:
+        """Return the nodes that lie within the bounds of the tool and its reach."""
+        places = positions.take(self.nodes, axis=0) - self.track.at(level)
         lower, upper = self.shape.bounds
-        near = ((places >= lower - self.law.reach) & (places <= upper + self.law.reach)).all(axis=1)
-        gaps, normals = np.full(len(places), np.inf), np.zeros_like(places)
-        gaps[near], normals[near] = self.shape.gaps(places[near])
-        return gaps, normals
+        there = (places >= lower - self.law.reach) & (places <= upper + self.law.reach)
+        rows = np.flatnonzero(np.logical_and.reduce(there.T))
+        if not len(rows):
+            return Near(rows, np.zeros(0), np.zeros((0, positions.shape[1])))
+        return Near(rows, *self.shape.gaps(places.take(rows, axis=0)))
 
     def energy(self, positions: Floats, level: float) -> float:
         """Return the stored energy plus the dissipation since the begin of the step [J]; infinite inside a barrier."""
@@ -90,37 +108,41 @@ class Contact:
 
     def stored(self, positions: Floats, level: float) -> float:
         """Return the stored energy alone [J]."""
-        return float(self.areas @ self.law.energy(self.gaps(positions, level)[0]))
+        near = self.near(positions, level)
+        return float(self.areas[near.rows] @ self.law.energy(near.gaps))
 
     def gradient(self, positions: Floats, level: float) -> Floats:
         """Return minus the force on the nodes [N], shape (n_nodes, dim)."""
-        found = np.zeros_like(positions)
-        found[self.nodes] = self._gradient(positions, level)
+        found, near = np.zeros_like(positions), self.near(positions, level)
+        if len(near.rows):
+            found[self.nodes[near.rows]] = self._pushed(near)
+        if self.friction is not None:
+            found[self.nodes] += self.friction.gradient(positions[self.nodes], self.track.at(level))
         return found
 
-    def _gradient(self, positions: Floats, level: float) -> Floats:
-        """Return minus the force on the nodes that the tool may touch [N], shape (n, dim)."""
-        gaps, normals = self.gaps(positions, level)
-        pushed: Floats = (self.areas * self.law.slope(gaps))[:, None] * normals
-        if self.friction is not None:
-            pushed = pushed + self.friction.gradient(positions[self.nodes], self.track.at(level))
-        return pushed
+    def _pushed(self, near: Near) -> Floats:
+        """Return minus the normal force on nodes [N], shape (n, dim)."""
+        return np.asarray((self.areas[near.rows] * self.law.slope(near.gaps))[:, None] * near.normals)
 
     def blocks(self, positions: Floats, level: float) -> tuple[Ints, Floats]:
         """Return nodes, shape (n,), and the second derivatives of the energy [N/m], shape (n, dim, dim), symmetric.
 
         They are exact: on a convex tool they include the negative stiffness of nodes that slide off.
         """
-        gaps, normals = self.gaps(positions, level)
-        slid = np.zeros(len(gaps)) if self.friction is None else self.friction.limit
-        near = np.flatnonzero((gaps < self.law.reach) | (slid > 0))
-        gap, normal, areas = gaps[near], normals[near], self.areas[near]
+        near = self.near(positions, level)
+        rows, gaps, normals = near.rows, near.gaps, near.normals
+        if self.friction is not None:  # it may act on nodes that have left the tool
+            rows = np.arange(len(self.nodes))
+            gaps, normals = near.on_all(len(rows), positions.shape[1])
+        slid = np.zeros(len(rows)) if self.friction is None else self.friction.limit
+        act = np.flatnonzero((gaps < self.law.reach) | (slid > 0))
+        rows, gap, normal = rows[act], gaps[act], normals[act]
+        areas, places = self.areas[rows], positions[self.nodes[rows]]
         found = (areas * self.law.bend(gap))[:, None, None] * (normal[:, :, None] * normal[:, None, :])
-        places = positions[self.nodes[near]]
         found += (areas * self.law.slope(gap))[:, None, None] * self.shape.bends(places - self.track.at(level))
         if self.friction is not None:
-            found += self.friction.among(near).blocks(places, self.track.at(level))
-        return self.nodes[near], found
+            found += self.friction.among(rows).blocks(places, self.track.at(level))
+        return self.nodes[rows], found
 
     def since(self, positions: Floats, level: float, creep: float) -> Self:
         """Return the contact in a step that begins at a state; friction is full from a slip of `creep` [m] on."""
@@ -142,30 +164,35 @@ class Contact:
 
     def _limit(self, positions: Floats, level: float) -> tuple[Floats, Floats]:
         """Return the largest friction of each node [N], shape (n,), and the normals, shape (n, dim)."""
-        gaps, normals = self.gaps(positions, level)
+        gaps, normals = self.near(positions, level).on_all(len(self.nodes), positions.shape[1])
         return -self.coefficient * self.areas * self.law.slope(gaps), normals
 
     def slide(self, positions: Floats, level: float) -> Slide:
         """Return the largest friction of the nodes that touch, for schemes that apply it node by node."""
-        limit, normals = self._limit(positions, level)
+        near = self.near(positions, level)
+        limit = -self.coefficient * self.areas[near.rows] * self.law.slope(near.gaps)
         there = limit > 0
-        return Slide(self.nodes[there], normals[there], limit[there], self.track.velocity(level))
+        nodes = self.nodes[near.rows[there]]
+        return Slide(nodes, near.normals[there], limit[there], self.track.velocity(level))
 
     def cleared(self, positions: Floats, level: float) -> Floats:
         """Return positions with the nodes inside of a barrier moved out of it [m], shape (n_nodes, dim)."""
-        gaps, normals = self.gaps(positions, level)
-        inside = np.flatnonzero(gaps < self.law.clearance)
-        if not len(inside):
+        near = self.near(positions, level)
+        inside = near.gaps < self.law.clearance
+        if not inside.any():
             return positions
         moved = positions.copy()
-        moved[self.nodes[inside]] += (self.law.clearance - gaps[inside])[:, None] * normals[inside]
+        out = (self.law.clearance - near.gaps[inside])[:, None] * near.normals[inside]
+        moved[self.nodes[near.rows[inside]]] += out
         return moved
 
     def touch(self, positions: Floats, level: float) -> Touch:
         """Return place, force of the body on the tool, and depth, which is zero as long as a barrier holds."""
-        gaps, _ = self.gaps(positions, level)
-        force = self._gradient(positions, level).sum(axis=0)
-        return Touch(self.track.at(level), force, max(0.0, -float(gaps.min())))
+        near, place = self.near(positions, level), self.track.at(level)
+        force = self._pushed(near).sum(axis=0)
+        if self.friction is not None:
+            force = force + self.friction.gradient(positions[self.nodes], place).sum(axis=0)
+        return Touch(place, force, max(0.0, -float(near.gaps.min(initial=0.0))))
 
     def largest_stiffness(self) -> Floats:
         """Return an upper bound of the stiffness of each node without friction [N/m], shape (n_nodes,).

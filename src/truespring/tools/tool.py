@@ -147,21 +147,20 @@ class Tool(Touching, ABC):
 
     def _check_start(self, contact: Contact, nodes: Floats, size: float) -> None:
         """Raise ToolError if the tool starts inside a body of a size [m]; `nodes` [m], shape (n_nodes, dim)."""
-        gaps, normals = contact.gaps(nodes, 0.0)
-        deepest = int(gaps.argmin())
-        slack = _ROUNDING * size
-        if gaps[deepest] >= slack or (gaps[deepest] > -slack and not contact.law.clearance > 0):
+        near, slack = contact.near(nodes, 0.0), _ROUNDING * size
+        gap = float(near.gaps.min(initial=np.inf))
+        if gap >= slack or (gap > -slack and not contact.law.clearance > 0):
             return
-        out = -normals[deepest]
-        place = vector_words(nodes[contact.nodes[deepest]])
-        if gaps[deepest] > -slack:
+        deepest = int(near.gaps.argmin())
+        node, out = int(contact.nodes[near.rows[deepest]]), -near.normals[deepest]
+        if gap > -slack:
             says, further = "touches the body, and a barrier starts outside", contact.law.reach
         else:
-            says, further = f"starts inside the body by {-gaps[deepest]:.4g} m", -float(gaps[deepest])
+            says, further = f"starts inside the body by {-gap:.4g} m", -gap
         way_out = vector_words(contact.track.at(0.0) + further * out, 4)
         raise ToolError(
             self.name,
-            f"{says}, at node {contact.nodes[deepest]} at {place} m: begin the path further out, such as at "
+            f"{says}, at node {node} at {vector_words(nodes[node])} m: begin the path further out, such as at "
             f"{way_out} m",
             "path",
         )
