@@ -15,6 +15,7 @@ from truespring.motion.stages import ORDERS
 
 NEWTON = ts.Newton(tolerance=1e-12)
 G = 9.81
+LONG = pytest.mark.verification
 
 
 def oscillator(dynamics: ts.Dynamics, stiffness: float = 4.0, mass: float = 1.0) -> ts.Solution:
@@ -91,8 +92,8 @@ def momenta(path: ts.Solution) -> tuple[np.ndarray, np.ndarray]:
     return linear, angular
 
 
-@pytest.mark.parametrize("damping", [0.0, pytest.param(2e-3, marks=pytest.mark.verification)])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("damping", [0.0, pytest.param(2e-3, marks=LONG)])
+@pytest.mark.parametrize("model", [pytest.param(one, marks=[] if one == "gaussian" else LONG) for one in MODELS])
 def test_a_free_body_keeps_its_momenta(model: str, damping: float) -> None:
     """A body that was spun by a moment and pulled for a while flies on freely; damping by the material keeps both."""
     pulled = [
@@ -131,7 +132,7 @@ def cantilever(model: object, dynamics: ts.Dynamics | None, load: float = -1e-6,
     return ts.solve(problem, model, ts.Newton(tolerance=1e-11, **further))
 
 
-@pytest.mark.parametrize("model", [ts.Springs("gaussian"), ts.Fem("neo-hookean")], ids=["gaussian", "fem"])
+@pytest.mark.parametrize("model", [ts.Springs("gaussian"), pytest.param(ts.Fem("neo-hookean"), marks=LONG)])
 def test_the_first_frequency_of_a_cantilever(model: ts.Fem) -> None:
     """The midpoint rule lengthens a period: it has the frequency (2 / h) atan(omega h / 2)."""
     problem = cantilever(model, None).problem
@@ -158,6 +159,7 @@ def test_a_very_long_step_is_the_static_solution(model: ts.Fem) -> None:
     assert np.abs(path.states[-1].displacement - still).max() < 1e-7 * np.abs(still).max()
 
 
+@LONG
 def test_a_pendulum_of_ninety_degrees() -> None:
     """Period 4 sqrt(L / g) K(sin 45 deg); the spring's own stretch is below 1e-3."""
     nodes = np.array([[0.0, 0.0], [1.0, 0.0]])
@@ -237,7 +239,7 @@ def test_a_free_fall(scheme: str, model: ts.Fem) -> None:
     assert problem.mass.sum() == pytest.approx(1000 * 0.1 * 0.05 * 0.01, rel=1e-14)
 
 
-@pytest.mark.parametrize("model", [ts.Springs("gaussian"), ts.Fem("neo-hookean")], ids=["gaussian", "fem"])
+@pytest.mark.parametrize("model", [ts.Springs("gaussian"), pytest.param(ts.Fem("neo-hookean"), marks=LONG)])
 def test_longitudinal_vibration_of_a_bar(model: ts.Fem) -> None:
     """Frequency c / 4 L of a bar fixed at one end whose width is free, and the arrival of a front at L / c."""
     length, n, young, density = 0.4, 40, 1e4, 1000.0
@@ -275,7 +277,7 @@ def test_runs_repeat_bit_for_bit() -> None:
     assert all((a.positions == b.positions).all() for a, b in zip(one.states, other.states, strict=True))
 
 
-@pytest.mark.verification
+@LONG
 def test_an_automatic_step_keeps_its_accuracy() -> None:
     model = ts.Springs("gaussian")
     truth = cantilever(model, ts.Dynamics(0.2, step=2e-4, scheme="midpoint", record=0.02), -2e-3)
@@ -334,12 +336,21 @@ def test_the_motion_begins_at_the_equilibrium_of_time_zero() -> None:
         ({"velocity": (1.0,)}, "velocity"),
         ({"scheme": "leapfrog", "step": 0.05}, "not stable with leapfrog"),
         ({"scheme": "leapfrog", "step": 1e-4, "iterations": 1}, "no iterations"),
+        ({"damping": 0.1}, "damping = 0.1: must be Damping("),
+        ({"accuracy": "x"}, "accuracy = 'x'"),
+        ({"substeps": 0}, "substeps = 0"),
+        ({"iterations": True, "step": 1e-3}, "iterations = True"),
     ],
 )
 def test_bad_input(change: dict, says: str) -> None:
     with pytest.raises(TruespringError) as raised:
         cantilever(ts.Fem("neo-hookean"), ts.Dynamics(**{"duration": 0.1, **change}))
     assert says in str(raised.value)
+
+
+def test_a_support_that_moves_needs_a_history() -> None:
+    with pytest.raises(TruespringError, match="would jump at time 0: give its history, such as over"):
+        strip(ts.Dynamics(0.1), supports=[ts.Fixed("left", displacement=(1e-3, 0.0))])
 
 
 def test_a_motion_needs_a_density_and_newton() -> None:
@@ -357,3 +368,121 @@ def test_a_step_that_fails_keeps_what_was_reached() -> None:
     path = cantilever(ts.Fem("neo-hookean"), dynamics, -2e-3, max_iterations=1)
     assert path.status is ts.Status.NOT_CONVERGED and path.states[0].load_factor == 0.0
     assert any("the step from time" in warning and "shorter step" in warning for warning in path.warnings)
+
+
+def strip(dynamics: ts.Dynamics | None, model: object | None = None, **further: object) -> ts.Solution:
+    """A small cantilever, by default with springs."""
+    known = {
+        "mesh": ts.rectangle((0.04, 0.02), (4, 2)),
+        "material": ts.Material(1e4, 0.3, density=1000.0),
+        "section": ts.PlaneStress(0.01),
+        "supports": [ts.Fixed("left")],
+        "dynamics": dynamics,
+    }
+    return ts.solve(ts.Problem(**{**known, **further}), model or ts.Springs("gaussian"), ts.Newton(tolerance=1e-9))
+
+
+def test_an_automatic_step_follows_a_load_that_grows_from_zero_later() -> None:
+    pull = [ts.Force("right", (0.0, -0.02), over=[(0.0, 0), (0.02, 0), (0.06, 1)])]
+    truth = strip(ts.Dynamics(0.1, step=2e-4, scheme="midpoint", record=0.02), loads=pull)
+    path = strip(ts.Dynamics(0.1, scheme="bdf2", record=0.02), loads=pull)
+    assert path.complete, path.warnings
+    away = [np.abs(a.displacement - b.displacement).max() for a, b in zip(path.states, truth.states, strict=True)]
+    assert max(away) < 0.01 * np.abs(truth.states[-1].displacement).max()
+
+
+@pytest.mark.parametrize("model", [ts.Springs("isotropic"), ts.Fem("saint-venant-kirchhoff"), ts.Fem("linear")])
+def test_a_body_that_rests_at_first_is_not_unstable(model: ts.Fem) -> None:
+    pull = [ts.Force("right", (0.0, -0.02), over=[(0.0, 0), (0.05, 0), (0.1, 1)])]
+    path = strip(ts.Dynamics(0.1, step=2e-3, scheme="bdf2", record=0.02), model, loads=pull)
+    assert path.status is ts.Status.CONVERGED, path.warnings
+
+
+def test_a_pulse_shorter_than_the_step_is_not_missed() -> None:
+    """Steps end at the corners of histories; the momentum of the pulse is force times duration."""
+    pulse = [(0.0, 0), (0.051, 0), (0.052, 1), (0.054, 1), (0.055, 0)]
+    loads = [ts.Force("right", (0.0, -0.1), over=pulse)]
+    path = strip(ts.Dynamics(0.06, step=0.01, scheme="midpoint"), loads=loads, supports=())
+    momentum = (path.problem.mass[:, None] * path.states[-1].moving.velocity).sum(axis=0)
+    assert momentum == pytest.approx([0.0, -0.1 * 0.003], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("scheme", [pytest.param(one, marks=[] if one == "midpoint" else LONG) for one in ORDERS])
+def test_a_support_that_stops_comes_to_rest(scheme: str) -> None:
+    """Held nodes have the velocity of their support, and it carries what their inertia and damping need."""
+    moved = [ts.Fixed("left", displacement=(4e-3, 0.0), over=[(0.0, 0), (0.05, 1)])]
+    damping = ts.Damping(stiffness=5e-3, mass=10.0)
+    path = strip(ts.Dynamics(0.2, step=5e-4, scheme=scheme, damping=damping, record=0.05), supports=moved)
+    left = path.problem.mesh.nodes[:, 0] == 0
+    assert path.states[-1].moving.velocity[left] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(path.states[-1].reaction).max() < 2e-3 * np.abs(path.states[0].reaction).max() + 1e-4
+    kept = [state.moving.energies for state in path.states]
+    done = max(abs(one.loads) for one in kept)
+    assert max(abs(one.numerical) for one in kept) < (0.05 if scheme in ("midpoint", "leapfrog") else 0.5) * done
+
+
+def test_drag_on_a_moved_support() -> None:
+    """A body moved as a whole at 0.1 m/s against alpha M v: the supports carry it, for all schemes."""
+    moved = [ts.Fixed(range(15), displacement=(0.01, 0.0), over=[(0.0, 0), (0.1, 1)])]
+    for scheme in ORDERS:
+        asked = ts.Dynamics(0.1, step=1e-3, scheme=scheme, damping=ts.Damping(mass=10.0), record=0.05)
+        path = strip(asked, supports=moved)
+        force = path.states[1].reaction[:, 0].sum()
+        assert force == pytest.approx(10.0 * path.problem.mass.sum() * 0.1, rel=1e-9), scheme
+        assert abs(path.states[1].moving.energies.numerical) < 1e-12
+
+
+def test_a_free_fall_of_second_order_elements() -> None:
+    mesh = ts.rectangle((0.04, 0.02), (2, 1), element="triangle")
+    for model in (ts.Fem("neo-hookean", element="quadratic"), ts.Springs("gaussian", element="quadratic")):
+        asked = ts.Dynamics(0.04, step=4e-3, scheme="midpoint")
+        last = strip(asked, model, mesh=mesh, supports=(), loads=[ts.Gravity((0.0, -G))]).states[-1]
+        assert last.moving.velocity[:, 1] == pytest.approx(-G * 0.04, rel=1e-9)
+
+
+def test_the_equilibrium_at_time_zero_has_the_grasps_of_time_zero() -> None:
+    """Nothing moves under gravity while a grasp rests."""
+    hold = ts.Grasp("hand", (0.04, 0.01), 0.011, [(0.0, 0.04, 0.01), (0.1, 0.04, 0.01)])
+    asked = ts.Dynamics(0.1, step=5e-3, scheme="bdf2", start="equilibrium")
+    path = strip(asked, loads=[ts.Gravity((0.0, -G))], grasps=[hold])
+    sagged = np.abs(path.states[0].displacement).max()
+    assert path.states[0].touches[0].force[1] < -1e-3
+    moved = max(np.abs(state.displacement - path.states[0].displacement).max() for state in path.states)
+    assert moved < 1e-6 * sagged
+
+
+def test_a_free_body_has_no_equilibrium_to_begin_with() -> None:
+    asked = ts.Dynamics(0.1, step=5e-3, scheme="bdf2", start="equilibrium")
+    path = strip(asked, supports=(), loads=[ts.Gravity((0.0, -G))])
+    assert path.status is ts.Status.NOT_CONVERGED
+    assert any("equilibrium at time 0 was not found: add supports" in warning for warning in path.warnings)
+
+
+def test_few_iterations_with_contact_stay_near_the_solved_motion() -> None:
+    press = [(0.0, 0.03, 0.035), (0.05, 0.03, 0.027)]
+    tool = ts.Sphere("probe", 0.01, press, stiffness=1e7)
+
+    def force(iterations: int) -> float:
+        asked = ts.Dynamics(0.05, step=2.5e-3, scheme="bdf2", iterations=iterations)
+        path = strip(asked, ts.Fem("neo-hookean"), supports=[ts.Fixed("bottom")], tools=[tool])
+        assert path.complete, path.warnings
+        return float(path.states[-1].touches[0].force[1])
+
+    assert force(0) > 1e-2
+    assert force(3) == pytest.approx(force(0), rel=0.02)
+
+
+def test_auto_counts_dashpots_and_contacts() -> None:
+    stiff = ts.HalfSpace("wall", (0.0, 1.0), [(0.0, 0.0, -0.01), (0.1, 0.0, -0.01)], stiffness=1e12)
+    plain = strip(ts.Dynamics(0.1, step=5e-3), loads=[ts.Force("right", (0.0, -0.01))])
+    damped = strip(ts.Dynamics(0.1, step=5e-3, damping=ts.Damping(0.2)), loads=[ts.Force("right", (0.0, -0.01))])
+    walled = strip(ts.Dynamics(0.1, step=5e-3), loads=[ts.Force("right", (0.0, -0.01))], tools=[stiff])
+    chosen = [path.cost.newton.split(",")[0] for path in (plain, damped, walled)]
+    assert chosen == ["leapfrog", "bdf2", "bdf2"]
+
+
+def test_leapfrog_keeps_to_a_time_limit() -> None:
+    problem = strip(ts.Dynamics(0.01, step=1e-3), loads=[ts.Force("right", (0.0, -0.01))]).problem
+    endless = replace(problem, dynamics=ts.Dynamics(2.0, step=1e-5, scheme="leapfrog"))
+    path = ts.solve(endless, ts.Springs("gaussian"), timeout=0.3)
+    assert path.status is ts.Status.NOT_CONVERGED and any("time limit" in warning for warning in path.warnings)

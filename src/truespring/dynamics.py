@@ -78,11 +78,15 @@ class Dynamics:
             value = getattr(self, name)
             if value not in allowed:
                 raise ProblemError(f"{name} = {value!r}{nearest(str(value), allowed)}; allowed: {', '.join(allowed)}")
-        if not isinstance(self.iterations, int) or self.iterations < 0:
+        if not isinstance(self.damping, Damping):
+            raise ProblemError(f"damping = {self.damping!r}: must be Damping(stiffness=..., mass=...)")
+        if not isinstance(self.substeps, int) or self.substeps < 1:
+            raise ProblemError(f"substeps = {self.substeps!r}: must be a whole number of at least 1")
+        if isinstance(self.iterations, bool) or not isinstance(self.iterations, int) or self.iterations < 0:
             raise ProblemError(f"iterations = {self.iterations!r}: must be 0, to solve each step, or a number of them")
         if self.iterations and self.step == "auto":
             raise ProblemError('iterations needs a step in seconds: step = "auto" estimates errors of solved steps')
-        if not 0 < self.accuracy < 1:
+        if not isinstance(self.accuracy, int | float) or not 0 < self.accuracy < 1:
             raise ProblemError(f"accuracy = {self.accuracy!r}: must be between 0 and 1")
 
     def words(self) -> str:

@@ -119,6 +119,12 @@ class Problem:
             raise ProblemError("a motion needs a density [kg/m^3] of the material and of each region")
         if dynamics.velocity is not None:
             components(dynamics.velocity, self.mesh.dim, "velocity", "m/s")
+        for support in self.supports:
+            if support.over is None and (support.rotation or np.any(support.displacement or 0.0)):
+                raise ProblemError(
+                    "a support that moves in a motion would jump at time 0: give its history, such as over = "
+                    '[["0 s", 0], ["50 ms", 1]]'
+                )
         _ = self.loading
 
     @property
@@ -300,7 +306,8 @@ class Problem:
         dense = bool(self.materials) and all(material.density is not None for material in self.materials)
         density = self.of_elements(lambda material: material.density or 0.0) if dense else None
         along = None if self.fibres is None else self.fibres.directions
-        return Body(self.mesh, 1.0 if self.section is None else self.section.thickness, density, along)
+        thickness = 1.0 if self.section is None else self.section.thickness
+        return Body(self.mesh, thickness, density, along, moving=self.dynamics is not None)
 
     def _amplitude(self, history: Rows | None) -> Amplitude:
         """Return the amplitude of a history; raise LoadError with the number of the first load that has it."""

@@ -89,9 +89,11 @@ def path_warnings(
             f"just before load factor {snapped[0].load_factor:.6g} the body moved much further than the previous step "
             "suggests: it may have snapped through unstable states, which are not in the solution; use more load_steps"
         )
-    loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
     if problem.dynamics is not None:
-        return (*warnings, *_of_motion(problem.dynamics, loose))
+        reached = (*states, *([] if best is None else [best]))
+        largest = max((state.residual for state in reached if state.load_factor > 0), default=0.0)
+        return (*warnings, *_of_motion(problem.dynamics, largest))
+    loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
     if loose > _LOOSE:
         warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load is near rounding errors")
     if not symmetric:
@@ -108,15 +110,13 @@ _NO_POTENTIAL = (
 
 
 def _of_motion(dynamics: Dynamics, residual: float) -> Iterator[str]:
-    """Yield a warning about the solution of the time steps; `residual` is the largest of them [-]."""
+    """Yield a warning if the number of iterations is fixed; `residual` is the largest of the steps [-]."""
     if dynamics.iterations:
         several = "s" * (dynamics.iterations != 1)
         yield (
             f"{dynamics.iterations} iteration{several} a step, not converged: the largest relative residual is "
             f"{residual:.1e}"
         )
-    elif residual > _LOOSE:
-        yield f"time steps are solved only to a relative residual of {residual:.1e}: the load is near rounding errors"
 
 
 _BELOW_ROUNDING = (

@@ -19,6 +19,7 @@ class Body(NamedTuple):
         fibres: unit vectors along the fibres of each element, zero where it has none, shape (n_families, n_elements,
             dim); None if no element has fibres.
         second_order: mid-edge nodes of second-order elements; None for first-order elements.
+        moving: whether the weight of the nodes is that of their lumped masses, as in a motion.
     """
 
     mesh: Mesh
@@ -26,6 +27,7 @@ class Body(NamedTuple):
     density: Floats | None
     fibres: Floats | None = None
     second_order: SecondOrder | None = None
+    moving: bool = False
 
     @property
     def nodes(self) -> Floats:
@@ -90,15 +92,20 @@ def nodal_mass(body: Body, density: Floats) -> Floats:
         body: the body.
         density: density of each element [kg/m^3], shape (n_elements,).
     """
-    mesh = body.mesh
-    shares = body.thickness * element_corner_measures(mesh) * density[:, None]
-    cells = mesh.elements
-    if body.second_order is not None:
-        cells = body.whole(cells)
-        shares = shares.sum(axis=1)[:, None] * _diagonal_shares(mesh.elements.shape[1], cells.shape[1])
+    cells, measures = lumped(body)
     mass = np.zeros(len(body.nodes))
-    np.add.at(mass, cells, shares)
+    np.add.at(mass, cells, measures * density[:, None])
     return mass
+
+
+def lumped(body: Body) -> tuple[Ints, Floats]:
+    """Return the nodes of each element and their shares of its volume [m^3], both of shape (n_elements, k)."""
+    mesh = body.mesh
+    cells, shares = mesh.elements, body.thickness * element_corner_measures(mesh)
+    if body.second_order is None:
+        return cells, shares
+    cells = body.whole(cells)
+    return cells, shares.sum(axis=1)[:, None] * _diagonal_shares(mesh.elements.shape[1], cells.shape[1])
 
 
 def _diagonal_shares(corners: int, nodes: int) -> Floats:

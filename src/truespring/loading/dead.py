@@ -8,7 +8,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats
 from truespring.errors import ProblemError
-from truespring.loading.body import Body, Spread
+from truespring.loading.body import Body, Spread, lumped
 from truespring.loading.history import History
 from truespring.loading.load import BodyForce, DeadLoad, Mark
 from truespring.loading.values import components, rotated, times
@@ -120,6 +120,8 @@ class Gravity(DeadLoad):
         acceleration = components(self.acceleration, body.mesh.dim, "gravity", "m/s^2")
         if body.density is None:
             raise ProblemError("gravity needs a density [kg/m^3] of the material and of each region")
+        if body.moving:  # as the masses, so that a free fall is uniform
+            return Spread(*lumped(body), body.density[:, None] * acceleration)
         elements, measures = body.carrying(body.mesh.elements, element_corner_measures(body.mesh))
         return Spread(elements, body.thickness * measures, body.density[:, None] * acceleration)
 

@@ -12,7 +12,7 @@ from truespring.motion.advance import Advance
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
 from truespring.motion.stages import History, Moment
-from truespring.solvers.balance import Equilibrium
+from truespring.solvers.balance import Equilibrium, Reporter
 
 # Share of the largest stable step at rest that is taken: a deformed body is stiffer.
 SAFE = 0.5
@@ -88,9 +88,9 @@ class Leapfrog:
     a node that sticks is at rest.
     """
 
-    def __init__(self, body: Body) -> None:
-        """Store the body."""
-        self.body = body
+    def __init__(self, body: Body, report: Reporter | None = None) -> None:
+        """Store the body, and a function that is called after each step as after an iteration."""
+        self.body, self._report = body, report
         self._force: Floats | None = None
 
     def advance(self, history: History, h: float, account: Account) -> Advance:
@@ -120,10 +120,13 @@ class Leapfrog:
         account.step(loading, last.positions, positions, levels[1])
         inertia = mass * (velocity - last.velocity) / h
         reaction = np.where(held, inertia - (self._force + force) / 2, 0.0)
-        account.support(reaction, moved)
         if alpha:
+            reaction = reaction + np.where(held, alpha * mass * half, 0.0)
             account.damped += alpha * float((mass * half * moved).sum())
+        account.support(reaction, moved)
         self._force = force
+        if self._report:
+            self._report(levels[1], 0, 0.0)
         moment, still = Moment(last.time + h, positions, velocity), np.zeros_like(positions)
         state = Equilibrium(levels[1], positions, reaction, still, 0.0, 0, 0.0, converged=True)
         return Advance(moment, state, loading, np.where(held, 0.0, force / mass), account, 0)

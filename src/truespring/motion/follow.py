@@ -15,6 +15,7 @@ from truespring.motion.moving import Body, creep_speed
 from truespring.motion.plan import SAME, Plan, planned
 from truespring.motion.record import Account
 from truespring.motion.stages import ORDERS, History, Moment
+from truespring.motion.still import Still
 from truespring.potential import Damper, Potential
 from truespring.solvers.balance import Balance, Equilibrium, Reporter
 from truespring.solvers.cost import Cost
@@ -26,6 +27,10 @@ _MAX_HALVINGS = 8
 # With an automatic step: the first one over the duration, the safety factor, bounds of a change, and the smallest step
 # over the duration.
 _FIRST, _SAFETY, _SHRINK, _GROW, _SMALLEST = 1e-4, 0.8, 0.2, 2.0, 1e-9
+# Displacements below this share of the body's size are rounding errors.
+_ROUNDING = 1e-10
+# Velocity and acceleration count as the displacement to which they lead in this share of the duration.
+_SOON = 1e-3
 # Share of the distance from a prediction by Taylor's series in the error of a step.
 _SHARE = 0.3
 # A motion has become unstable if its energy exceeds this multiple of the energy that it was given, or if a node moved
@@ -81,14 +86,17 @@ def _begin(body: Body, dynamics: Dynamics, newton: Newton, report: Reporter | No
     rest = Equilibrium(0.0, body.placed(nodes, 0.0), still, still, 0.0, 0, 0.0, converged=True)
     if dynamics.start == "rest":
         return rest
-    steady = replace(body.loading.mapped(_at_begin), interactions=())
+    still_tools = tuple(Still(one) for one in body.loading.interactions)
+    steady = replace(body.loading.mapped(_at_begin), interactions=still_tools)
     if steady.vanishes(1.0):
         return rest
     last = rest
     for one in newton.follow(body.potential, steady, report, geometry):
         last = one
-    why = "the equilibrium at time 0, from which the motion begins, was not found"
-    return last if last.converged else replace(last, load_factor=0.0, reason=why)
+    way_out = 'add supports, reduce the loads of time 0, or begin with start = "rest"'
+    if last.converged and last.load_factor == 1.0:
+        return last
+    return replace(last, load_factor=0.0, converged=False, reason=f"the equilibrium at time 0 was not found: {way_out}")
 
 
 def _at_begin(part: Loading) -> Loading:
@@ -105,7 +113,7 @@ def _balance(body: Body, newton: Newton, report: Reporter | None, geometry: Geom
 
 def _states(body: Body, dynamics: Dynamics, plan: Plan, balance: Balance, begin: Equilibrium) -> Iterator[Equilibrium]:
     """Yield the recorded states, that at time 0 first."""
-    scheme: Scheme = Leapfrog(body)
+    scheme: Scheme = Leapfrog(body, balance.report)
     if plan.scheme != "leapfrog":
         scheme = Implicit(body, balance, plan.scheme, dynamics.iterations)
     if plan.note:
@@ -125,14 +133,14 @@ def _states(body: Body, dynamics: Dynamics, plan: Plan, balance: Balance, begin:
             history, account = History(taken.moment, history.last), taken.account
             taken = steps.to(goal, history, account)
         if isinstance(taken, Equilibrium):
-            yield recorder.failed(history.last, taken)
+            yield recorder.failed(taken)
             return
         recorder.add(taken)
         history, account = History(taken.moment, history.last), taken.account
         why = _lost(body, taken)
         if number in plan.recorded or why:
             state = recorder.state(taken.moment, taken)
-            why = why or _unstable(state)
+            why = why or _unstable(body, state)
             yield replace(state, converged=False, reason=why) if why else state
         if why:
             return
@@ -143,8 +151,7 @@ def _velocity(body: Body, dynamics: Dynamics, plan: Plan) -> Floats:
     nodes = body.potential.nodes
     velocity = np.zeros(nodes.shape) if dynamics.velocity is None else np.tile(dynamics.velocity, (len(nodes), 1))
     soon = _FIRST * dynamics.duration if plan.step is None else plan.step
-    moved = body.loading.motion(min(soon / dynamics.duration, 1.0)) - body.loading.motion(0.0)
-    return np.where(body.held, moved / soon, velocity)
+    return np.where(body.held, body.velocity(0.0, soon), velocity)
 
 
 class _Steps:
@@ -158,7 +165,8 @@ class _Steps:
         self._smallest = _SMALLEST * duration if plan.step is None else plan.step / 2**_MAX_HALVINGS
         self._order = ORDERS[plan.scheme]
         self._acceleration = acceleration
-        self._largest = 0.0
+        self._soon = _SOON * duration
+        self._largest = _ROUNDING * _size(body)
 
     def to(self, goal: float, history: History, account: Account) -> Advance | Equilibrium:
         """Return a step that ends at a time [s] or before; the state of least residual if none was found."""
@@ -174,13 +182,26 @@ class _Steps:
                 return replace(taken, iterations=spent)
             self._h = h * (max(_SHRINK, self._factor(error)) if np.isfinite(error) else 0.5)
             if self._h < self._smallest:
-                return taken.state if isinstance(taken, Advance) else replace(taken, iterations=spent)
+                return self._given_up(taken, history.last.time, spent)
+
+    def _given_up(self, taken: Advance | Equilibrium, time: float, spent: int) -> Equilibrium:
+        """Return the state of a step from a time [s] that was refused, with the reason."""
+        if isinstance(taken, Advance):
+            reason = (
+                f"the error of the step from time {time:.6g} s is above accuracy = {self._accuracy:g} for any length: "
+                "increase accuracy, give a step, or smooth the loads"
+            )
+            return replace(taken.state, converged=False, reason=reason, iterations=spent)
+        reason = (
+            f"the step from time {time:.6g} s was not found (relative residual {taken.residual:.1e}): use a shorter "
+            "step, more max_iterations, or less load"
+        )
+        return replace(taken, converged=False, reason=reason, iterations=spent)
 
     def _accept(self, taken: Advance, h: float, error: float) -> None:
         """Choose the length of the step after one of length h [s]."""
         self._acceleration = taken.acceleration
-        moved = np.abs(taken.moment.positions - self._body.potential.nodes).max()
-        self._largest = max(self._largest, float(moved))
+        self._largest = self._scale(taken)
         if self._plan.step is not None:
             self._h = min(2 * h, self._plan.step) if h < self._plan.step * (1 - SAME) else self._plan.step
         elif h < self._h * (1 - SAME):  # cut by a goal
@@ -197,7 +218,7 @@ class _Steps:
         """Return the estimated error of a step over the allowed one; 0 with a fixed step.
 
         A share of the distance from a prediction: of Taylor's series with the acceleration of the step before, or for
-        Euler's scheme with the velocity.
+        Euler's scheme with the velocity; relative to the largest displacement.
         """
         if self._plan.step is not None:
             return 0.0
@@ -205,9 +226,13 @@ class _Steps:
         if self._order > 1:
             ahead = ahead + h**2 / 2 * self._acceleration
         away = np.abs(np.where(self._body.held, 0.0, taken.moment.positions - ahead)).max()
-        moved = np.abs(taken.moment.positions - self._body.potential.nodes).max()
-        largest = max(self._largest, float(moved))
-        return _SHARE * float(away) / (self._accuracy * largest) if largest else 0.0
+        return _SHARE * float(away) / (self._accuracy * self._scale(taken))
+
+    def _scale(self, taken: Advance) -> float:
+        """Return the largest displacement so far, or that to which velocity and acceleration soon lead [m]."""
+        moved, soon = taken.moment.positions - self._body.potential.nodes, self._soon
+        ways = (moved, soon * taken.moment.velocity, soon**2 / 2 * taken.acceleration)
+        return max(self._largest, *(float(np.abs(way).max()) for way in ways))
 
 
 class _Recorder:
@@ -246,13 +271,9 @@ class _Recorder:
         self._iterations, self._residual = 0, 0.0
         return found
 
-    def failed(self, last: Moment, state: Equilibrium) -> Equilibrium:
-        """Return the state of least residual of a step that failed."""
-        reason = (
-            f"the step from time {last.time:.6g} s was not found (relative residual {state.residual:.1e}): use a "
-            "shorter step, more max_iterations, or less load"
-        )
-        return replace(state, converged=False, reason=reason, cost=self._cost())
+    def failed(self, state: Equilibrium) -> Equilibrium:
+        """Return the state of a step that failed, with the cost up to there."""
+        return replace(state, cost=self._cost())
 
     def _cost(self) -> Cost:
         return self._balance.cost(f"{self._scheme}, {self._steps} steps")
@@ -261,15 +282,25 @@ class _Recorder:
 def _lost(body: Body, taken: Advance) -> str:
     """Return why a step cannot be continued: positions are not finite, or far away; else empty."""
     moment = taken.moment
-    size = float(np.linalg.norm(np.ptp(body.potential.nodes, axis=0)))
-    if np.isfinite(moment.velocity).all() and np.abs(moment.positions).max() < _LOST * size:
+    moved = np.abs(moment.positions - body.potential.nodes).max()
+    if np.isfinite(moment.velocity).all() and moved < _LOST * _size(body):
         return ""
     return f"the motion became unstable before time {moment.time:.6g} s: use a shorter step, or an implicit scheme"
 
 
-def _unstable(state: Equilibrium) -> str:
-    """Return that a motion became unstable: its energy exceeds by far what it was given; else empty."""
+def _size(body: Body) -> float:
+    """Return the diagonal of the undeformed body's bounding box [m]."""
+    return float(np.linalg.norm(np.ptp(body.potential.nodes, axis=0)))
+
+
+def _unstable(body: Body, state: Equilibrium) -> str:
+    """Return that a motion became unstable: its energy exceeds by far what it was given; else empty.
+
+    The energies of a body that moved by no more than rounding errors are rounding errors.
+    """
     assert state.moving is not None
+    if np.abs(state.positions - body.potential.nodes).max() <= _ROUNDING * _size(body):
+        return ""
     energies = state.moving.energies
     now = energies.kinetic + energies.elastic
     given = abs(energies.loads) + energies.damped + abs(energies.total + energies.damped + energies.numerical)

@@ -46,6 +46,9 @@ class Implicit:
                 return state
             loading, start = loading.lagged(state.positions, levels[1]), state.positions
         moment = stage.end(state.positions, history, time)
+        if stage.share < 1:  # going straight on, held nodes would never come to rest
+            velocity = np.where(body.held, body.velocity(time, h), moment.velocity)
+            moment = replace(moment, velocity=velocity)
         self._add(account, stage, history, state, moment, loading, dashpots, levels[1:])
         velocity = history.combined(stage.weights, lambda one: one.velocity)
         acceleration = (stage.velocity(state.positions, history) - velocity) / stage.b

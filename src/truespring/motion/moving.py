@@ -40,6 +40,12 @@ class Body:
         """True for held directions, shape (n_nodes, dim)."""
         return self.loading.held
 
+    def velocity(self, time: float, h: float) -> Floats:
+        """Return the velocity of held directions from their places a time h [s] before and after [m/s]."""
+        before, after = max(time - h, 0.0), min(time + h, self.duration)
+        moved = self.loading.motion(after / self.duration) - self.loading.motion(before / self.duration)
+        return np.asarray(moved / (after - before))
+
     def placed(self, positions: Floats, level: float) -> Floats:
         """Return positions [m], shape (n_nodes, dim), with held directions where the supports are at a level."""
         return np.where(self.held, self.potential.nodes + self.loading.motion(level), positions)

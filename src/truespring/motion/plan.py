@@ -51,7 +51,7 @@ def planned(body: Body, dynamics: Dynamics, crossing: float | None = None) -> Pl
         stable = stable_step(body)
         safe = SAFE * stable
         if scheme == "auto":
-            scheme, note = _chosen(dynamics, stable, stable if crossing is None else crossing)
+            scheme, note = _chosen(dynamics, stable, _typical(body, stable if crossing is None else crossing))
         if scheme == "leapfrog":
             if dynamics.iterations:
                 raise ProblemError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
@@ -70,6 +70,18 @@ def planned(body: Body, dynamics: Dynamics, crossing: float | None = None) -> Pl
     return Plan(scheme, fixed, *_times(body, dynamics, fixed), note)
 
 
+def _typical(body: Body, crossing: float) -> float:
+    """Return the stable step of a problem [s] from the time in which a wave crosses an element, for all its models.
+
+    It is shortened by dashpots as in `stable_step`, and by the stiffness of contacts on the masses of their nodes.
+    """
+    xi = body.damping.stiffness / crossing if crossing else 0.0
+    typical = crossing * (np.sqrt(1 + xi**2) - xi)
+    touched = sum((one.largest_stiffness() for one in body.loading.interactions), np.zeros(len(body.mass)))
+    stiffest = float((touched / body.mass).max())
+    return float(min(typical, 2 / np.sqrt(stiffest))) if stiffest else float(typical)
+
+
 def _chosen(dynamics: Dynamics, stable: float, crossing: float) -> tuple[str, str]:
     """Return the scheme that costs less, by a time that the stable step is about as long as [s]; and why."""
     implicit = dynamics.step if isinstance(dynamics.step, int | float) else dynamics.duration / _EXPECTED
@@ -85,16 +97,18 @@ def _chosen(dynamics: Dynamics, stable: float, crossing: float) -> tuple[str, st
 def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence[float], frozenset[int]]:
     """Return the times that steps end at [s], and the numbers of those that are recorded.
 
-    Steps are shortened so that a whole number of them ends at each recorded time: models are compared at these.
+    Steps are shortened so that a whole number of them ends at each recorded time: models are compared at these. Steps
+    also end at the corners of histories and paths.
     """
     interval, n_recorded = _recorded(dynamics)
-    if step is not None:
-        each = max(1, int(np.ceil(interval / step - SAME))) * dynamics.substeps
-        n = n_recorded * each
-        goals = [dynamics.duration * (k + 1) / n for k in range(n)]
-        return goals, frozenset(range(each - 1, n, each))
-    recorded = [dynamics.duration * (k + 1) / n_recorded for k in range(n_recorded)]
-    goals = sorted({*recorded, *(dynamics.duration * one for one in body.loading.corners)})
+    each = 1 if step is None else max(1, int(np.ceil(interval / step - SAME))) * dynamics.substeps
+    n = n_recorded * each
+    regular = [dynamics.duration * (k + 1) / n for k in range(n)]
+    recorded = set(regular[each - 1 :: each])
+    corners = [dynamics.duration * one for one in body.loading.corners]
+    near = np.round(np.array(regular) / dynamics.duration, 12)
+    others = [one for one in corners if not np.isin(round(one / dynamics.duration, 12), near)]
+    goals = sorted([*regular, *others])
     return goals, frozenset(number for number, goal in enumerate(goals) if goal in recorded)
 
 

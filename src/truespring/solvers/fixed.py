@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from truespring.arrays import Floats
-from truespring.potential import Projectable, SparseMatrix
+from truespring.potential import SparseMatrix
 from truespring.solvers.balance import Balance, Equilibrium, Watch, stepped
 
 # Largest number of halvings of a step to a state without finite energy (an inverted element).
@@ -46,5 +46,6 @@ def _moved(balance: Balance, load_factor: float, positions: Floats, watch: Watch
 def _tangents(balance: Balance, load_factor: float, positions: Floats) -> Iterator[SparseMatrix]:
     """Yield the tangent, and if it is not positive definite, its projection."""
     yield balance.hessian(positions, load_factor)
-    if isinstance(balance.potential, Projectable):
-        yield balance.in_blocks(balance.potential.projected_hessian(positions))
+    projected = balance.projected(positions, load_factor)
+    if projected is not None:
+        yield projected
