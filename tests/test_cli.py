@@ -234,11 +234,8 @@ def test_plane_strain_says_which_moduli_it_compares(tmp_path: Path, capsys: pyte
 def test_schema_describes_the_study(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert set(schema["required"]) == {
-        "mesh",
-        "support",
-        "models",
-    }  # a body in 3D has no section, a network no material
+    # A body in 3D has no section, a network no material, a body that moves or that a grasp holds no support.
+    assert set(schema["required"]) == {"mesh", "models"}
     assert schema["$defs"]["SpringsKeys"]["properties"]["rule"]["anyOf"][0]["enum"][0] == "lloyd"
 
 
