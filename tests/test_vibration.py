@@ -143,6 +143,17 @@ def test_motions_that_supports_leave_are_counted(supports: tuple[ts.Fixed, ...],
     assert found.eigenvalues == near(expected[n_rigid : n_rigid + 3], rel=1e-7)
 
 
+def test_a_stiff_body_on_a_soft_layer_is_not_free() -> None:
+    """It bounces on the layer, ten orders of magnitude softer, as a mass on a spring, and rocks on it."""
+    soft = ts.Region(ts.Box((0.0, 0.0), (1.0, 0.1)), ts.Material(young=1e-2, poisson=0.0, density=1e-6))
+    mesh = ts.rectangle((1.0, 1.0), (4, 10))
+    stiff = ts.Material(young=1e8, poisson=0.0, density=1000.0)
+    problem = replace(body(mesh, ts.Fixed(on="bottom"), material=stiff), regions=[soft])
+    found = ts.modes(problem, ts.Fem(law="linear"), 3)
+    assert found.n_rigid == 0 and found.converged
+    assert found.eigenvalues[1] == pytest.approx(1e-2 / 0.1 / (1000 * 0.9), rel=1e-3)
+
+
 def test_parts_that_nothing_joins_move_each_for_itself() -> None:
     one = ts.rectangle((1.0, 0.1), (10, 1))
     both = ts.Mesh(
