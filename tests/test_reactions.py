@@ -412,3 +412,40 @@ def test_nothing_was_made_worse_where_the_force_improved() -> None:
         assert said.count("s0") == 1 and (more in said if more else "more:" not in said and "and" not in said)
     mixed = CaseResult(case, True, off(0.3, 0.01), off(0.01, 0.1))
     assert mixed.quantity == "displacement" and mixed.pair == pytest.approx((0.3, 0.1))
+
+
+# --- over the way -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("over", [None, [[0, 0], [1, 1]], [[0, 0], [0.5, 1], [1, 0]]], ids=["none", "up", "back"])
+def test_a_body_that_is_stiffer_by_a_share_is_off_by_it_in_force(over: Any) -> None:
+    """Motion alone gives both the same displacement; all forces are in the ratio of Young's moduli."""
+    pulled = block(ts.Fixed("left"), ts.Fixed("right", displacement=(1e-3, 0, 0), over=over))
+    stiffer = replace(pulled, material=ts.Material(26e3, 0.3))
+    found = result(*(ts.solve(one, RUBBER, Newton(4)) for one in (stiffer, pulled)))
+    compared = found.comparisons["neo"]
+    assert compared.rms_error is not None and compared.rms_error < 1e-6
+    assert compared.force_error == pytest.approx(0.3, rel=1e-6) == compared.error
+    assert compared.decided_by == "force" and not compared.agrees_up_to_load_factor
+    values = summary(found)["comparison"]["neo"]
+    assert (values["force_error"], values["decided_by"]) == (compared.error, "force")
+    assert difference(found)["force_error"] == compared.error
+    assert "30 % in the force" in verdict(found)
+
+
+def test_the_force_of_a_tool_is_compared_over_its_way() -> None:
+    """An indentation that retracts: the root mean square of the difference over that of the reference's force."""
+    press = ts.HalfSpace("plate", (0, -1), [[0, 0.0, 0.021], [0.5, 0.0, 0.019], [1, 0.0, 0.021]])
+    mesh, section = ts.rectangle((0.04, 0.02), (4, 2)), ts.PlaneStress(0.01)
+    pressed = ts.Problem(mesh, ts.Material(20e3, 0.3), section, ts.Fixed("bottom"), tools=press)
+    one, other = (ts.solve(pressed, model, Newton(8)) for model in (ts.Springs("isotropic"), RUBBER))
+    found = result(one, other)
+    mine, theirs = (np.array([state.touches[0].force for state in path.states[1:]]) for path in (one, other))
+    expected = np.sqrt(((mine - theirs) ** 2).sum() / (theirs**2).sum())
+    compared = found.comparisons["neo"]
+    assert compared.over_the_way and compared.force_error == pytest.approx(expected) and expected > 1e-3
+    (values,) = summary(found)["comparison"]["neo"]["supports"]
+    assert (values["support"], values["on"], values["force_error"]) == (None, "plate", compared.force_error)
+    most = np.abs(theirs[:, 1]).argmax()
+    assert values["force"]["reference"] == theirs[most].tolist()
+    assert compared.rms_error is not None and compared.rms_error < 0.5  # the end is at rest

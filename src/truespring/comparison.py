@@ -1,6 +1,6 @@
 """Compare two solutions: the errors of a model against a reference at each load level."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,15 @@ from truespring.mesh import CELL_SHAPES, Gap, SurfaceDistance, gap, named_point,
 from truespring.mesh.facets import triangles_of
 from truespring.problem import Problem
 from truespring.solution import Solution, State
-from truespring.support_errors import Decisive, SupportError, decisive, support_errors
+from truespring.support_errors import (
+    Decisive,
+    SupportError,
+    decisive,
+    of_the_way,
+    over_the_way,
+    support_errors,
+    touch_errors,
+)
 
 #: Default tolerance: two solutions agree if their error is below 5 %.
 TOLERANCE = 0.05
@@ -42,11 +50,12 @@ class Comparison:
         max_errors: largest nodal distance over largest displacement [-], shape (n,).
         probe_errors: distance over displacement at the probe [-], shape (n,).
         rms_distances, max_distances: root-mean-square and largest nodal distance [m], shape (n,).
-        support_errors: for each level, the errors of the moved supports whose forces both solutions have, length n.
+        support_errors: for each level, the errors of the moved supports, tools and grasps whose forces both solutions
+            have, length n.
         surface: distances of outlines and nearest nodes, for a reference read as a surface.
         over_the_way: whether the errors are those over all levels, as of a motion or a load that returns to zero. The
-            errors at a level are then over the root-mean-square, or the largest, quantity of all levels; the rms and
-            probe errors are their root mean square, the largest error is the worst.
+            errors at a level are then over the root-mean-square, or the largest, quantity of all levels; the rms, probe
+            and force errors are their root mean square, the largest error is the worst.
     """
 
     model: Solution
@@ -70,27 +79,39 @@ class Comparison:
     def __repr__(self) -> str:
         return f"Comparison({self})"
 
-    def _at_full_load(self, errors: Floats, over: Callable[[Floats], float] = _rms) -> float | None:
-        """Return the last of the errors if it is at full load and not NaN, or that over the way; else None."""
-        if not self.load_factors.size or self.load_factors[-1] != 1.0:
-            return None
-        error = over(errors) if self.over_the_way else float(errors[-1])
-        return error if np.isfinite(error) else None
+    def last(self, errors: Floats, worst: bool = False) -> float:
+        """Return the last of the errors at the levels, or their root mean square over the way; NaN without any.
+
+        Over the way, `worst` takes the largest.
+        """
+        if not self.load_factors.size:
+            return np.nan
+        if self.over_the_way:
+            return float(errors.max()) if worst else _rms(errors)
+        return float(errors[-1])
+
+    def _at_full_load(self, error: float) -> float | None:
+        """Return an error, or None if a solution does not reach full load or the error is NaN."""
+        return error if self._complete and np.isfinite(error) else None
+
+    @property
+    def _complete(self) -> bool:
+        return bool(self.load_factors.size and self.load_factors[-1] == 1.0)
 
     @property
     def probe_error(self) -> float | None:
         """The probe's error at full load; None if a solution does not reach it."""
-        return self._at_full_load(self.probe_errors)
+        return self._at_full_load(self.last(self.probe_errors))
 
     @property
     def rms_error(self) -> float | None:
         """The rms error at full load; None if a solution does not reach it."""
-        return self._at_full_load(self.rms_errors)
+        return self._at_full_load(self.last(self.rms_errors))
 
     @property
     def max_error(self) -> float | None:
         """The largest error at full load; None if a solution does not reach it."""
-        return self._at_full_load(self.max_errors, lambda errors: float(errors.max()))
+        return self._at_full_load(self.last(self.max_errors, worst=True))
 
     @cached_property
     def decisive(self) -> tuple[Decisive, ...]:
@@ -107,26 +128,37 @@ class Comparison:
         """The largest error of a support's force or torque at each level [-], shape (n,); NaN where none is known."""
         return np.array([decisive(np.nan, several).error for several in self.support_errors])
 
+    @cached_property
+    def last_supports(self) -> tuple[SupportError, ...]:
+        """The errors of supports, tools and grasps at the last level, or over the way."""
+        if self.over_the_way:
+            return of_the_way(self.support_errors)
+        return self.support_errors[-1] if self.support_errors else ()
+
     @property
     def supports(self) -> tuple[SupportError, ...]:
-        """The errors of the moved supports at full load; empty if a solution does not reach it."""
-        reached = self.load_factors.size and self.load_factors[-1] == 1.0
-        return self.support_errors[-1] if reached else ()
+        """The errors of supports, tools and grasps at full load; empty if a solution does not reach it."""
+        return self.last_supports if self._complete else ()
+
+    @cached_property
+    def last_decisive(self) -> Decisive:
+        """The error that decides at the last level, or over the way."""
+        return decisive(self.last(self.rms_errors), self.last_supports)
 
     @property
     def error(self) -> float | None:
         """The error that decides at full load; None if a solution does not reach it."""
-        return self._at_full_load(self.errors)
+        return self._at_full_load(self.last_decisive.error)
 
     @property
     def decided_by(self) -> str | None:
         """The quantity whose error decides at full load: "displacement", "force" or "torque"; None if none is known."""
-        return None if self.error is None else self.decisive[-1].quantity
+        return None if self.error is None else self.last_decisive.quantity
 
     @property
     def force_error(self) -> float | None:
-        """The largest error of a moved support's force or torque at full load; None if none is known."""
-        return self._at_full_load(self.force_errors)
+        """The largest error of a force or torque at full load; None if none is known."""
+        return self._at_full_load(decisive(np.nan, self.last_supports).error)
 
     @property
     def n_outside(self) -> int:
@@ -231,9 +263,11 @@ def compare(
     compared = ~outside & ~_prescribed(mine.path, theirs.path)
     found = [_Distances.between(one, other, compared) for one, other in both]
     probed = [_at_probe(one, other, watched) for one, other in both]
+    called = [[one.name for one in path.problem.touching] for path in (model, reference)]
+    forces = [(*support_errors(mine.path, theirs.path, *pair), *touch_errors(called, *pair)) for pair in both]
     over = mine.path.problem.returns
     if over:
-        found, probed = _over_the_way(found), _over_the_way(probed)
+        found, probed, forces = _over_the_way(found), _over_the_way(probed), over_the_way(forces)
     return Comparison(
         model=mine.path,
         reference=theirs.path,
@@ -248,7 +282,7 @@ def compare(
         known_on=(model, reference),
         outside=outside,
         compared=compared,
-        support_errors=tuple(() if over else tuple(support_errors(mine.path, theirs.path, *pair)) for pair in both),
+        support_errors=tuple(forces),
         node_by_node=mine.node_by_node and theirs.node_by_node,
         surface=_surface_distance(mine.path, theirs.path),
         over_the_way=over,

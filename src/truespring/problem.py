@@ -29,7 +29,7 @@ from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, element_corner_measures, select_elements
 from truespring.mesh.selections import AXES
 from truespring.rigid_modes import centred, modes_at, n_modes
-from truespring.tools import TOOLS, Grasp, Tool
+from truespring.tools import TOOLS, Grasp, Tool, varies
 
 _Found = TypeVar("_Found")
 
@@ -287,8 +287,12 @@ class Problem:
 
     @property
     def returns(self) -> bool:
-        """Whether displacements may return to zero on the way: in a motion, and with histories."""
-        return self.dynamics is not None or any(history is not None for history in self._histories)
+        """Whether displacements or forces may vanish on the way: in a motion, with histories, with moving tools.
+
+        A tool or grasp counts if its place changes: before it touches, and after it retracts, it moves nothing.
+        """
+        histories = any(history is not None for history in self._histories)
+        return self.dynamics is not None or histories or any(varies(one.path) for one in self.touching)
 
     @property
     def _young(self) -> float | None:

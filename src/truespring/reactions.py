@@ -23,14 +23,14 @@ Rows = sparse.csr_array[Any, tuple[int, int]]
 
 @dataclass(frozen=True, eq=False)
 class SupportForce:
-    """Force and torque of a moved support on the body: the resultant of its reactions.
+    """Force and torque of a moved support on the body: the resultant of its reactions; or the force on a tool or grasp.
 
     Attributes:
-        support: index among the supports of the problem.
-        name: selection that it is on; "support 2" if that has no name.
+        support: index among the supports of the problem; -1 of a tool or grasp.
+        name: selection that it is on; "support 2" if that has no name; the name of a tool or grasp.
         force: sum of the reactions [N], shape (dim,).
         torque: sum of arm x reaction [N m], shape (1,) in the plane (about z), (3,) in space; arms are those of the
-            deformed body, from `point_of_torque`.
+            deformed body, from `point_of_torque`. Empty of a tool or grasp.
         has_force, has_torque: whether the resultant does not vanish.
     """
 
@@ -40,6 +40,11 @@ class SupportForce:
     torque: Floats
     has_force: bool
     has_torque: bool
+
+    @property
+    def key(self) -> tuple[int, str]:
+        """What identifies it among supports, tools and grasps: its number, or its name."""
+        return self.support, self.name if self.support < 0 else ""
 
 
 def moved_supports(problem: Problem) -> list[int]:

@@ -20,7 +20,7 @@ from truespring.report.quantity import input_quantity, percent, quantity, signif
 from truespring.report.result import Result
 from truespring.report.shell import picture, render
 from truespring.report.standing import own_errors
-from truespring.report.supports import support_rows
+from truespring.report.supports import support_rows, support_title
 from truespring.report.verdict import (
     carrying_sentence,
     cause_sentence,
@@ -104,6 +104,8 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "tolerance": tolerance_percent(result.tolerance),
         "measures": _measures(result),
         "supports": list(support_rows(result)),
+        "support_title": support_title(result),
+        "over_the_way": any(one.over_the_way for one in result.comparisons.values()),
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
         "models": [_model_row(name, path, axis_of(result)) for name, path in result.paths.items()],
         "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],

@@ -154,6 +154,9 @@ def error_figure(result: Result) -> Sheet:
     name_of_y = "rms error or error of a force, the larger [%]" if forced else "rms error [%]"
     if any(one.over_the_way for one in result.comparisons.values()):
         name_of_y = "rms distance [% of the displacement over the way]"
+        name_of_y = (
+            "rms distance or difference of a force, the larger [% of those over the way]" if forced else name_of_y
+        )
     curves = [
         Curve(
             axis.value(one.load_factors),

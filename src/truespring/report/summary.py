@@ -5,14 +5,13 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
-from truespring.arrays import Floats
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 from truespring.models import Moduli
 from truespring.reactions import moved_supports
 from truespring.report.parts import largest, parts_of
 from truespring.report.result import Result
-from truespring.support_errors import SupportError
+from truespring.support_errors import SupportError, decisive
 
 
 def summary(result: Result) -> dict[str, Any]:
@@ -117,8 +116,8 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
         "max_error": comparison.max_error,
         "agrees_up_to_load_factor": comparison.agrees_up_to_load_factor,
     }
-    if moved_supports(comparison.model.problem):
-        values |= _of_forces(comparison, None if comparison.error is None else -1)
+    if moved_supports(comparison.model.problem) or any(comparison.support_errors):
+        values |= _of_forces(comparison, comparison.error is not None)
     if (surface := comparison.surface) is not None:
         values["outline_distance"] = {"rms": surface.outline_rms, "max": surface.outline_max}
         values["nearest_node_distance"] = {"rms": surface.nodes_rms, "max": surface.nodes_max}
@@ -134,20 +133,20 @@ def _standing(result: Result, name: str) -> dict[str, float | None]:
     }
 
 
-def _of_forces(comparison: Comparison, level: int | None) -> dict[str, Any]:
-    """Return the force errors of moved supports at a level, by its index, and the quantity with the largest error."""
-    if level is None:
+def _of_forces(comparison: Comparison, known: bool) -> dict[str, Any]:
+    """Return the errors of forces at the last level or over the way, if known, and the quantity with the largest."""
+    if not known:
         return {"force_error": None, "decided_by": None, "supports": []}
     return {
-        "force_error": _known(float(comparison.force_errors[level])),
-        "decided_by": comparison.decisive[level].quantity or None,
-        "supports": [_support(one) for one in comparison.support_errors[level]],
+        "force_error": _known(decisive(math.nan, comparison.last_supports).error),
+        "decided_by": comparison.last_decisive.quantity or None,
+        "supports": [_support(one) for one in comparison.last_supports],
     }
 
 
 def _support(one: SupportError) -> dict[str, Any]:
     return {
-        "support": one.mine.support + 1,
+        "support": None if one.mine.support < 0 else one.mine.support + 1,
         "on": one.mine.name,
         "force": {"model": one.mine.force.tolist(), "reference": one.theirs.force.tolist()},
         "torque": {"model": one.mine.torque.tolist(), "reference": one.theirs.torque.tolist()},
@@ -158,29 +157,25 @@ def _support(one: SupportError) -> dict[str, Any]:
 
 
 def difference(result: Result) -> dict[str, Any]:
-    """Return the difference of two results at the last load level that both have, as JSON values.
+    """Return the difference of two results at the last load level that both have, or over the way, as JSON values.
 
     Relative errors are those of the summary of a study; distances are in metres; unknown values are None.
     """
     (one,) = result.comparisons.values()
     model, reference = result.paths  # in this order, whichever is drawn over the other
     surfaces = one.hausdorff
-    met = bool(one.load_factors.size)
-
-    def last(values: Floats) -> float | None:
-        return _known(float(values[-1])) if met else None
 
     return {
         "model": model,
         "reference": reference,
-        "load_factor": last(one.load_factors),
-        "rms_error": last(one.rms_errors),
-        "max_error": last(one.max_errors),
-        "probe_error": last(one.probe_errors),
-        **(_of_forces(one, -1) if any(one.support_errors) else {}),
+        "load_factor": float(one.load_factors[-1]) if one.load_factors.size else None,
+        "rms_error": _known(one.last(one.rms_errors)),
+        "max_error": _known(one.last(one.max_errors, worst=True)),
+        "probe_error": _known(one.last(one.probe_errors)),
+        **(_of_forces(one, True) if any(one.support_errors) else {}),
         "energy_error": one.energy_error,
-        "rms_distance": last(one.rms_distances),
-        "max_distance": last(one.max_distances),
+        "rms_distance": _known(one.last(one.rms_distances)),
+        "max_distance": _known(one.last(one.max_distances, worst=True)),
         "hausdorff": None if surfaces is None else surfaces.max,
         "surface_rms": None if surfaces is None else surfaces.rms,
         "n_nodes": len(one.outside),

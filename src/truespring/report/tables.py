@@ -9,7 +9,7 @@ from truespring.report.parts import PartRow, part_rows
 from truespring.report.quantity import natural_scale
 from truespring.report.result import Result
 from truespring.report.standing import own_errors
-from truespring.report.supports import support_rows
+from truespring.report.supports import support_rows, support_title
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -152,7 +152,7 @@ def support_table(result: Result) -> "Table | None":
         return None
     loaded = any(row.share_of_load for row in rows)
     columns = ("", f"'{result.model}'", "reference", "error", *(("of the load",) if loaded else ()))
-    table = new_table("Forces and torques of moved supports", "support", *columns)
+    table = new_table(support_title(result), "support", *columns)
     for row in rows:
         shares = [row.share_of_load or "-"] if loaded else []
         table.add_row(row.support, f"{row.quantity}, {row.label}", row.mine, row.theirs, row.error or "-", *shares)

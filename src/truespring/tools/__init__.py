@@ -3,6 +3,7 @@
 from truespring.tools.grasp import Grasp as Grasp
 from truespring.tools.laws import CONTACTS as CONTACTS
 from truespring.tools.path import Path as Path
+from truespring.tools.path import varies as varies
 from truespring.tools.shapes import Block as Block
 from truespring.tools.shapes import Capsule as Capsule
 from truespring.tools.shapes import HalfSpace as HalfSpace

@@ -85,6 +85,12 @@ def track_of(name: str, path: Path, dim: int, span: float) -> Track:
     return Track(ways, rows[:, 1:], span)
 
 
+def varies(path: Path) -> bool:
+    """Return whether the place changes along a path."""
+    rows = np.asarray(path, dtype=float)
+    return rows.ndim == 2 and bool((rows[:, 1:] != rows[0, 1:]).any())
+
+
 def path_words(path: Path) -> str:
     """Return the begin and the end of a path for tables: "from (0.03, 0.041) m to (0.03, 0.037) m"."""
     rows = np.asarray(path, dtype=float)

@@ -70,7 +70,12 @@ def _named(result: Result, measured: dict[str, Comparison], name: str) -> str:
 
 def _is_complete(one: Comparison) -> bool:
     """Return whether forces are compared too, and the model agrees at every level up to full load."""
-    return one.agrees_up_to_load_factor == 1.0 and bool(np.isfinite(one.force_errors[-1]))
+    return one.agrees_up_to_load_factor == 1.0 and _is_forced(one)
+
+
+def _is_forced(one: Comparison) -> bool:
+    """Return whether a force or torque is compared at the last level, or over the way."""
+    return bool(decisive(np.nan, one.last_supports).quantity)
 
 
 def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
@@ -82,7 +87,7 @@ def _errors(result: Result, measured: dict[str, Comparison]) -> str | None:
         f"{display_name(result, name)} {_off(measured[name])}" for name in sorted(known, key=lambda name: known[name])
     ]
     # The errors of one reference may be separated by commas.
-    between = "; " if any(np.isfinite(one.force_errors[-1]) for one in measured.values()) else ", "
+    between = "; " if any(map(_is_forced, measured.values())) else ", "
     return f"{_what(measured)}{axis_of(result).at_full}: {between.join(parts)}"
 
 
@@ -96,10 +101,10 @@ def _what(measured: dict[str, Comparison]) -> str:
 
 def _off(one: Comparison) -> str:
     """Return the errors at the last level or over the way, the larger first, with the quantity if forces are known."""
-    displacement = float(one.rms_errors[-1]) if one.rms_error is None else one.rms_error
+    displacement = one.last(one.rms_errors)
     found = [(displacement, "in displacement")] if np.isfinite(displacement) else []
-    several = len({error.mine.support for error in one.support_errors[-1]}) > 1
-    largest = decisive(np.nan, one.support_errors[-1])
+    several = len(one.last_supports) > 1
+    largest = decisive(np.nan, one.last_supports)
     if not largest.quantity:
         return percent(displacement)
     found.append((largest.error, f"in the {largest.quantity}{f' of {largest.support}' if several else ''}"))

@@ -19,15 +19,18 @@ def force_sentence(result: Result) -> str | None:
     """Return force and torque of each moved support in each model; None if no support moves or they are unknown.
 
     A force is positive along the displacement of its support, a torque about the axis of its rotation; a negative one
-    holds the body back.
+    holds the body back. Those at the last level; where displacements may return to zero, where they are largest.
     """
     if result.model is None or not result.paths[result.model].states:
         return None
     model = result.paths[result.model]
-    level = model.load_factor
+    state = model.states[-1]
+    if result.problem.stated and result.problem.returns and moved_supports(result.problem):
+        state = max(model.states, key=lambda one: sum(float(of.force @ of.force) for of in model.support_forces(one)))
+    level = state.load_factor
     found = [
         sentence
-        for one in (model.support_forces(model.states[-1]) if level else ())
+        for one in (model.support_forces(state) if level else ())
         for sentence in _sentences(result, level, one)
     ]
     return " ".join(found) or None
