@@ -30,7 +30,7 @@ class Touching:
     """How a tool touches a body.
 
     Attributes:
-        contact: "penalty" lets nodes enter the tool by pressure / stiffness; "barrier" keeps them out, and begins to
+        contact: "penalty": nodes enter the tool by pressure / stiffness; "barrier": they stay outside, and it begins to
             push at the distance `width`.
         stiffness: pressure per depth [Pa/m]; None for 1000 E / L, E the largest Young's modulus of the body, L the
             diagonal of its bounding box.
