@@ -115,10 +115,11 @@ def _parts(result: Result, axis: Axis) -> Iterator[Part]:
     half += ", which are as far or farther from the exact motion" if dynamics.scheme == "euler" else ""
     yield Part("time step", splits.step, half, _finer(dynamics))
     few = dynamics.iterations
-    counted = f"{few} iteration{'s' * (few != 1)} a step" if few else "steps are solved"
+    explicit = result.paths[result.model].newton_iterations == 0
+    solved = "explicit steps, which are not iterated" if explicit else "steps are solved"
     yield Part(
         "solver",
         splits.solver,
-        f"{counted}, against solved steps" if few else counted,
+        f"{few} iteration{'s' * (few != 1)} a step, against solved steps" if few and not explicit else solved,
         f"take more than {few}, or iterations = 0, which solves each step",
     )

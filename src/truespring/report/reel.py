@@ -25,9 +25,10 @@ from truespring.report.touching import draw_tools, drawn_tools, entries, near, v
 from truespring.report.words import draw_words
 
 _DASHES = (0, (3, 2))
-# Instants of a strip; smallest width of a sheet, largest width and height, margin, height of a line of text [inch].
+# Instants of a strip; smallest width of a sheet, largest width and height, largest height of a picture, margin, height
+# of a line of text [inch].
 INSTANTS = 6
-_NARROW, _WIDTH, _HEIGHT, _SIDE, _ROW = 4.6, 7.0, 6.4, 0.12, 0.19
+_NARROW, _WIDTH, _HEIGHT, _HIGHEST, _SIDE, _ROW = 4.6, 7.0, 6.4, 4.4, 0.12, 0.19
 # Resolution of images in space [pixels/inch].
 _DPI = 150
 
@@ -131,7 +132,7 @@ def _layout(reel: Reel, n_pictures: int) -> _Layout:
     found = []
     for columns in range(1, n_pictures + 1):
         rows = -(-n_pictures // columns)
-        room = (_WIDTH - (columns + 1) * _SIDE) / columns, _HEIGHT / rows - _ROW
+        room = (_WIDTH - (columns + 1) * _SIDE) / columns, min(_HEIGHT / rows, _HIGHEST) - _ROW
         scale = min(room[0] / wide, room[1] / high)
         found.append(_Layout(columns, rows, scale * wide, scale * high))
     return max(found, key=lambda one: one.width)

@@ -43,7 +43,7 @@ def energies_figure(result: Result, name: str) -> Sheet:
     y = limits[0] / scale.size, limits[1] / scale.size
     area = Area(sheet, _LEFT, _BOTTOM, _WIDTH - _LEFT - 0.15, _HEIGHT, (0.0, axis.span), y)
     draw_frame(area, axis.label, f"energy [{scale.unit}]")
-    for band, (below, above) in _stacked(values).items():
+    for band, below, above in _stacked(values):
         _fill(area, x, below / scale.size, above / scale.size, _BANDS[band], band)
     area.add(Line2D(x, work / scale.size, color=INK, lw=1.3, zorder=4, gid="work", label="work"))
     draw_words(sheet, _LEFT, sheet.height - 0.19, sheet.title, 9, bold=True)
@@ -76,19 +76,20 @@ def _limits(result: Result) -> tuple[float, float]:
     for name in moving(result):
         _, values, work = _energies(result.paths[name])
         found += [float(work.min()), float(work.max())]
-        for ends in _stacked(values).values():
-            found += [float(min(one.min() for one in ends)), float(max(one.max() for one in ends))]
+        for _, below, above in _stacked(values):
+            found += [float(below.min()), float(above.max())]
     return min(found), max(found)
 
 
-def _stacked(values: dict[str, Floats]) -> dict[str, tuple[Floats, Floats]]:
-    """Return the lower and upper side of each band; negative values are stacked below zero."""
+def _stacked(values: dict[str, Floats]) -> list[tuple[str, Floats, Floats]]:
+    """Return name, lower and upper side of each band; negative values are stacked below zero, as bands of their own."""
     up, down = (np.zeros(len(next(iter(values.values())))) for _ in range(2))
-    found = {}
+    found = []
     for band, one in values.items():
-        start = np.where(one < 0, down, up)
-        found[band] = start, start + one
-        up, down = np.where(one < 0, up, up + one), np.where(one < 0, down + one, down)
+        above, below = up + one.clip(min=0), down + one.clip(max=0)
+        found += [(band, up, above)] if (one > 0).any() else []
+        found += [(band, below, down)] if (one < 0).any() else []
+        up, down = above, below
     return found
 
 
