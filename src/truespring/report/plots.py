@@ -153,10 +153,8 @@ def error_figure(result: Result) -> Sheet:
     forced = any(np.isfinite(one.force_errors).any() for one in result.comparisons.values())
     name_of_y = "rms error or error of a force, the larger [%]" if forced else "rms error [%]"
     if any(one.over_the_way for one in result.comparisons.values()):
-        name_of_y = "rms distance [% of the displacement over the way]"
-        name_of_y = (
-            "rms distance or difference of a force, the larger [% of those over the way]" if forced else name_of_y
-        )
+        what = "distance or difference of force" if forced else "distance"
+        name_of_y = f"rms {what} [% over the way]"
     curves = [
         Curve(
             axis.value(one.load_factors),
