@@ -214,8 +214,12 @@ class Loading:
     @property
     def corners(self) -> tuple[float, ...]:
         """The levels between 0 and 1 at which an amplitude or the path of a tool has a corner [-], ascending."""
-        found = {corner for part in self.parts for corner in part.amplitude.corners}
-        return tuple(sorted(found.union(*(one.corners for one in self.interactions))))
+        return tuple(sorted({*self.history_corners, *(corner for one in self.interactions for corner in one.corners)}))
+
+    @property
+    def history_corners(self) -> tuple[float, ...]:
+        """The levels between 0 and 1 at which an amplitude has a corner [-], ascending."""
+        return tuple(sorted({corner for part in self.parts for corner in part.amplitude.corners}))
 
     def vanishes(self, level: float, positions: Floats | None = None) -> bool:
         """Return whether no load acts at a level, and no prescribed motion.

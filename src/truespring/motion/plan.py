@@ -97,19 +97,29 @@ def _chosen(dynamics: Dynamics, stable: float, crossing: float) -> tuple[str, st
 def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence[float], frozenset[int]]:
     """Return the times that steps end at [s], and the numbers of those that are recorded.
 
-    Steps are shortened so that a whole number of them ends at each recorded time: models are compared at these. Steps
-    also end at the corners of histories and paths.
+    Steps are shortened so that a whole number of them ends at each recorded time: models are compared at these.
     """
     interval, n_recorded = _recorded(dynamics)
     each = 1 if step is None else max(1, int(np.ceil(interval / step - SAME))) * dynamics.substeps
     n = n_recorded * each
     regular = [dynamics.duration * (k + 1) / n for k in range(n)]
     recorded = set(regular[each - 1 :: each])
-    corners = [dynamics.duration * one for one in body.loading.corners]
+    corners = [dynamics.duration * one for one in _corners(body, dynamics)]
     near = np.round(np.array(regular) / dynamics.duration, 12)
     others = [one for one in corners if not np.isin(round(one / dynamics.duration, 12), near)]
     goals = sorted([*regular, *others])
     return goals, frozenset(number for number, goal in enumerate(goals) if goal in recorded)
+
+
+def _corners(body: Body, dynamics: Dynamics) -> tuple[float, ...]:
+    """Return the levels at which steps end, too: a load that is shorter than a step must not be missed.
+
+    A path, which may be drawn by hand in many rows, shortens automatic steps only, and nothing shortens those of a
+    fixed number of iterations.
+    """
+    if dynamics.step == "auto":
+        return body.loading.corners
+    return () if dynamics.iterations else body.loading.history_corners
 
 
 def _recorded(dynamics: Dynamics) -> tuple[float, int]:
