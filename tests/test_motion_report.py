@@ -343,7 +343,7 @@ def test_the_verb_writes_an_animation(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_a_page_shows_the_film_and_the_energies() -> None:
     page = render_page([result(0.02, MotionErrors(0.3, 0.0))], None)
-    for words_of in ("Film strip", "Over time", "Energies of springs", "Separate errors over the whole", "largest"):
+    for words_of in ("Film strip", "Over time", "Energies of springs", "Separate errors of displacement", "largest"):
         assert words_of in page
 
 
@@ -399,3 +399,11 @@ def test_a_grasp_is_drawn_by_its_radius(dim: int) -> None:
     assert np.linalg.norm(skin.points, axis=1) == pytest.approx(0.012)
     along = np.linalg.norm(np.diff(skin.points[skin.lines], axis=1)[:, 0], axis=1)
     assert along.sum() == pytest.approx((1 if dim == 2 else 3) * 2 * np.pi * 0.012, rel=2e-3)
+
+
+def test_errors_are_those_of_displacement_where_forces_are_compared() -> None:
+    dynamics = ts.Dynamics(DURATION, 0.004, "bdf2")
+    splits = MotionErrors(0.01, 0.0)
+    text = verdict(result(0.02, splits, problem([BALL], dynamics)))
+    assert in_order(text, "the model is the largest error of the motion in displacement", "errors in displacement over")
+    assert "of the motion in displacement" not in verdict(result(0.02, splits))

@@ -76,7 +76,7 @@ class PartRow:
 def part_rows(result: Result) -> list[PartRow]:
     """Return the errors of a motion as rows of a table."""
     parts = parts_of(result)
-    most = largest(parts)
+    most = largest_of(parts)
     return [
         PartRow(one.name, part_words(one), one.against, one is most, (one.value or 0.0) >= result.tolerance)
         for one in parts
@@ -88,7 +88,7 @@ def part_words(one: Part) -> str:
     return "not known" if one.value is None else "0 %" if one.value == 0 else percent(one.value)
 
 
-def largest(parts: list[Part]) -> Part | None:
+def largest_of(parts: list[Part]) -> Part | None:
     """Return the largest of the errors that are known; None if none is known or all are zero."""
     known = [one for one in parts if one.value]
     return max(known, key=lambda one: one.value or 0.0) if known else None

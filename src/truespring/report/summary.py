@@ -9,7 +9,7 @@ from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 from truespring.models import Moduli
 from truespring.reactions import moved_supports
-from truespring.report.parts import largest, parts_of
+from truespring.report.parts import largest_of, parts_of
 from truespring.report.result import Result
 from truespring.support_errors import SupportError, decisive
 
@@ -35,7 +35,7 @@ def _motion(result: Result) -> dict[str, Any]:
     if splits is None:
         return {"duration": duration}
     parts = parts_of(result)
-    most = largest(parts)
+    most = largest_of(parts)
     model = next((one.value for one in parts if one.name == "model"), None)
     errors = {"model_error": model, "step_error": splits.step, "solver_error": splits.solver}
     return {

@@ -139,7 +139,7 @@ def _error_table(result: Result) -> "Table":
 
 
 def _part_table(result: Result, parts: list[PartRow]) -> "Table":
-    table = new_table(f"Separate errors {axis_of(result).at_full}", "error of", "", "error")
+    table = new_table(f"Separate errors of displacement {axis_of(result).at_full}", "error of", "", "error")
     for row in parts:
         table.add_row(row.name, row.against, f"{row.error}{', largest' if row.largest else ''}")
     return table

@@ -19,7 +19,7 @@ from truespring.report.words import draw_words
 # Energies in the order of the stack, with their colours; `numerical` is an error.
 _BANDS = {"kinetic": BLUE, "elastic": "#7fc0e8", "contact": "#00795a", "damped": "#e0a030", "numerical": RED}
 # Energies below this share of the largest are left out of the legend.
-_NONE = 1e-6
+_NONE = 1e-3
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM = 5.9, 2.7, 0.62, 0.5
 _DASHES = ("-", (0, (4, 2)), (0, (1.2, 1.5)), (0, (6, 1.5, 1, 1.5)))
 

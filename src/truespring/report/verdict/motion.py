@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from truespring.report.axis import axis_of
-from truespring.report.parts import Part, by_scheme, largest, part_words, parts_of
+from truespring.report.parts import Part, by_scheme, largest_of, part_words, parts_of
 from truespring.report.quantity import percent, tolerance_percent
 from truespring.report.result import Result
 from truespring.report.verdict.naming import listed
@@ -19,11 +19,11 @@ def motion_sentences(result: Result) -> Iterator[str]:
     parts = parts_of(result)
     if not parts:
         return
-    most = largest(parts)
+    most = largest_of(parts)
     if most is not None:
         yield _largest_sentence(result, most)
     shown = [f"{one.name} {part_words(one)} ({one.against})" for one in parts]
-    yield f"errors {axis_of(result).at_full}: {', '.join(shown)}."
+    yield f"errors{_measured(result)} {axis_of(result).at_full}: {', '.join(shown)}."
     taken = by_scheme(result.paths[result.model or ""])
     if taken is not None and abs(taken) >= result.tolerance:
         did = "dissipated" if taken > 0 else "added"
@@ -37,12 +37,19 @@ def integration_dominates(result: Result) -> bool:
     return any(one.name != "model" and (one.value or 0.0) >= result.tolerance for one in parts_of(result))
 
 
+def _measured(result: Result) -> str:
+    """Return of what the errors are, where forces are compared, too."""
+    forced = any(one.force_error is not None for one in result.comparisons.values())
+    return " in displacement" if forced else ""
+
+
 def _largest_sentence(result: Result, most: Part) -> str:
     who, error = _SUBJECTS[most.name], percent(most.value or 0.0)
+    largest = f"{who} is the largest error of the motion{_measured(result)}, {error}"
     if (most.value or 0.0) < result.tolerance:
-        return f"{who} is the largest error of the motion, {error}, below {tolerance_percent(result.tolerance)}."
+        return f"{largest}, below {tolerance_percent(result.tolerance)}."
     above = [one for one in parts_of(result) if one.name != most.name and (one.value or 0.0) >= result.tolerance]
     others = listed([f"{_SUBJECTS[one.name]}, {part_words(one)}," for one in above]) if above else ""
     limit = tolerance_percent(result.tolerance)
     further = f"; {others} {'are' if len(above) > 1 else 'is'} above {limit}, too" if above else ""
-    return f"{who} is the largest error of the motion, {error}: {most.remedy}{further}."
+    return f"{largest}: {most.remedy}{further}."
