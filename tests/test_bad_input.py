@@ -251,6 +251,42 @@ def test_a_broken_stl_is_refused(content: bytes, word: str, tmp_path: Path, caps
     assert "models.other" in message and "other.stl" in message
 
 
+MOVES = '[dynamics]\nduration = "0.1 s"\n%s\n[solver]'
+DENSE = ("poisson = 0.3", "poisson = 0.3\ndensity = 1000")
+PART = (
+    "[section]",
+    '[[region]]\non = { box = [["0 mm", "0 mm"], ["10 mm", "10 mm"]] }\nyoung = 1e4\npoisson = 0.3\n\n[section]',
+)
+UNEVEN = "over = [[0, 0], [0.5, 1], [0.4, 1]]"
+MOVING = {
+    "no density": ([("[solver]", MOVES % "")], ("material.density", "a motion needs a density")),
+    "no density of a region": ([DENSE, PART, ("[solver]", MOVES % "")], ("region.1.density", "a motion needs")),
+    "velocity in space": ([DENSE, ("[solver]", MOVES % "velocity = [1, 0, 0]")], ("dynamics.velocity",)),
+    "arc length": (
+        [DENSE, ("[solver]", MOVES % "" + '\ncontrol = "arc-length"')],
+        ("solver.control", "leave control out"),
+    ),
+    "iterations of leapfrog": (
+        [DENSE, ("[solver]", MOVES % 'scheme = "leapfrog"\nstep = "0.1 ms"\niterations = 2')],
+        ("dynamics.iterations", "leave iterations out"),
+    ),
+    "history of a load": ([('on = "right"', f'on = "right"\n{UNEVEN}')], ("load.1.over", "must ascend")),
+    "history of a support": (
+        [('on = "left"', f'on = "left"\ndisplacement = ["1 mm", 0]\n{UNEVEN}')],
+        ("support.1.over", "must ascend"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_wrong_motion_is_an_error_at_its_key(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changes, words = MOVING[name]
+    message = refused(tmp_path, capsys, written(tmp_path, changed(*changes)))
+    assert len(message.splitlines()) == 1, message
+    for word in words:
+        assert word in message, message
+
+
 def test_all_faults_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = written(tmp_path, changed(("poisson = 0.3", "poison = 0.3")), "first.toml")
     second = written(tmp_path, changed(('on = "left"', 'on = "lef"')), "second.toml")

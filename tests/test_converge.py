@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,16 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from tests.studies import written
+from tests.studies import changed, written
+from truespring.calibration.study import calibrate_study
 from truespring.cli import main
+from truespring.converging import converge
 from truespring.converging.converge import _watched
 from truespring.converging.settling import Attempt, refinement, settle
 from truespring.errors import TruespringError
 from truespring.mesh import refined
+from truespring.study import Study, read_study
+from truespring.validity import map_validity
 
 MESHES = {
     "squares": ts.rectangle((4.0, 3.0), (3, 2)),
@@ -272,3 +277,34 @@ def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:
     assert [sheet.svg()[:5] for sheet in found.figures().values()] == [b"<?xml"]
     files = found.write(tmp_path / "out")
     assert all(file.is_file() and file.parent == tmp_path / "out" / "study" for file in files.values())
+
+
+# --- studies without a last level to compare ----------------------------------------------------------------------
+
+_MOVES = ("poisson = 0.3", "poisson = 0.3\ndensity = 1000\n[dynamics]\nduration = 0.1")
+_BACK = ('on = "right"', 'on = "right"\nover = [[0, 0], [0.5, 1], [1, 0]]')
+_TOOL = (
+    '[[tool]]\nshape = "plane"\nnormal = [0, -1]\npath = [[0, 0, 0.011], [0.5, 0, 0.009], [1, 0, 0.011]]\n\n[solver]'
+)
+_RETRACTS = ("[solver]", _TOOL)
+_PRESSES = ("[solver]", _TOOL.replace(", [1, 0, 0.011]", "").replace("0.5", "1"))
+
+
+@pytest.mark.parametrize("verb", [map_validity, lambda study: next(converge(study)), calibrate_study])
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [(_MOVES, "dynamics"), (_BACK, "load.1.over"), (_RETRACTS, "tool.1.path")],
+    ids=["motion", "history", "tool"],
+)
+def test_verbs_that_compare_the_last_level_need_one(
+    verb: Callable[[Study], object], change: tuple[str, str], key: str, tmp_path: Path
+) -> None:
+    study = read_study(written(tmp_path, changed(change)))
+    with pytest.raises(TruespringError, match=rf"study\.toml:\d+: {key}: .*(leave|end|give)"):
+        verb(study)
+
+
+def test_the_force_on_a_tool_settles_too(tmp_path: Path) -> None:
+    found = next(converge(read_study(written(tmp_path, changed(_PRESSES))), most=1))
+    forces = {one.model: one.values[0] for one in found.quantities if one.quantity == "force of tool 1"}
+    assert set(forces) == {"springs", "linear"} and all(force > 0 for force in forces.values())

@@ -370,6 +370,20 @@ def test_a_twisted_bar_bears_a_moment() -> None:
     assert free < moment[1][0] < 1.15 * free  # ends that cannot warp, and elements, are stiffer
 
 
+@pytest.mark.parametrize("order", ["linear", "quadratic"])
+def test_two_supports_that_turn_a_node_alike_turn_it_once(order: str) -> None:
+    """The nodes on the left, at the top at once by both supports, and the midpoints of edges between them."""
+    turn = {"rotation": 0.1, "about": (0.01, 0.0)}
+    moved = ts.Fixed([0, 9], displacement=(0.0, 0.0), **turn)  # type: ignore[arg-type]
+    problem = strip(supports=[ts.Fixed("left", **turn), moved], loads=())  # type: ignore[arg-type]
+    problem = replace(problem, mesh=ts.rectangle((0.16, 0.04), (8, 2), "triangle", "alternating"))
+    path = ts.solve(problem, ts.Fem("neo-hookean", order), ts.Newton(1))
+    known = path.whole.points
+    arms = known - (0.01, 0.0)
+    turned = arms @ np.array([[math.cos(0.1), math.sin(0.1)], [-math.sin(0.1), math.cos(0.1)]]) + (0.01, 0.0)
+    assert path.states[-1].all_positions == pytest.approx(turned, abs=1e-9)
+
+
 def test_a_region_that_turns_starts_from_its_motion() -> None:
     """Held nodes are where they should be at each level, by every way to the balance."""
     problem = strip(supports=[ts.Fixed("left"), ts.Fixed("right", rotation=1.0, displacement=(-0.03, 0.02))], loads=())

@@ -7,7 +7,7 @@ import pytest
 
 import truespring as ts
 from truespring.errors import TruespringError
-from truespring.study.network import read_network
+from truespring.study import read_network, read_study, run
 
 NODES = "node,x [mm],y [mm]\na,0,0\nb,1000,0\nc,500,400\n"
 SPRINGS = "a,b,stiffness [N/mm],rest_length [m]\na,c,2,0.6\nc,b,3,0.65\n"
@@ -29,6 +29,30 @@ def test_names_and_units_are_understood(tmp_path: Path) -> None:
 def test_numbers_in_si_are_enough(tmp_path: Path) -> None:
     network = read_network(*files(tmp_path, "x,y,z\n0,0,0\n1,0,0\n", "a,b,stiffness\n0,1,5\n"))
     assert network.nodes.shape == (2, 3) and network.rest_length == pytest.approx([1.0])
+
+
+def test_a_motion_needs_masses_which_the_file_of_the_nodes_may_have(tmp_path: Path) -> None:
+    """Free masses under no load but a velocity keep it; without masses the study names the column."""
+    heavy = NODES.replace("y [mm]", "y [mm],mass [g]").replace("0\n", "0,20\n")
+    network = read_network(*files(tmp_path, heavy))
+    assert network.mass == pytest.approx([0.02] * 3)
+    springs = SPRINGS.replace(",rest_length [m]", "").replace(",0.6\n", "\n").replace(",0.65\n", "\n")
+    models = '[mesh]\nnodes = "nodes.csv"\nsprings = "springs.csv"\n[models.net]\nkind = "network"\n'
+    moves = '[dynamics]\nduration = "0.1 s"\nstep = "10 ms"\nscheme = "midpoint"\nvelocity = ["1 m/s", 0]\n'
+    study = tmp_path / "study.toml"
+    study.write_text(models + moves, encoding="utf-8")
+    files(tmp_path, heavy, springs)
+    (path,) = run(read_study(study)).paths.values()
+    assert path.states[-1].displacement == pytest.approx(np.tile([0.1, 0.0], (3, 1)))
+    files(tmp_path, NODES, springs)
+    with pytest.raises(TruespringError, match=r"mesh\.nodes: a motion needs the mass of the nodes: add a column mass"):
+        read_study(study)
+    light = read_network(*files(tmp_path, NODES, springs))
+    problem = ts.Problem(light.mesh, dynamics=ts.Dynamics(0.1, 0.01, "midpoint"))
+    with pytest.raises(TruespringError, match=r"mass of the nodes.*SpringNetwork.*mass="):
+        ts.solve(problem, light)
+    with pytest.raises(TruespringError, match=r"nodes.csv:3: mass = -1 kg: must be positive"):
+        read_network(*files(tmp_path, "x,y,mass\n0,0,1\n1,0,-1\n", "a,b,stiffness\n0,1,5\n"))
 
 
 WRONG = {

@@ -238,11 +238,14 @@ class Loading:
     def motion(self, level: float = 1.0) -> Floats:
         """Return the prescribed displacement at a level [m], zero in free directions, shape (n_nodes, dim)."""
         motion = np.zeros(self.displacement.shape)
+        turned = np.zeros(len(motion), dtype=bool)
         for part in self.parts:
             share = part.amplitude.at(level)
             motion += share * part.displacement
-            for turn in part.turns:
-                motion[turn.nodes] += turn.motion(share)
+            for turn in part.turns:  # several supports may state the same rotation of a node
+                first = ~turned[turn.nodes]
+                motion[turn.nodes[first]] += turn.motion(share)[first]
+                turned[turn.nodes] = True
         return motion
 
     def dead_force(self, level: float = 1.0) -> Floats:

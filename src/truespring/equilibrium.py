@@ -150,7 +150,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         path = solver.follow(potential, loading, report, geometry)
     else:
         path = _motion(problem, problem.dynamics, model, (potential, loading), solver, report, geometry)
-    found, broken = _followed(path, potential)
+    found, broken = _followed(problem, path, potential)
     found, below_rounding = _above_rounding(problem, found)
     states = tuple(_state(problem, potential, loading, one) for one in found if one.converged)
     best = None if found[-1].converged else _state(problem, potential, loading, found[-1])
@@ -200,6 +200,11 @@ def _motion(
         mass = potential.lumped_mass()
     else:
         own = potential.mass if isinstance(potential, Massive) else np.zeros(0)
+        if not len(own) and problem.material is None:
+            raise ProblemError(
+                f"a motion needs the mass of the nodes [kg], which {model.label} lacks: SpringNetwork(..., mass=...), "
+                "or a column mass in the file of the nodes"
+            )
         mass = own if len(own) else problem.mass
     damper = damper_of(problem, potential, model.finite) if dynamics.damping.stiffness else None
     crossing = problem.crossing_time
@@ -250,7 +255,9 @@ def _moved_by_more_than_rounding(problem: Problem, load_factor: float) -> bool:
     return loading.driven_by_motion and (bool(loading.interactions) or UNBALANCED * moved > rounding)
 
 
-def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list[Equilibrium], tuple[str, ...]]:
+def _followed(
+    problem: Problem, follow: Iterator[Equilibrium], potential: Potential
+) -> tuple[list[Equilibrium], tuple[str, ...]]:
     """Return the states up to the end or an exception, at least the unloaded one; and a warning of the exception."""
     found: list[Equilibrium] = []
     try:
@@ -262,8 +269,9 @@ def _followed(follow: Iterator[Equilibrium], potential: Potential) -> tuple[list
         if not ranks_of(potential).is_on_all(error):
             raise OneProcessError(error_words(error)) from error
         at = found[-1].load_factor if found else 0.0
-        broken = (f"stopped beyond load factor {at:.6g}: {error_words(error)}; {Status.NOT_CONVERGED.advice}",)
-        return found or [_rest(potential.nodes)], broken
+        advice = f"; {Status.NOT_CONVERGED.advice}" if problem.dynamics is None else ""
+        broken = f"stopped beyond {problem.where(at)}: {error_words(error)}{advice}"
+        return found or [_rest(potential.nodes)], (broken,)
     return found, ()
 
 

@@ -32,6 +32,16 @@ class LoadError(ProblemError):
         self.number, self.text = number, text
 
 
+class PartError(ProblemError):
+    """A part of a problem is wrong; `place` is the place in a study: ("support", 0, "over"), lists count from 0."""
+
+    def __init__(self, place: tuple[str | int, ...], text: str) -> None:
+        several = len(place) > 1 and isinstance(place[1], int)
+        named = [f"{place[0]}s[{place[1]}]", *place[2:]] if several else list(place)
+        super().__init__(f"{'.'.join(map(str, named))}: {text}")
+        self.place, self.text = place, text
+
+
 class ToolError(ProblemError):
     """A tool or grasp does not fit the body; `name` is its name, `key` the wrong argument or empty."""
 

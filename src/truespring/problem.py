@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Bools, Floats, Ints
 from truespring.conditions import Amplitude, Loading, Turn
 from truespring.dynamics import Dynamics
-from truespring.errors import LoadError, NoLoadError, ProblemError, ToolError, TruespringError
+from truespring.errors import LoadError, NoLoadError, PartError, ProblemError, ToolError, TruespringError
 from truespring.fibres import Families, families
 from truespring.loading import (
     LOADS,
@@ -114,16 +114,23 @@ class Problem:
             raise NoLoadError(f"nothing loads the body{held}: add a load, or a support with a nonzero displacement")
 
     def _check_motion(self, dynamics: Dynamics) -> None:
-        """Raise ProblemError if a motion has no mass, or its velocity does not fit the body."""
+        """Raise PartError if a motion has no mass, its velocity does not fit the body, or a support would jump."""
         if self.material is not None and self.body.density is None:
-            raise ProblemError("a motion needs a density [kg/m^3] of the material and of each region")
+            places: list[tuple[tuple[str | int, ...], Material]] = [(("material", "density"), self.material)]
+            places += [(("region", number, "density"), one.material) for number, one in enumerate(self.regions)]
+            without = (place for place, one in places if one.density is None and one in self.materials)
+            raise PartError(next(without), "a motion needs a density [kg/m^3] of the material and of each region")
         if dynamics.velocity is not None:
-            components(dynamics.velocity, self.mesh.dim, "velocity", "m/s")
-        for support in self.supports:
+            try:
+                components(dynamics.velocity, self.mesh.dim, "velocity", "m/s")
+            except ProblemError as error:
+                raise PartError(("dynamics", "velocity"), str(error)) from None
+        for number, support in enumerate(self.supports):
             if support.over is None and (support.rotation or np.any(support.displacement or 0.0)):
-                raise ProblemError(
+                raise PartError(
+                    ("support", number, "over"),
                     "a support that moves in a motion would jump at time 0: give its history, such as over = "
-                    '[["0 s", 0], ["50 ms", 1]]'
+                    '[["0 s", 0], ["50 ms", 1]]',
                 )
         _ = self.loading
 
@@ -232,6 +239,10 @@ class Problem:
                 held[there], moved[there], histories[there] = True, motion[:, axis], number
                 displacements[:, support.nodes, axis] = 0.0
                 displacements[number, support.nodes, axis] = support.motion[axis]
+        for support, stated in reversed(list(zip(self.held, self.supports, strict=True))):
+            if support.turn is not None:  # the first that turns a node moves it, see `Loading.motion`
+                displacements[:, support.nodes] = 0.0
+                displacements[self._histories.index(_history(stated)), support.nodes] = support.motion
         turns = [
             tuple(
                 one.turn
@@ -314,14 +325,18 @@ class Problem:
         return Body(self.mesh, thickness, density, along, moving=self.dynamics is not None)
 
     def _amplitude(self, history: Rows | None) -> Amplitude:
-        """Return the amplitude of a history; raise LoadError with the number of the first load that has it."""
+        """Return the amplitude of a history; raise PartError with the first load or support that has it."""
         try:
             return amplitude_of(history, self.duration)
         except ProblemError as error:
-            number = next((number for number, load in enumerate(self.loads) if _history(load) == history), None)
-            if number is None:
-                raise
-            raise LoadError(number, str(error)) from None
+            several: dict[str, Sequence[Load | Fixed]] = {"load": self.loads, "support": self.supports}
+            place = next(
+                (kind, number, "over")
+                for kind, ones in several.items()
+                for number, one in enumerate(ones)
+                if _history(one) == history
+            )
+            raise PartError(place, str(error).removeprefix("over: ")) from None
 
     def _of_each_load(self, ask: Callable[[Load], _Found | None], numbers: Sequence[int]) -> Iterator[_Found]:
         """Yield `ask(load)` for loads, except None; raise LoadError with the number of a load that raises."""

@@ -23,6 +23,7 @@ Dimension = Literal[
     "time",
     "rate",
     "speed",
+    "mass",
 ]
 
 #: The SI unit of each dimension, and an example for error messages.
@@ -39,6 +40,7 @@ SI_UNITS: dict[Dimension, tuple[str, str]] = {
     "time": ("s", '"20 ms"'),
     "rate": ("1/s", '"2 1/s"'),
     "speed": ("m/s", '"30 mm/s"'),
+    "mass": ("kg", '"20 g"'),
 }
 
 #: Limits on the magnitude of nonzero quantities in SI units; their fourth powers do not overflow.

@@ -81,6 +81,8 @@ class LoadCase:
             object.__setattr__(self, "against", known)
         if not self.solver.follows_load:
             raise ProblemError(f'{self.name}: calibration needs load control: set control = "load"')
+        if self.problem.dynamics is not None:
+            raise ProblemError(f"{self.name}: calibration is for equilibria: leave dynamics out")
         if not self.observations:
             steps = self.solver.load_steps
             raise ProblemError(

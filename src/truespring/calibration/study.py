@@ -18,6 +18,7 @@ from truespring.models import springs_by_rule
 from truespring.problem import Problem
 from truespring.reference import read_result
 from truespring.refining import COST, in_second_order, own_error, work_of
+from truespring.study.last_level import require_last_level
 from truespring.study.read import Study
 from truespring.study.run import follow
 
@@ -48,12 +49,13 @@ def calibrate_study(
         regularisation: weight of the term toward the rule.
         progress: called with the current step and the share of the work done.
 
-    Raises StudyError, with the file, if the studies do not fit together.
+    Raises StudyError, with the file, if the studies do not fit together, or one is a motion or returns before its end.
     """
     name = springs_of(study, unknowns)
     model = springs_by_rule(study.entries)[name]
     for one in (study, *cases, *held_out):
         _require_newton(one)
+        require_last_level(one, "calibrate")
     for one in (*cases, *held_out):
         with _naming(study):
             require_one_body([(str(one.file), one.problem)], study.problem)

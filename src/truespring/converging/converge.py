@@ -13,6 +13,7 @@ from truespring.equilibrium import Solution
 from truespring.errors import StudyError
 from truespring.mesh import nearest_node
 from truespring.mesh.selections import AXES
+from truespring.study.last_level import require_last_level
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 
@@ -27,8 +28,9 @@ def converge(
     """Solve a study on a sequence of meshes, each with elements of half the size; yield the refinement after each.
 
     It ends when every watched quantity has settled, when a model does not reach full load, or after `most` meshes.
-    Watched are the probe's displacement along each axis, the stored energy, and force and torque of each moved support.
-    Nothing settles on a mesh on which a model is inverted, unstable or not converged.
+    Watched are the probe's displacement along each axis, the stored energy, force and torque of each moved support,
+    and the force on each tool and grasp. Nothing settles on a mesh on which a model is inverted, unstable or not
+    converged.
 
     Args:
         study: a study or its file.
@@ -36,9 +38,10 @@ def converge(
         most: largest number of meshes.
         progress: called with the refined study and the name of a model before it is solved.
 
-    Raises StudyError if the mesh cannot be refined.
+    Raises StudyError if the mesh cannot be refined, or the study is a motion or returns before its end.
     """
     original = study if isinstance(study, Study) else read_study(study)
+    require_last_level(original, "converge")
     attempts: list[Attempt] = []
     values: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
     place = None
@@ -78,6 +81,8 @@ def _watched(path: Solution, probe: int) -> Iterator[tuple[str, str, float]]:
         yield f"u{direction} of the probe", "m", float(value)
     if np.isfinite(state.energy):  # unknown for some other programs
         yield "energy", "J", state.energy
+    for tool, touch in zip(path.problem.touching, state.touches, strict=False):  # not known of some other programs
+        yield f"force of {tool.name}", "N", float(np.linalg.norm(touch.force))
     for one in path.support_forces(state):  # a resultant that vanishes is zero on every mesh
         yield f"force of {one.name}", "N", float(np.linalg.norm(one.force)) if one.has_force else 0.0
         yield f"torque of {one.name}", "N m", float(np.linalg.norm(one.torque)) if one.has_torque else 0.0

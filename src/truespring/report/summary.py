@@ -5,6 +5,8 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution
 from truespring.models import Moduli
@@ -67,6 +69,9 @@ def _model(path: Solution, probe: int) -> dict[str, Any]:
         "warnings": list(path.warnings),
         "solver": None if path.cost is None else asdict(path.cost),
     }
+    if path.problem.stated and path.problem.returns:
+        moved = [float(np.linalg.norm(state.displacement[probe])) for state in path.states]
+        values["largest_probe_displacement"] = max(moved, default=None)
     if path.element is not None:
         values["element"] = path.element
     if path.moduli is not None:

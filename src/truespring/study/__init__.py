@@ -3,6 +3,7 @@
 from truespring.study.changes import value_at as value_at
 from truespring.study.export import export_study as export_study
 from truespring.study.export import springs_of as springs_of
+from truespring.study.last_level import require_last_level as require_last_level
 from truespring.study.moduli import Realised as Realised
 from truespring.study.moduli import realised_moduli as realised_moduli
 from truespring.study.moduli import realised_values as realised_values

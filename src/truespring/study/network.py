@@ -10,7 +10,13 @@ from truespring.models import SpringNetwork
 from truespring.units import Dimension
 
 # Dimension of each allowed column; None for texts and numbers without a unit.
-_NODE_COLUMNS: dict[str, Dimension | None] = {"node": None, "x": "length", "y": "length", "z": "length"}
+_NODE_COLUMNS: dict[str, Dimension | None] = {
+    "node": None,
+    "x": "length",
+    "y": "length",
+    "z": "length",
+    "mass": "mass",
+}
 _SPRING_COLUMNS: dict[str, Dimension | None] = {
     "a": None,
     "b": None,
@@ -23,7 +29,7 @@ def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
     """Read a network from two CSV files, each with a header line.
 
     Args:
-        nodes: columns x, y and, in 3D, z; optionally `node`, the name of each node.
+        nodes: columns x, y and, in 3D, z; optionally `node`, the name of each node, and `mass`, which a motion needs.
         springs: columns a and b, the two nodes of each spring, by name or, without names, by number from 0; stiffness;
             and optionally rest_length, by default the distance of the nodes.
 
@@ -41,7 +47,11 @@ def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
     joined = Columns(Path(springs), _SPRING_COLUMNS, ("a", "b", "stiffness"))
     ends = np.array([[joined.known(column, row, number) for column in "ab"] for row in range(joined.n_rows)])
     rest = joined.numbers("rest_length") if "rest_length" in joined.columns else np.zeros(0)
+    mass = data.numbers("mass") if "mass" in data.columns else np.zeros(0)
+    light = np.flatnonzero(mass <= 0)
+    if light.size:
+        raise MeshError(f"{nodes}:{data.line(int(light[0]))}: mass = {mass[light[0]]:g} kg: must be positive")
     try:
-        return SpringNetwork(places, ends, joined.numbers("stiffness"), rest)
+        return SpringNetwork(places, ends, joined.numbers("stiffness"), rest, mass=mass)
     except TruespringError as error:
         raise MeshError(f"{springs}: {error}") from None

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from truespring.errors import FibreError, LoadError, NoLoadError, StudyError, ToolError, TruespringError
+from truespring.errors import FibreError, LoadError, NoLoadError, PartError, StudyError, ToolError, TruespringError
 from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
 from truespring.models import Model, SpringNetwork, check_fibres
@@ -183,6 +183,9 @@ def _problem(keys: StudyKeys, places: Places, halvings: int, balanced: bool) -> 
     tools = [tool.build(places, number, mesh) for number, tool in enumerate(keys.tool)]
     grasps = [grasp.build(places, number, mesh) for number, grasp in enumerate(keys.grasp)]
     dynamics = None if keys.dynamics is None else keys.dynamics.build(places)
+    if dynamics is not None and network is not None and not network.mass.size:
+        with places.at("mesh", "nodes"):
+            raise StudyError("a motion needs the mass of the nodes: add a column mass [kg] to the file")
     _check_histories(keys, places)
     moving: dict[str, Any] = {"dynamics": dynamics, "tools": tools, "grasps": grasps}
     try:
@@ -191,6 +194,9 @@ def _problem(keys: StudyKeys, places: Places, halvings: int, balanced: bool) -> 
         own = [number for number, region in enumerate(regions) if region.material.fibres == error.fibres]
         with places.at("region", own[0]) if own else places.at("material"):
             raise
+    except PartError as error:
+        with places.at(*error.place):
+            raise StudyError(error.text) from None
     except LoadError as error:
         with places.at("load", error.number):
             raise StudyError(error.text) from None

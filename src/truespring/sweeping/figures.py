@@ -58,6 +58,8 @@ class Measured:
 def measured(rows: Sequence[Row]) -> Measured:
     """Return the rms error against each reference [%]; without references, the probe's displacement in each model.
 
+    Where displacements may return to zero, as in a motion, it is the largest on the way.
+
     Values of failed points are None.
     """
     errors = [column for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")]
@@ -67,7 +69,7 @@ def measured(rows: Sequence[Row]) -> Measured:
     models = dict.fromkeys(
         column.split(".")[1] for column in rows[0] if column.startswith("models.") and ".probe_displacement." in column
     )
-    moves = {name: [_length(row, f"models.{name}.probe_displacement.") for row in rows] for name in models}
+    moves = {name: [_moved(row, f"models.{name}.") for row in rows] for name in models}
     largest = max((value for values in moves.values() for value in values if value is not None), default=1.0)
     scale = natural_scale(largest, "m")
     moves = {name: [_times(value, 1 / scale.size) for value in values] for name, values in moves.items()}
@@ -80,6 +82,12 @@ def _times(value: float | None, factor: float) -> float | None:
 
 def _known(row: Row, column: str) -> float | None:
     return row[column] if row["status"] == "converged" else None
+
+
+def _moved(row: Row, prefix: str) -> float | None:
+    """Return the largest displacement of the probe on the way if the row has it, else that at the last level [m]."""
+    largest = f"{prefix}largest_probe_displacement"
+    return _known(row, largest) if row.get(largest) is not None else _length(row, f"{prefix}probe_displacement.")
 
 
 def _length(row: Row, prefix: str) -> float | None:

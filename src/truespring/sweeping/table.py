@@ -11,6 +11,7 @@ _OF_MODELS = (
     "status",
     "load_factor",
     "probe_displacement",
+    "largest_probe_displacement",
     "force",
     "energy",
     "residual",

@@ -11,7 +11,7 @@ import numpy as np
 
 from truespring.errors import StudyError, TruespringError, nearest
 from truespring.models import LAWS
-from truespring.study import Study, read_study
+from truespring.study import Study, read_study, require_last_level
 from truespring.sweeping import Failure, Pool
 from truespring.validity.axes import NAMES, Range, axis_of, check_axes, known, range_of, sizes_to
 from truespring.validity.bodies import Body, Spot
@@ -68,6 +68,7 @@ def map_validity(
     Raises StudyError for invalid arguments or combinations of them.
     """
     read = study if isinstance(study, Study) else read_study(study)
+    require_last_level(read, "map", in_proportion=True)
     if law not in LAWS:
         raise StudyError(f"law = '{law}' is unknown{nearest(law, LAWS)}; allowed: {', '.join(LAWS)}")
     started = time.perf_counter()

@@ -142,7 +142,9 @@ class VoxelsKeys(MeshKeys):
 class NetworkFilesKeys(MeshKeys):
     """A spring network from two CSV files, for the model of kind "network"."""
 
-    nodes: FileName = Field(description="CSV file of nodes, relative to the study: columns x, y and, in 3D, z [m]")
+    nodes: FileName = Field(
+        description="CSV file of nodes, relative to the study: columns x, y and, in 3D, z [m], for a motion mass [kg]"
+    )
     springs: FileName = Field(
         description="CSV file of springs, relative to the study: columns a, b, stiffness [N/m], rest_length [m]"
     )

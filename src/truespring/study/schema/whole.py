@@ -78,7 +78,7 @@ class SolverKeys(Keys):
         """Return the solver; raise StudyError if it does not fit the problem."""
         common: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
         past = {**common, "linear": "direct" if self.linear == "auto" else self.linear}
-        self._check_control(places)
+        self._check_control(places, problem.dynamics is not None)
         if self.direction is not None and self.to is not None:
             with places.at("solver", "on"):
                 select(problem.mesh, self.on)
@@ -92,8 +92,11 @@ class SolverKeys(Keys):
             common |= {"method": self.method, "linear": self.linear, "coarse_start": self.coarse_start}
             return Newton(self.load_steps, **common)
 
-    def _check_control(self, places: Places) -> None:
-        """Raise StudyError if keys of displacement control are missing, or set for another control."""
+    def _check_control(self, places: Places, moves: bool) -> None:
+        """Raise StudyError if the control is not for motions, or keys of displacement control do not belong to it."""
+        if moves and self.control != "load":
+            with places.at("solver", "control"):
+                raise StudyError(f'"{self.control}" is for equilibria: with [dynamics] leave control out')
         for key in ("on", "direction", "to"):
             is_set = getattr(self, key) is not None
             if is_set != (self.control == "displacement"):
@@ -145,6 +148,9 @@ class DynamicsKeys(Keys):
         values = {name: getattr(self, name) for name in type(self).model_fields if name != "damping"}
         with places.at("dynamics", "damping"):
             damping = Damping(self.damping.stiffness, self.damping.mass)
+        if self.scheme == "leapfrog" and self.iterations:
+            with places.at("dynamics", "iterations"):
+                raise StudyError("leapfrog has no iterations: leave iterations out, or choose an implicit scheme")
         with places.at("dynamics"):
             return Dynamics(damping=damping, **values)
 
