@@ -32,6 +32,8 @@ from truespring.report.timelines import energies_figure
 from truespring.report.touching import drawn_tools, with_tools
 from truespring.report.verdict import verdict, verdict_sentences
 from truespring.report.viewer import viewer
+from truespring.sweeping.figures import measured
+from truespring.sweeping.table import rows_of
 from truespring.tools import TOOLS, Tool
 
 __all__ = ["page_of"]  # a fixture
@@ -152,6 +154,20 @@ def test_without_a_reference_the_motion_is_described() -> None:
     found = result()
     alone = Result(**{name: getattr(found, name) for name in Result.__dataclass_fields__} | {"comparisons": {}})
     assert in_order(verdict(alone), "springs were followed over the whole motion of 0.4 s", "nothing was compared")
+
+
+def test_a_sweep_shows_the_largest_displacement_of_a_motion() -> None:
+    """At the end of a whole period the body is back; a quarter before it was furthest."""
+    values = summary(result(0.1)) | {"comparison": {}}
+    (row,) = rows_of(["k"], [{"values": {"k": 1}, "status": "converged", "reason": "", "summary": values}])
+    assert row["models.springs.largest_probe_displacement"] == pytest.approx(1.1 * 5 * 0.08**2)
+    assert measured([row]).values["springs"] == [pytest.approx(1.1 * 5 * 0.08**2 * 1e3)]  # [mm]
+
+
+def test_an_exception_ends_a_motion_at_a_time() -> None:
+    body = problem(dynamics=ts.Dynamics(0.4, 0.1, "bdf2"))
+    (said,) = [one for one in ts.solve(body, ts.Springs("isotropic"), timeout=0.0).warnings if "stopped" in one]
+    assert said.startswith("stopped beyond 0 s: the time limit") and "load_steps" not in said
 
 
 # --- three errors ---------------------------------------------------------------------------------
