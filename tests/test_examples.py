@@ -18,6 +18,8 @@ from truespring.study import read_study, run
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 NAMES = ("stretching", "bending", "soft_block", "tissue", "muscle")
+# Studies of motions.
+MOVING = ("gripped_block", "liver_probe")
 
 
 @cache
@@ -39,7 +41,24 @@ def script(name: str) -> ModuleType:
 
 def test_every_example_is_run_here() -> None:
     names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
-    assert names == {*NAMES, "truss", "organ", "six_methods", "cantilever_modes"}
+    assert names == {*NAMES, *MOVING, "truss", "organ", "six_methods", "cantilever_modes"}
+
+
+@pytest.mark.verification
+@pytest.mark.parametrize("name", MOVING)
+def test_the_errors_of_the_shipped_motions_are_separate(name: str) -> None:
+    """The figures of README.md for the gripped block; the liver's probe presses and rubs."""
+    result = run(read_study(EXAMPLES / f"{name}.toml"))
+    assert result.converged, [path.warnings for path in result.paths.values()]
+    model, splits = result.comparisons["fem"].rms_error, result.splits
+    assert model is not None and splits is not None and splits.step is not None
+    assert splits.solver == 0.0
+    if name == "gripped_block":
+        assert (model, splits.step) == (pytest.approx(0.018, abs=5e-4), pytest.approx(1e-4, abs=5e-5))
+    else:
+        assert model < 0.02 and splits.step < 1e-3
+        last = result.paths["springs"].states[-1].touches[0]
+        assert last.force[0] > 1e-3 and abs(last.force[1]) > 1e-4
 
 
 def test_six_methods_stand_side_by_side() -> None:
