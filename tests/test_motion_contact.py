@@ -73,6 +73,7 @@ def test_a_block_slides_down_an_incline(angle: float, friction: float, length: f
     assert force[0] == pytest.approx(-friction * force[1], rel=1e-6, abs=1e-12)
 
 
+@LONG
 def test_a_block_slides_on_a_barrier() -> None:
     path = sliding(30, 0.4, 1e-3, contact="barrier")
     before, after = path.states[-3], path.states[-1]

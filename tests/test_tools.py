@@ -281,6 +281,7 @@ def test_a_plate_that_slides_drags_with_the_coefficient_of_friction(dim: int) ->
     assert dragged.applied_force[0] / -dragged.applied_force[1] == pytest.approx(0.3, rel=1e-3)
 
 
+@pytest.mark.verification
 def test_friction_has_the_normal_forces_of_the_state_itself() -> None:
     """A ball that is pressed and drawn at once: the result does not depend on the number of steps."""
     rows = [[0, 0.03, 0.0405], [1, 0.034, 0.037]]
