@@ -12,7 +12,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.models.constants import Constants
-from truespring.models.fem_potential import FemPotential, _filled_up, require_continuum
+from truespring.models.fem_potential import FemPotential, filled_up, require_continuum
 from truespring.models.gauss_points import Points
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.quadratic import QuadraticPotential
@@ -39,7 +39,7 @@ class _Relaxed(FemPotential):
         at = super()._points(positions, first, last)
         if self.strain is None:
             return at
-        change = at.strain - self.strain[..., _filled_up(first, last)]
+        change = at.strain - self.strain[..., filled_up(first, last)]
         return replace(at, strain=change + identity(change) if self.law.finite else change)
 
 

@@ -127,7 +127,7 @@ class FemPotential:
         section = self.problem.section
         assert section is not None  # see require_continuum
         corner_slopes, slopes, weights = self._reference
-        chosen = _filled_up(first, last)
+        chosen = filled_up(first, last)
         nodes, dim, n_points = writable(self.elements[chosen]), self.mesh.dim, len(weights)
         n = len(nodes)
         gradients = np.empty((n // LANES, slopes.shape[1] * dim * n_points, LANES))
@@ -287,7 +287,7 @@ class FemPotential:
         at = self._points(positions, first, last)
         if stress is None:
             return self._tangent(at, None)
-        given = np.ascontiguousarray(stress[..., _filled_up(first, last)])
+        given = np.ascontiguousarray(stress[..., filled_up(first, last)])
         return self._tangent(at, at.from_reference(given, self._law_gradient(at)))
 
     def _tangent(self, at: Points, stress: Floats | None) -> Floats:
@@ -340,7 +340,7 @@ class FemPotential:
         return stress
 
 
-def _filled_up(first: int, last: int) -> Ints | slice:
+def filled_up(first: int, last: int) -> Ints | slice:
     """Return the indices of a slice of the elements, filled up with its last one to a multiple of LANES."""
     from truespring.kernels.lanes import LANES
 

@@ -74,11 +74,9 @@ class Implicit:
         states = [one for one in history if one is not None]
         known = {one.time: self._measures.get(one.time) or damper.measure(one.positions) for one in states}
         self._measures = known
-        n_parts = len(known[history.last.time])
-        return [
-            history.combined(stage.weights, lambda one, part=part: known[one.time][part])  # type: ignore[misc]
-            for part in range(n_parts)
-        ]
+        shares = zip(stage.weights, states, strict=False)
+        weighted = [[share * one for one in known[state.time]] for share, state in shares]
+        return [sum(several[1:], several[0]) for several in zip(*weighted, strict=True)]
 
     def _solved(self, level: float, start: Floats, other: Floats) -> Equilibrium:
         """Return the equilibrium of a step found from a start, else from another; or after a number of iterations."""

@@ -97,10 +97,12 @@ class StressedStep(Step):
         return self.elastic.extrapolated_stress(positions, step)
 
 
-def step_of(elastic: Potential, *parts: object) -> Step:
+def step_of(
+    elastic: Potential, inertia: Floats, target: Floats, momentum: float, dashpots: Sequence[Potential]
+) -> Step:
     """Return a step; arguments as Step."""
     kind = StressedStep if isinstance(elastic, Stressed) else Step
-    return kind(elastic, *parts)  # type: ignore[arg-type]
+    return kind(elastic, inertia, target, momentum, dashpots)
 
 
 def _sum(one: SparseMatrix, other: SparseMatrix, dim: int) -> SparseMatrix:
