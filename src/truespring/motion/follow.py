@@ -14,7 +14,8 @@ from truespring.motion.implicit import Implicit
 from truespring.motion.moving import Body, creep_speed
 from truespring.motion.plan import SAME, Plan, planned
 from truespring.motion.record import Account
-from truespring.motion.stages import ORDERS, History, Moment
+from truespring.motion.stages import History, Moment
+from truespring.motion.steps import FIRST, ROUNDING, Steps
 from truespring.motion.still import Still
 from truespring.potential import Damper, Potential
 from truespring.solvers.balance import Balance, Equilibrium, Reporter
@@ -22,17 +23,6 @@ from truespring.solvers.cost import Cost
 from truespring.solvers.newton import Newton, linear_of
 from truespring.solvers.solver import Geometry
 
-# A step that fails is halved up to so many times.
-_MAX_HALVINGS = 8
-# With an automatic step: the first one over the duration, the safety factor, bounds of a change, and the smallest step
-# over the duration.
-_FIRST, _SAFETY, _SHRINK, _GROW, _SMALLEST = 1e-4, 0.8, 0.2, 2.0, 1e-9
-# Displacements below this share of the body's size are rounding errors.
-_ROUNDING = 1e-10
-# Velocity and acceleration count as the displacement to which they lead in this share of the duration.
-_SOON = 1e-3
-# Share of the distance from a prediction by Taylor's series in the error of a step.
-_SHARE = 0.3
 # A motion has become unstable if its energy exceeds this multiple of the energy that it was given, or if a node moved
 # further than this multiple of the body's size.
 _UNSTABLE, _LOST = 100.0, 1e6
@@ -125,7 +115,7 @@ def _states(body: Body, dynamics: Dynamics, plan: Plan, balance: Balance, begin:
     yield recorder.state(first, Advance.none(first, body.loading, account))
     force = body.loading.force(first.positions, 0.0) - body.potential.gradient(first.positions)
     acceleration = np.where(body.held, 0.0, force / body.mass[:, None])
-    history, steps = History(first), _Steps(body, plan, dynamics, scheme, acceleration)
+    history, steps = History(first), Steps(body, plan, dynamics, scheme, acceleration)
     for number, goal in enumerate(plan.goals):
         taken = steps.to(goal, history, account)
         while isinstance(taken, Advance) and taken.moment.time < goal * (1 - SAME):
@@ -150,89 +140,8 @@ def _velocity(body: Body, dynamics: Dynamics, plan: Plan) -> Floats:
     """Return the velocity at time 0 [m/s], shape (n_nodes, dim); of supports that of their motion."""
     nodes = body.potential.nodes
     velocity = np.zeros(nodes.shape) if dynamics.velocity is None else np.tile(dynamics.velocity, (len(nodes), 1))
-    soon = _FIRST * dynamics.duration if plan.step is None else plan.step
+    soon = FIRST * dynamics.duration if plan.step is None else plan.step
     return np.where(body.held, body.velocity(0.0, soon), velocity)
-
-
-class _Steps:
-    """The lengths of steps: as planned, halved where a step fails, or by an estimate of the error."""
-
-    def __init__(self, body: Body, plan: Plan, dynamics: Dynamics, scheme: Scheme, acceleration: Floats) -> None:
-        self._body, self._plan, self._scheme = body, plan, scheme
-        self._accuracy = dynamics.accuracy / dynamics.substeps**3
-        duration = dynamics.duration
-        self._h = plan.step or _FIRST * duration
-        self._smallest = _SMALLEST * duration if plan.step is None else plan.step / 2**_MAX_HALVINGS
-        self._order = ORDERS[plan.scheme]
-        self._acceleration = acceleration
-        self._soon = _SOON * duration
-        self._largest = _ROUNDING * _size(body)
-
-    def to(self, goal: float, history: History, account: Account) -> Advance | Equilibrium:
-        """Return a step that ends at a time [s] or before; the state of least residual if none was found."""
-        spent = 0
-        while True:
-            left = goal - history.last.time
-            h = left if self._h >= left * (1 - SAME) else self._h
-            taken = self._scheme.advance(history, h, account)
-            spent += taken.iterations
-            error = self._error(history.last, taken, h) if isinstance(taken, Advance) else np.inf
-            if isinstance(taken, Advance) and error <= 1:
-                self._accept(taken, h, error)
-                return replace(taken, iterations=spent)
-            self._h = h * (max(_SHRINK, self._factor(error)) if np.isfinite(error) else 0.5)
-            if self._h < self._smallest:
-                return self._given_up(taken, history.last.time, spent)
-
-    def _given_up(self, taken: Advance | Equilibrium, time: float, spent: int) -> Equilibrium:
-        """Return the state of a step from a time [s] that was refused, with the reason."""
-        if isinstance(taken, Advance):
-            reason = (
-                f"the error of the step from time {time:.6g} s is above accuracy = {self._accuracy:g} for any length: "
-                "increase accuracy, give a step, or smooth the loads"
-            )
-            return replace(taken.state, converged=False, reason=reason, iterations=spent)
-        reason = (
-            f"the step from time {time:.6g} s was not found (relative residual {taken.residual:.1e}): use a shorter "
-            "step, more max_iterations, or less load"
-        )
-        return replace(taken, converged=False, reason=reason, iterations=spent)
-
-    def _accept(self, taken: Advance, h: float, error: float) -> None:
-        """Choose the length of the step after one of length h [s]."""
-        self._acceleration = taken.acceleration
-        self._largest = self._scale(taken)
-        if self._plan.step is not None:
-            self._h = min(2 * h, self._plan.step) if h < self._plan.step * (1 - SAME) else self._plan.step
-        elif h < self._h * (1 - SAME):  # cut by a goal
-            self._h = max(h, self._h * min(1.0, self._factor(error)))
-        else:
-            self._h = h * self._factor(error)
-
-    def _factor(self, error: float) -> float:
-        """Return the length of the next step over that of one with a relative error."""
-        best = _SAFETY * error ** (-1 / (self._order + 1)) if error else _GROW
-        return float(min(max(best, _SHRINK), _GROW))
-
-    def _error(self, last: Moment, taken: Advance, h: float) -> float:
-        """Return the estimated error of a step over the allowed one; 0 with a fixed step.
-
-        A share of the distance from a prediction: of Taylor's series with the acceleration of the step before, or for
-        Euler's scheme with the velocity; relative to the largest displacement.
-        """
-        if self._plan.step is not None:
-            return 0.0
-        ahead = last.positions + h * last.velocity
-        if self._order > 1:
-            ahead = ahead + h**2 / 2 * self._acceleration
-        away = np.abs(np.where(self._body.held, 0.0, taken.moment.positions - ahead)).max()
-        return _SHARE * float(away) / (self._accuracy * self._scale(taken))
-
-    def _scale(self, taken: Advance) -> float:
-        """Return the largest displacement so far, or that to which velocity and acceleration soon lead [m]."""
-        moved, soon = taken.moment.positions - self._body.potential.nodes, self._soon
-        ways = (moved, soon * taken.moment.velocity, soon**2 / 2 * taken.acceleration)
-        return max(self._largest, *(float(np.abs(way).max()) for way in ways))
 
 
 class _Recorder:
@@ -283,14 +192,9 @@ def _lost(body: Body, taken: Advance) -> str:
     """Return why a step cannot be continued: positions are not finite, or far away; else empty."""
     moment = taken.moment
     moved = np.abs(moment.positions - body.potential.nodes).max()
-    if np.isfinite(moment.velocity).all() and moved < _LOST * _size(body):
+    if np.isfinite(moment.velocity).all() and moved < _LOST * body.size:
         return ""
     return f"the motion became unstable before time {moment.time:.6g} s: use a shorter step, or an implicit scheme"
-
-
-def _size(body: Body) -> float:
-    """Return the diagonal of the undeformed body's bounding box [m]."""
-    return float(np.linalg.norm(np.ptp(body.potential.nodes, axis=0)))
 
 
 def _unstable(body: Body, state: Equilibrium) -> str:
@@ -299,7 +203,7 @@ def _unstable(body: Body, state: Equilibrium) -> str:
     The energies of a body that moved by no more than rounding errors are rounding errors.
     """
     assert state.moving is not None
-    if np.abs(state.positions - body.potential.nodes).max() <= _ROUNDING * _size(body):
+    if np.abs(state.positions - body.potential.nodes).max() <= ROUNDING * body.size:
         return ""
     energies = state.moving.energies
     now = energies.kinetic + energies.elastic

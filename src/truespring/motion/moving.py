@@ -40,6 +40,11 @@ class Body:
         """True for held directions, shape (n_nodes, dim)."""
         return self.loading.held
 
+    @property
+    def size(self) -> float:
+        """The diagonal of the undeformed body's bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.potential.nodes, axis=0)))
+
     def velocity(self, time: float, h: float) -> Floats:
         """Return the velocity of held directions from their places a time h [s] before and after [m/s]."""
         before, after = max(time - h, 0.0), min(time + h, self.duration)
