@@ -19,8 +19,10 @@ from truespring.linear import processes_of
 from truespring.mesh import interpolations, select
 from truespring.models import Model, as_model, check_fibres, damper_of
 from truespring.motion import follow_motion
+from truespring.motion.moving import Body as MovingBody
+from truespring.motion.moving import creep_speed
 from truespring.piecewise import Piecewise, own_rows
-from truespring.potential import Massive, Potential, Stretched
+from truespring.potential import Damper, Massive, Potential, Stretched
 from truespring.problem import Problem
 from truespring.program import Program
 from truespring.ranks import Communicator, layout_of, ranks_of
@@ -196,6 +198,13 @@ def _motion(
         raise ProblemError(f"the steps of a motion are solved by Newton's method, not by {type(solver).__name__}")
     if processes_of(solver.linear).size > 1:
         raise ProblemError("a motion is computed by one process: start one, or leave dynamics out")
+    mass, damper = _inertia(problem, dynamics, model, potential)
+    crossing = problem.crossing_time
+    return follow_motion(potential, loading, dynamics, mass, damper, solver, report, geometry, crossing)
+
+
+def _inertia(problem: Problem, dynamics: Dynamics, model: Model, potential: Potential) -> tuple[Floats, Damper | None]:
+    """Return the mass of the nodes [kg], shape (n_nodes,), and dashpots; raise ProblemError if there is no mass."""
     if isinstance(potential, Refined):
         mass = potential.lumped_mass()
     else:
@@ -206,9 +215,26 @@ def _motion(
                 "or a column mass in the file of the nodes"
             )
         mass = own if len(own) else problem.mass
-    damper = damper_of(problem, potential, model.finite) if dynamics.damping.stiffness else None
-    crossing = problem.crossing_time
-    return follow_motion(potential, loading, dynamics, mass, damper, solver, report, geometry, crossing)
+    return mass, damper_of(problem, potential, model.finite) if dynamics.damping.stiffness else None
+
+
+def moving_body(problem: Problem, model: Model | Potential) -> tuple[MovingBody, Geometry]:
+    """Return what moves, and the geometry for its solver, for steps that are taken one by one.
+
+    Raises ModelError if the model does not fit the problem, ProblemError if the body has no mass or no `dynamics`.
+    """
+    model, dynamics = as_model(model), problem.dynamics
+    if dynamics is None:
+        raise ProblemError("a motion needs dynamics: Problem(..., dynamics=Dynamics(duration=...))")
+    check_fibres(problem, model)
+    potential = model.potential(problem)
+    loading = potential.loading if isinstance(potential, Refined) else problem.loading
+    loading = loading if model.finite else loading.at_rest(potential.nodes)
+    mass, damper = _inertia(problem, dynamics, model, potential)
+    creep = creep_speed(dynamics, potential.nodes)
+    body = MovingBody(potential, loading, mass, dynamics.damping, damper, dynamics.duration, creep)
+    weights = partial(coarse_weights, problem, potential)
+    return body, replace(geometry_of(problem, model.finite), interpolations=weights)
 
 
 def _coarse_body(model: Model, body: CoarseBody) -> Coarse | None:

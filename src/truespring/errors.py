@@ -62,6 +62,10 @@ class ModelError(TruespringError):
     """A model cannot be built for a problem: its rule or law is unknown or does not fit."""
 
 
+class LiveError(TruespringError):
+    """A live session cannot begin, or a command of it is wrong."""
+
+
 class ReferenceFileError(TruespringError):
     """A result file of another program cannot be read."""
 

@@ -171,6 +171,34 @@ class Unstressed(Potential, Protocol):
         ...
 
 
+class ConstantSprings(NamedTuple):
+    """Springs of zero rest length and constant stiffness, and a pressure in each element.
+
+    The force on node i is the sum of w (x_i - x_j), plus (offset + slope ln J) / J times the derivative of the volume
+    of each element, J its volume over the undeformed one.
+
+    Attributes:
+        springs: starts (n_nodes + 1,), columns (n_blocks,) and weights [N/m] (n_blocks,) of the neighbours of nodes.
+        cells: elements (n_elements, k), at_starts (n_nodes + 1,), at (n_elements * k,): the elements of each node;
+            undeformed volumes [m^3], offset and slope [Pa] (n_elements,).
+        form: the kind of elements, see `kernels.leapfrog.measure`.
+    """
+
+    springs: tuple[ShortInts, ShortInts, Floats]
+    cells: tuple[ShortInts, ShortInts, ShortInts, Floats, Floats, Floats]
+    form: tuple[Any, ...]
+
+
+@runtime_checkable
+class Explicit(Potential, Protocol):
+    """A potential whose force compiled loops may compute."""
+
+    @property
+    def constant_springs(self) -> ConstantSprings | None:
+        """The springs and elements; None if the potential has another form."""
+        ...
+
+
 class VolumeStiffness(NamedTuple):
     """The stiffness of cells of one kind against changes of their volume.
 

@@ -138,6 +138,11 @@ class Gravity(DeadLoad):
         """The acceleration [m/s^2], shape (dim,)."""
         return np.array(self.acceleration, dtype=float)
 
+    @property
+    def acceleration_of_body(self) -> Floats | None:
+        """The acceleration, unless it changes over time."""
+        return self.vector if self.over is None else None
+
     def mark(self, body: Body, held: Bools) -> Mark:
         """Return an arrow along the acceleration, at the centre of the nodes."""
         size = float(np.linalg.norm(self.acceleration))

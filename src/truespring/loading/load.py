@@ -109,6 +109,11 @@ class Load(ABC):
         """
         return None
 
+    @property
+    def acceleration_of_body(self) -> Floats | None:
+        """The constant acceleration of the whole body that the load is [m/s^2], shape (dim,); None of other loads."""
+        return None
+
     def moved_to(self, on: Selection) -> Self:
         """Return the load on another selection, such as a group of another mesh."""
         changed: Any = replace(self, on=on)  # type: ignore[type-var]  # subclasses are dataclasses

@@ -20,7 +20,7 @@ from truespring.models.laws import LAWS
 from truespring.models.semidefinite import clipped, is_semidefinite
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import SummedSprings
-from truespring.potential import SparseMatrix, VolumeStiffness
+from truespring.potential import ConstantSprings, SparseMatrix, VolumeStiffness
 from truespring.problem import Problem
 
 # Smallest number of elements, or of nodes, for which threads share the work.
@@ -230,6 +230,17 @@ class GaussianElements:
     def constant(self) -> bool:
         """Whether the springs have a constant stiffness: the law is linear in I1, and there are no fibres."""
         return self.law.constant_springs and len(self.laplacians.matrices) == 1
+
+    @property
+    def constant_springs(self) -> ConstantSprings | None:
+        """The springs and elements for compiled loops, see Explicit; None unless the pressure is linear in ln J."""
+        known, constants = self._weights, self._by_element
+        if known is None or constants.plane_stress:
+            return None
+        pattern, at = self._pattern, self._at_rest.law.at
+        volumes = self._volumes, at.by_y.copy(), at.by_y_y.copy()
+        cells = (pattern.elements, pattern.at_starts, pattern.at, *volumes)
+        return ConstantSprings((pattern.starts, pattern.columns, known), cells, self._measures.kernel_form)
 
     @cached_property
     def _at_rest(self) -> _State:

@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats
 from truespring.conditions import Loading
+from truespring.motion.moving import Body
 from truespring.motion.record import Account
 from truespring.motion.stages import History, Moment
 from truespring.solvers.balance import Equilibrium
@@ -41,7 +42,17 @@ class Advance:
 
 
 class Scheme(Protocol):
-    """A way to take steps."""
+    """A way to take steps.
+
+    Attributes:
+        body: what moves; another loading may take the place of its own between steps.
+    """
+
+    body: Body
+
+    def forget(self) -> None:
+        """Forget what is kept of the last step: the next one begins at another state."""
+        ...
 
     def advance(self, history: History, h: float, account: Account) -> Advance | Equilibrium:
         """Return a step of length h [s] with the work in it; the state of least residual if it was not found."""

@@ -93,6 +93,10 @@ class Leapfrog:
         self.body, self._report = body, report
         self._force: Floats | None = None
 
+    def forget(self) -> None:
+        """Forget the force at the end of the last step: the next one begins at another state."""
+        self._force = None
+
     def advance(self, history: History, h: float, account: Account) -> Advance:
         """Return the step of length h [s] with the work in it."""
         body, last, alpha, account = self.body, history.last, self.body.damping.mass, copy(account)

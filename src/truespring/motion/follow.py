@@ -62,14 +62,16 @@ def follow_motion(
     acting = damper if dynamics.damping.stiffness else None
     body = Body(potential, loading, mass, dynamics.damping, acting, dynamics.duration, creep)
     plan = planned(body, dynamics, crossing)
-    begin = _begin(body, dynamics, newton, report, geometry)
+    begin = begin_of(body, dynamics, newton, report, geometry)
     if not begin.converged:
         yield begin
         return
-    yield from _states(body, dynamics, plan, _balance(body, newton, report, geometry), begin)
+    yield from _states(body, dynamics, plan, balance_of(body, newton, report, geometry), begin)
 
 
-def _begin(body: Body, dynamics: Dynamics, newton: Newton, report: Reporter | None, geometry: Geometry) -> Equilibrium:
+def begin_of(
+    body: Body, dynamics: Dynamics, newton: Newton, report: Reporter | None, geometry: Geometry
+) -> Equilibrium:
     """Return the state at time 0, not converged if its equilibrium was not found."""
     nodes = body.potential.nodes
     still = np.zeros_like(nodes)
@@ -94,7 +96,7 @@ def _at_begin(part: Loading) -> Loading:
     return replace(part, amplitude=Amplitude((0.0, 1.0), (0.0, part.amplitude.at(0.0))))
 
 
-def _balance(body: Body, newton: Newton, report: Reporter | None, geometry: Geometry) -> Balance:
+def balance_of(body: Body, newton: Newton, report: Reporter | None, geometry: Geometry) -> Balance:
     """Return the balance of forces, whose potential and loading are those of each step in turn."""
     linear = linear_of(newton.linear, body.potential, body.loading, geometry)
     known = (body.potential, body.loading, newton.tolerance, newton.max_iterations, linear, report)

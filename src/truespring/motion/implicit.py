@@ -30,6 +30,10 @@ class Implicit:
         self._scheme = IMPLICIT[scheme]
         self._measures: dict[float, Sequence[Floats]] = {}
 
+    def forget(self) -> None:
+        """Forget the strains of the last states: the next step begins at another one."""
+        self._measures = {}
+
     def advance(self, history: History, h: float, account: Account) -> Advance | Equilibrium:
         """Return the step of length h [s] with the work in it; the state of least residual if it was not found."""
         body, last, account = self.body, history.last, copy(account)

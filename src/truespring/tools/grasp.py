@@ -49,9 +49,14 @@ class Grasp:
 
     def acting_on(self, body: Body, young: float | None, span: float) -> Interaction:
         """Return the springs of the grasp on a body; arguments and errors as `Tool.acting_on`."""
+        track = track_of(self.name, self.path, body.mesh.dim, span)
+        nodes, stiffness = self.patch(body, young)
+        return Springs(self.name, track, nodes, stiffness, body.nodes)
+
+    def patch(self, body: Body, young: float | None) -> tuple[Ints, Floats]:
+        """Return the held nodes and the stiffness of the spring of each [N/m], shape (n,); as `acting_on`."""
         dim = body.mesh.dim
         at, radius = vector(self.name, "at", self.at, dim, "m"), positive(self.name, "radius", self.radius, "m")
-        track = track_of(self.name, self.path, dim, span)
         if self.stiffness is None and young is None:
             raise ToolError(self.name, "is required for a body without a material [N/m]", "stiffness")
         default = (young or 0.0) * (radius if dim == 3 else body.thickness)
@@ -69,7 +74,7 @@ class Grasp:
                 "at",
             )
         shares = areas[inside] / areas[inside].sum()
-        return Springs(self.name, track, nodes[inside], stiffness * shares, body.nodes)
+        return nodes[inside], stiffness * shares
 
 
 def _surface(body: Body) -> tuple[Ints, Floats]:

@@ -1,0 +1,132 @@
+"""What acts on a live body within a frame: grasps and spheres that move linearly from its begin to its end."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.conditions import Interaction
+from truespring.tools import Sphere
+from truespring.tools.contact import Contact
+from truespring.tools.grasp import Springs
+from truespring.tools.laws import Penalty
+from truespring.tools.path import Track
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """A patch of the surface that is held by springs to its undeformed places plus a motion.
+
+    Attributes:
+        name: its name.
+        at: centre of the patch on the undeformed body [m], shape (dim,).
+        radius: of the patch [m].
+        nodes: the held nodes, shape (n,).
+        stiffness: of the spring of each [N/m], shape (n,).
+        rest: undeformed positions of the held nodes [m], shape (n, dim).
+        begin, end: motion at the begin and the end of the frame [m], shape (dim,).
+    """
+
+    name: str
+    at: Floats
+    radius: float
+    nodes: Ints
+    stiffness: Floats
+    rest: Floats
+    begin: Floats
+    end: Floats
+
+    def to(self, motion: Floats) -> Self:
+        """Return the grasp with another motion at the end of the frame [m], shape (dim,)."""
+        return replace(self, end=motion)
+
+    @property
+    def settled(self) -> Self:
+        """The grasp in the frame after this one, at its end."""
+        return self if self.begin is self.end else replace(self, begin=self.end)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the place changes within the frame."""
+        return bool((self.begin != self.end).any())
+
+    @property
+    def place(self) -> Floats:
+        """The place of the centre at the end of the frame [m], shape (dim,)."""
+        return np.asarray(self.at + self.end)
+
+    def mean_motion(self, positions: Floats) -> Floats:
+        """Return the mean displacement of the patch [m], shape (dim,); `positions` [m], shape (n_nodes, dim)."""
+        return np.asarray(self.stiffness @ (positions[self.nodes] - self.rest) / self.stiffness.sum())
+
+    def stored(self, positions: Floats) -> float:
+        """Return the energy of the springs at the end of the frame [J]."""
+        away = positions[self.nodes] - self.rest - self.end
+        return float(self.stiffness @ (away**2).sum(axis=1)) / 2
+
+    def interaction(self, nodes: Floats, times: tuple[float, float], span: float) -> Interaction:
+        """Return the grasp as an action on a body from the begin to the end of the frame [s].
+
+        `nodes` are the undeformed positions [m], shape (n_nodes, dim), `span` the duration at level 1 [s].
+        """
+        track = Track(np.array(times), np.stack([self.begin, self.end]), span)
+        rest = nodes + self.begin  # the springs add the motion since level 0, where the track is at its begin
+        return Springs(self.name, track, self.nodes, self.stiffness, rest)
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """A sphere that pushes the surface, without friction.
+
+    Attributes:
+        name: its name.
+        radius: [m].
+        stiffness: pressure per depth [Pa/m].
+        begin, end: centre at the begin and the end of the frame [m], shape (dim,).
+    """
+
+    name: str
+    radius: float
+    stiffness: float
+    begin: Floats
+    end: Floats
+
+    def to(self, centre: Floats) -> Self:
+        """Return the sphere with another centre at the end of the frame [m], shape (dim,)."""
+        return replace(self, end=centre)
+
+    @property
+    def settled(self) -> Self:
+        """The sphere in the frame after this one, at its end."""
+        return self if self.begin is self.end else replace(self, begin=self.end)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the place changes within the frame."""
+        return bool((self.begin != self.end).any())
+
+    @property
+    def place(self) -> Floats:
+        """The centre at the end of the frame [m], shape (dim,)."""
+        return self.end
+
+    def stored(self, positions: Floats, surface: tuple[Ints, Floats]) -> float:
+        """Return the energy of the contact at the end of the frame [J]; `surface` has nodes and areas [m^2]."""
+        nodes, areas = surface
+        gap = np.linalg.norm(positions[nodes] - self.end, axis=1) - self.radius
+        return float(areas @ Penalty(self.stiffness).energy(gap))
+
+    def interaction(
+        self, surface: tuple[Ints, Floats], n_nodes: int, times: tuple[float, float], span: float
+    ) -> Interaction:
+        """Return the sphere as a tool from the begin to the end of the frame [s]; see `Grip.interaction`."""
+        track = Track(np.array(times), np.stack([self.begin, self.end]), span)
+        shape = Sphere(self.name, self.radius, self.begin.tolist())
+        return Contact(self.name, shape, track, Penalty(self.stiffness), *surface, n_nodes)
+
+
+def stacked(rows: Sequence[Floats], dim: int) -> Floats:
+    """Return rows of shape (dim,) as an array of shape (n, dim), also of none."""
+    return np.array(rows, dtype=float).reshape(len(rows), dim)

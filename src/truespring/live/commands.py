@@ -1,0 +1,118 @@
+"""The commands of a live session: what is asked of it, in the order of time, so that it can be repeated."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+from truespring.errors import LiveError, nearest
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command.
+
+    Attributes:
+        frame: number of frames before it.
+        kind: what is asked, one of COMMANDS.
+        name: of the grasp, sphere, pin or model.
+        place: coordinates [m], one value per direction.
+        radius: [m].
+        value: what the kind needs.
+    """
+
+    frame: int
+    kind: str
+    name: str = ""
+    place: tuple[float, ...] = ()
+    radius: float | None = None
+    value: float | None = None
+
+
+class Kind(NamedTuple):
+    """What a kind of command needs.
+
+    Attributes:
+        says: what it does.
+        place: whether it needs a place.
+        radius: whether it needs a radius.
+        bounds: smallest and largest value, both allowed; None without a value.
+        name: whether it needs a name.
+        repeats: whether a study repeats it, with the same model and material.
+    """
+
+    says: str
+    place: bool = False
+    radius: bool = False
+    bounds: tuple[float, float] | None = None
+    name: bool = False
+    repeats: bool = True
+
+
+_SIZE = (0.0, math.inf)
+
+#: The commands by kind.
+COMMANDS: Mapping[str, Kind] = MappingProxyType(
+    {
+        "grasp": Kind("hold the patch within `radius` of a place of the undeformed body by springs of `value` N/m",
+                      place=True, radius=True, bounds=_SIZE, name=True),
+        "sphere": Kind("add a sphere at a place, of `value` Pa/m", place=True, radius=True, bounds=_SIZE, name=True),
+        "move": Kind("move a grasp or sphere to a place", place=True, name=True),
+        "release": Kind("remove a grasp, pin or sphere", name=True),
+        "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0)),
+        "young": Kind("multiply Young's moduli of the study by `value`", bounds=(1e-3, 1e3), repeats=False),
+        "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False),
+        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False),
+        "model": Kind("change to another model of the study", name=True, repeats=False),
+        "restart": Kind("bring the body back to its begin, without grasps and spheres"),
+    }
+)  # fmt: skip
+
+
+def checked(command: Command, dim: int) -> Command:
+    """Return a command; raise LiveError unless its kind is known and it has finite values for all that it needs."""
+    if command.kind not in COMMANDS:
+        allowed = ", ".join(COMMANDS)
+        raise LiveError(f"command '{command.kind}'{nearest(command.kind, COMMANDS)}; allowed: {allowed}")
+    kind = COMMANDS[command.kind]
+    if kind.name and not command.name:
+        raise LiveError(f"{command.kind}: needs a name")
+    if kind.place and not _finite(command.place, dim):
+        raise LiveError(f"{command.kind}: place = {list(command.place)!r}: give {dim} finite coordinates [m]")
+    if kind.radius and not (command.radius is not None and math.isfinite(command.radius) and command.radius > 0):
+        raise LiveError(f"{command.kind}: radius = {command.radius!r} m: must be a positive number")
+    if kind.bounds is not None:
+        low, high = kind.bounds
+        value = command.value
+        if value is None or not math.isfinite(value) or not low <= value <= high:
+            raise LiveError(f"{command.kind}: value = {value!r}: must be a number from {low:g} to {high:g}")
+    return command
+
+
+def _finite(place: Sequence[float], dim: int) -> bool:
+    """Return whether a place has `dim` finite coordinates."""
+    return len(place) == dim and all(isinstance(one, int | float) and math.isfinite(one) for one in place)
+
+
+@dataclass
+class Log:
+    """The commands since the begin of a session, and where grasps and spheres were at the end of each frame.
+
+    Attributes:
+        frame: time between frames [s].
+        frames: number of frames so far.
+        commands: in the order of time.
+        places: number of frames, name and place [m] of what moved.
+    """
+
+    frame: float
+    frames: int = 0
+    commands: list[Command] = field(default_factory=list)
+    places: list[tuple[int, str, tuple[float, ...]]] = field(default_factory=list)
+
+    @property
+    def repeatable(self) -> int:
+        """The number of frames that a study can repeat: up to the first change of model or material."""
+        others = [one.frame for one in self.commands if not COMMANDS[one.kind].repeats]
+        return min([self.frames, *others])

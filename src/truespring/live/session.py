@@ -1,0 +1,615 @@
+"""A live session: the one mutable object, in front of the same steps as a motion that is computed to its end."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import TracebackType
+from typing import Self, TypeVar
+
+import numpy as np
+
+from truespring.arrays import Floats, Ints
+from truespring.conditions import Amplitude, Loading
+from truespring.dynamics import Damping, Dynamics, Energies
+from truespring.equilibrium import moving_body
+from truespring.errors import LiveError
+from truespring.live.actions import Ball, Grip
+from truespring.live.commands import Command, Log, checked
+from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.material import Material
+from truespring.models import Model, as_model
+from truespring.motion.explicit import SAFE, Leapfrog, stable_step
+from truespring.motion.follow import balance_of, begin_of
+from truespring.motion.implicit import Implicit
+from truespring.motion.stages import Moment
+from truespring.potential import Potential
+from truespring.problem import Problem
+from truespring.solvers import Newton
+from truespring.tools import Grasp
+from truespring.tools.surface import surface
+
+#: Time between frames by default [s].
+FRAME = 1 / 60
+#: Density of a body without one: that of water [kg/m^3].
+WATER = 1000.0
+#: Gravity of a body without such a load [m/s^2], against the last direction.
+GRAVITY = 9.81
+# Radius of a grasp by default: the larger of these shares of a typical edge and of the size of the body.
+_PATCH, _SHARE = 1.6, 0.05
+# Stiffness of a pin over that of a grasp.
+_PINNED = 10.0
+# Energy that a frame may gain without work, over the largest energy so far: more is an instability.
+_GAIN = 0.05
+# The step is halved up to so many times.
+_HALVINGS = 6
+# Largest motion in a frame: of a sphere over its radius, of a grasp over the size of the body.
+_FASTEST_BALL, _FASTEST_GRIP = 0.5, 0.25
+# The stiffness of a contact on a node is at most this share of the stiffness that limits the step.
+_CONTACT = 0.5
+Part = TypeVar("Part", Grip, Ball)
+
+# A step may exceed the planned one by this share, a rounding error.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a session takes its steps.
+
+    Attributes:
+        frame: time between frames [s]; commands act from one frame to the next.
+        scheme: "auto", or a scheme of `Dynamics`.
+        step: longest time step [s]; "auto" for what the scheme allows.
+        iterations: Newton iterations of an implicit step; 0 solves it.
+    """
+
+    frame: float = FRAME
+    scheme: str = "auto"
+    step: float | str = "auto"
+    iterations: int = 0
+
+
+class Live:
+    """A body that moves while it is pulled, pushed and pinned: call `pull` and the like, then `step`.
+
+    Each call of `step` advances the body by one frame. What was asked before it acts linearly over that frame, so that
+    a pull that moves at each frame is a path of straight lines in time, as that of a `Grasp`.
+
+    Attributes:
+        problem: the problem, completed: a body without `dynamics` begins at its equilibrium, one without density has
+            that of water.
+        model: the model.
+        settings: how steps are taken.
+        notes: what was assumed, and what happened, in sentences.
+        log: the commands since the begin.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        model: Model | Potential,
+        *,
+        models: Mapping[str, Model] | None = None,
+        frame: float = FRAME,
+        scheme: str = "auto",
+        step: float | str = "auto",
+        iterations: int = 0,
+    ) -> None:
+        """Bring the body to its begin.
+
+        Args:
+            problem: body, supports and loads.
+            model: the model of the body.
+            models: models to which the command "model" changes, by name.
+            frame: time between frames [s].
+            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog unless it has no stable step.
+            step: longest time step [s]; "auto" for that of the problem, or half of leapfrog's stable step.
+            iterations: Newton iterations of each step of an implicit scheme; 0 solves it.
+
+        Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
+        """
+        self.notes: list[str] = []
+        self.settings = Settings(frame, scheme, step, iterations)
+        self.model, self._models = as_model(model), dict(models or {})
+        self.problem = self._stated = self._completed(problem)
+        self._changes: dict[str, float] = {}
+        self._gravity = 1.0 if self._own_gravity is not None else 0.0
+        self.log = Log(frame)
+        self._clear()
+        self._build()
+        self._moment = self._begin()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the session: it cannot be advanced any more."""
+        self._stepper.forget()
+
+    def _completed(self, problem: Problem) -> Problem:
+        """Return a problem with density and dynamics."""
+        if problem.material is not None and any(one.density is None for one in problem.materials):
+            self.notes.append(f"no density is given: that of water, {WATER:g} kg/m^3, is taken")
+            problem = _with_materials(problem, lambda one: replace(one, density=one.density or WATER))
+        if problem.dynamics is None:
+            self.notes.append("no dynamics are given: the body begins at its equilibrium, without damping")
+            problem = replace(problem, dynamics=Dynamics(1.0, start="equilibrium"))
+        return problem
+
+    @property
+    def _dynamics(self) -> Dynamics:
+        dynamics = self.problem.dynamics
+        assert dynamics is not None  # see `_completed`
+        return dynamics
+
+    def _clear(self) -> None:
+        """Remove grasps and spheres."""
+        self._grips: dict[str, Grip] = {}
+        self._balls: dict[str, Ball] = {}
+        self._targets: dict[str, Floats] = {}
+        self._forces: Floats = np.zeros((0, self.dim))
+
+    def _build(self) -> None:
+        """Build the body of the present problem and model, and choose how it moves."""
+        self._plain, self._geometry = moving_body(self.problem, self.model)
+        self.body = self._plain
+        self._stable = stable_step(self.body)
+        self._halved, self._largest = 0, 0.0
+        self._choose()
+
+    def _choose(self) -> None:
+        """Choose how steps are taken, under the present gravity."""
+        self.body = replace(self._plain, loading=self._weighted(self._plain.loading))
+        dynamics, settings = self._dynamics, self.settings
+        wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
+        asked = dynamics.step if settings.step == "auto" else settings.step
+        self._stepper: Stepper
+        if wanted == "leapfrog" or (wanted == "auto" and self._stable > 0):
+            if not self._stable:
+                raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
+            safe = SAFE * self._stable
+            self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
+            springs = fitting(self.body)
+            plain = StepByStep(Leapfrog(self.body), "leapfrog")
+            self._stepper = plain if springs is None else Compiled(self.body, springs)
+            return
+        scheme = "bdf2" if wanted == "auto" else wanted
+        self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
+        balance = balance_of(self.body, Newton(), None, self._geometry)
+        self._stepper = StepByStep(Implicit(self.body, balance, scheme, settings.iterations), scheme)
+
+    def _begin(self) -> Moment:
+        """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
+        begin = begin_of(self.body, self._dynamics, Newton(), None, self._geometry)
+        positions = begin.positions
+        if not begin.converged:
+            self.notes.append(f"{begin.reason}; it begins undeformed")
+            positions = self.body.placed(self.body.potential.nodes, 0.0)
+        velocity = np.zeros_like(positions)
+        if self._dynamics.velocity is not None:
+            velocity = np.where(self.body.held, 0.0, self._dynamics.velocity)
+        return Moment(0.0, positions, velocity)
+
+    # --- what it is ---------------------------------------------------------------------------------------------
+
+    @property
+    def dim(self) -> int:
+        """Number of directions."""
+        return self.problem.mesh.dim
+
+    @property
+    def moment(self) -> Moment:
+        """The state, with the further nodes of second-order elements."""
+        return self._moment
+
+    @property
+    def time(self) -> float:
+        """The time [s]."""
+        return self._moment.time
+
+    @property
+    def positions(self) -> Floats:
+        """Positions of the nodes of the mesh [m], shape (n_nodes, dim); a copy."""
+        return self._moment.positions[: self.problem.mesh.n_nodes].copy()
+
+    @property
+    def velocities(self) -> Floats:
+        """Velocities of the nodes of the mesh [m/s], shape (n_nodes, dim); a copy."""
+        return self._moment.velocity[: self.problem.mesh.n_nodes].copy()
+
+    @property
+    def scheme(self) -> str:
+        """How steps are taken, in words."""
+        return self._stepper.name
+
+    @property
+    def steps_a_frame(self) -> int:
+        """The number of steps of a frame."""
+        longest = self._longest / 2**self._halved
+        return max(1, int(np.ceil(self.settings.frame / longest - _SAME)))
+
+    @property
+    def step_length(self) -> float:
+        """The time step [s]."""
+        return self.settings.frame / self.steps_a_frame
+
+    @property
+    def grasps(self) -> Mapping[str, Grip]:
+        """Grasps and pins by name."""
+        return self._grips
+
+    @property
+    def spheres(self) -> Mapping[str, Ball]:
+        """Spheres by name."""
+        return self._balls
+
+    @property
+    def forces(self) -> dict[str, Floats]:
+        """Force of the body on each grasp and sphere at the end of the last frame [N], shape (dim,), by name."""
+        known = dict(zip(self._acted, self._forces, strict=True))
+        return {name: known[name] for name in (*self._grips, *self._balls) if name in known}
+
+    _acted: tuple[str, ...] = ()
+
+    @cached_property
+    def surface(self) -> tuple[Ints, Floats]:
+        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each."""
+        return surface(self.problem.body, None)
+
+    @cached_property
+    def edge(self) -> float:
+        """A typical edge of an element [m]."""
+        mesh = self.problem.mesh
+        return float(np.median(np.abs(mesh.measures)) ** (1 / mesh.dim))
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the undeformed body's bounding box [m]."""
+        return self.body.size
+
+    def energies(self) -> Energies:
+        """Return the energies; work and dissipation are those of the last frame."""
+        body, moment = self.body, self._moment
+        kinetic = float(np.einsum("n,ni,ni->", body.mass, moment.velocity, moment.velocity)) / 2
+        elastic, (done, damped) = body.potential.energy(moment.positions), self._work
+        return Energies(kinetic, elastic, -done, self._acting.stored(moment.positions), damped, 0.0)
+
+    _work: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What should not be trusted in the present state."""
+        ratio = self.problem.mesh.smallest_area_ratio(self.positions)
+        return () if ratio > 0 else (f"inverted: the smallest corner Jacobian is {ratio:.2g} of that at rest",)
+
+    # --- what is asked of it ------------------------------------------------------------------------------------
+
+    def pull(
+        self,
+        point: int | Sequence[float],
+        to: Sequence[float] | None = None,
+        *,
+        name: str = "pull",
+        radius: float | None = None,
+        stiffness: float | None = None,
+    ) -> str:
+        """Hold the patch around a point by springs and move it; return the name of the grasp.
+
+        Args:
+            point: number of a node, or a place on the body as it is now [m]: the nearest node of the surface.
+            to: where the point is at the end of the next frame [m]; None to hold it where it is.
+            name: name of the grasp; one of this name is moved, whatever the point.
+            radius: distance within which nodes of the surface are held [m]; None for 1.6 typical edges, at least 5 % of
+                the size of the body.
+            stiffness: of all springs together [N/m]; None for Young's modulus times the radius.
+        """
+        if name not in self._grips:
+            node = self.node_at(point)
+            radius = self.patch if radius is None else radius
+            place, value = self._undeformed(node), self._grasp_stiffness(radius, stiffness)
+            self.do("grasp", name, place, radius, value)
+        if to is not None:
+            self.do("move", name, to)
+        return name
+
+    def pin(self, point: int | Sequence[float], *, name: str = "pin", radius: float | None = None) -> str:
+        """Hold the patch around a point where it is, by stiff springs; return the name; arguments as `pull`."""
+        radius = self.patch if radius is None else radius
+        place = self._undeformed(self.node_at(point))
+        self.do("grasp", name, place, radius, _PINNED * self._grasp_stiffness(radius, None))
+        return name
+
+    def push(self, to: Sequence[float], *, name: str = "sphere", radius: float | None = None) -> str:
+        """Move a sphere to a place [m], or add it there; return its name.
+
+        A sphere moves by at most half of its radius in a frame. `radius` [m] is that of a new one, by default 10 % of
+        the size of the body.
+        """
+        if name in self._balls:
+            self.do("move", name, to)
+        else:
+            self.do("sphere", name, to, 2 * _SHARE * self.size if radius is None else radius, self.contact_stiffness)
+        return name
+
+    def release(self, name: str) -> None:
+        """Remove a grasp, pin or sphere."""
+        self.do("release", name)
+
+    def gravity(self, share: float) -> None:
+        """Multiply gravity: 1 for that of the problem, or 9.81 m/s^2 against the last direction if it has none."""
+        self.do("gravity", value=share)
+
+    def restart(self) -> None:
+        """Bring the body back to its begin, without grasps and spheres."""
+        self.do("restart")
+
+    def do(
+        self,
+        kind: str,
+        name: str = "",
+        place: Sequence[float] = (),
+        radius: float | None = None,
+        value: float | None = None,
+    ) -> None:
+        """Carry out a command, one of COMMANDS, before the next frame; raise LiveError if it is wrong."""
+        there = tuple(float(one) for one in place)
+        command = checked(Command(self.log.frames, kind, name, there, radius, value), self.dim)
+        self._carry_out(command)
+        if kind == "restart":
+            self.log = Log(self.settings.frame)
+        else:
+            self.log.commands.append(command)
+
+    def _carry_out(self, command: Command) -> None:
+        """Carry out a command that is checked."""
+        carried: Mapping[str, Callable[[Command], None]] = {
+            "grasp": self._do_grasp,
+            "sphere": self._do_sphere,
+            "move": self._do_move,
+            "release": self._do_release,
+            "gravity": self._do_gravity,
+            "young": self._do_material,
+            "poisson": self._do_material,
+            "damping": self._do_damping,
+            "model": self._do_model,
+            "restart": self._do_restart,
+        }
+        carried[command.kind](command)
+
+    def _do_grasp(self, command: Command) -> None:
+        self._require_free(command.name)
+        at, radius = np.array(command.place), command.radius
+        assert radius is not None and command.value is not None  # see `checked`
+        body, still = self.problem.body, np.zeros(self.dim)
+        nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
+        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still)
+        motion = grip.mean_motion(self._moment.positions)
+        self._grips[command.name] = replace(grip, begin=motion, end=motion)
+        self._targets[command.name] = motion
+        self._note_place(command.name)
+
+    def _do_sphere(self, command: Command) -> None:
+        self._require_free(command.name)
+        centre = np.array(command.place)
+        assert command.radius is not None and command.value is not None  # see `checked`
+        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre)
+        self._targets[command.name] = centre
+        self._note_place(command.name)
+
+    def _do_move(self, command: Command) -> None:
+        place = np.array(command.place)
+        if command.name in self._grips:
+            place = place - self._grips[command.name].at
+        elif command.name not in self._balls:
+            raise self._unknown(command.name)
+        self._targets[command.name] = place
+
+    def _do_release(self, command: Command) -> None:
+        if command.name not in self._targets:
+            raise self._unknown(command.name)
+        for several in (self._grips, self._balls, self._targets):
+            several.pop(command.name, None)
+
+    def _do_gravity(self, command: Command) -> None:
+        assert command.value is not None  # see `checked`
+        self._gravity = command.value
+        self._choose()
+
+    def _do_material(self, command: Command) -> None:
+        assert command.value is not None  # see `checked`
+        self._changes[command.kind] = command.value
+        stiffer, poisson = self._changes.get("young", 1.0), self._changes.get("poisson")
+
+        def changed(one: Material) -> Material:
+            return replace(one, young=stiffer * one.young, poisson=one.poisson if poisson is None else poisson)
+
+        self.problem = replace(_with_materials(self._stated, changed), dynamics=self._dynamics)
+        self._build()
+
+    def _do_damping(self, command: Command) -> None:
+        assert command.value is not None  # see `checked`
+        damping = Damping(self._dynamics.damping.stiffness, command.value)
+        self.problem = replace(self.problem, dynamics=replace(self._dynamics, damping=damping))
+        self._build()
+
+    def _do_model(self, command: Command) -> None:
+        if command.name not in self._models:
+            raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self._models) or 'none'}")
+        self.model = self._models[command.name]
+        before = self._moment
+        self._build()
+        if len(self.body.potential.nodes) != len(before.positions):
+            self._moment = self._begin()
+
+    def _do_restart(self, command: Command) -> None:
+        self._clear()
+        self._build()
+        self._moment = self._begin()
+
+    def _require_free(self, name: str) -> None:
+        """Raise LiveError if a grasp or sphere has a name."""
+        if name in self._targets:
+            raise LiveError(f"'{name}' is there already: release it first, or take another name")
+
+    def _unknown(self, name: str) -> LiveError:
+        return LiveError(f"'{name}' is no grasp, pin or sphere; there are: {', '.join(self._targets) or 'none'}")
+
+    # --- how it moves -------------------------------------------------------------------------------------------
+
+    def step(self, frames: int = 1) -> None:
+        """Advance by a number of frames."""
+        for _ in range(frames):
+            self._frame()
+
+    @property
+    def _acting(self) -> Acting:
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface)
+
+    def _frame(self) -> None:
+        """Advance by a frame; halve the step where energy rises without work."""
+        self._aim()
+        acting = self._acting
+        taken = self._stepper.frame(self._moment, acting, self.steps_a_frame, self.step_length)
+        while not self._sound(taken, acting) and self._halved < _HALVINGS:
+            self._halved += 1
+            self._stepper.forget()
+            self.notes.append(
+                f"{self.time:.4g} s: energy rose without work, the step is halved: {self.step_length:.3g} s"
+            )
+            taken = self._stepper.frame(self._moment, acting, self.steps_a_frame, self.step_length)
+        self.log.frames += 1
+        if not taken.solved or not np.isfinite(taken.moment.positions).all():
+            self.notes.append(f"{self.time:.4g} s: the motion became unstable: the body begins again")
+            self.restart()
+            return
+        self._moment, self._forces, self._work = taken.moment, taken.forces, (taken.done, taken.damped)
+        self._acted = (*self._grips, *self._balls)
+        for name in [name for several in (self._grips, self._balls) for name, one in several.items() if one.moves]:
+            self._note_place(name)
+        self._grips = {name: one.settled for name, one in self._grips.items()}
+        self._balls = {name: one.settled for name, one in self._balls.items()}
+
+    def _aim(self) -> None:
+        """Let grasps and spheres move towards where they were asked to go, at most as fast as is allowed."""
+        for name, grip in self._grips.items():
+            self._grips[name] = grip.to(_towards(grip.begin, self._targets[name], _FASTEST_GRIP * self.size))
+        for name, ball in self._balls.items():
+            self._balls[name] = ball.to(_towards(ball.begin, self._targets[name], _FASTEST_BALL * ball.radius))
+
+    def _sound(self, taken: Frame, acting: Acting) -> bool:
+        """Return whether the energy after a frame is explained by the work in it."""
+        if not taken.solved or not np.isfinite(taken.moment.positions).all():
+            return False
+        begins = replace(acting, grips=_begins(acting.grips), balls=_begins(acting.balls))
+        before = self._energy(self._moment, begins)
+        after = self._energy(taken.moment, acting)
+        if not np.isfinite(after):  # an inverted element: its energy is not known
+            after = self._kinetic(taken.moment)
+        before = before if np.isfinite(before) else after
+        self._largest = max(self._largest, abs(taken.done), before)
+        return after - before - taken.done + taken.damped <= _GAIN * self._largest
+
+    def _energy(self, moment: Moment, acting: Acting) -> float:
+        """Return kinetic and stored energy [J]."""
+        return self._kinetic(moment) + self.body.potential.energy(moment.positions) + acting.stored(moment.positions)
+
+    def _kinetic(self, moment: Moment) -> float:
+        return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2
+
+    def _note_place(self, name: str) -> None:
+        """Write down where a grasp or sphere is at the present number of frames."""
+        one = self._grips.get(name) or self._balls[name]
+        self.log.places.append((self.log.frames, name, tuple(one.place.tolist())))
+
+    # --- sizes --------------------------------------------------------------------------------------------------
+
+    @property
+    def patch(self) -> float:
+        """The radius of a grasp by default [m]."""
+        return max(_PATCH * self.edge, _SHARE * self.size)
+
+    @cached_property
+    def contact_stiffness(self) -> float:
+        """The pressure per depth of a sphere [Pa/m]: that which does not shorten the step much."""
+        nodes, areas = self.surface
+        stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
+        stiffest = float((areas / self.body.mass[nodes]).max())
+        return _CONTACT * (2 / stable) ** 2 / stiffest
+
+    def node_at(self, point: int | Sequence[float]) -> int:
+        """Return the number of the node of the surface that is nearest to a place on the body as it is now [m]."""
+        nodes, _ = self.surface
+        if isinstance(point, int | np.integer):
+            if not 0 <= point < self.problem.mesh.n_nodes:
+                raise LiveError(f"node {point}: the body has nodes 0 to {self.problem.mesh.n_nodes - 1}")
+            return int(point)
+        away = self._moment.positions[nodes] - np.asarray(point, dtype=float)
+        return int(nodes[(away**2).sum(axis=1).argmin()])
+
+    def _undeformed(self, node: int) -> list[float]:
+        """Return the undeformed place of a node [m]."""
+        return [float(one) for one in self.problem.mesh.nodes[node]]
+
+    def _grasp_stiffness(self, radius: float, stiffness: float | None) -> float:
+        """Return the stiffness of a grasp [N/m], by default Young's modulus times the radius."""
+        if stiffness is not None:
+            return stiffness
+        young = max((one.young for one in self.problem.materials), default=None)
+        if young is None:
+            raise LiveError("the stiffness of a grasp is required for a body without a material [N/m]")
+        return young * (radius if self.dim == 3 else self.problem.body.thickness)
+
+    # --- gravity ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _own_gravity(self) -> Floats | None:
+        """The acceleration of the problem's loads on the whole body [m/s^2], shape (dim,); None without such a load."""
+        own = [one for load in self._stated.loads if (one := load.acceleration_of_body) is not None]
+        return np.asarray(np.sum(own, axis=0)) if own else None
+
+    def _weighted(self, loading: Loading) -> Loading:
+        """Return a loading with the present share of gravity."""
+        own = self._own_gravity
+        down = np.zeros(self.dim)
+        down[-1] = -GRAVITY
+        more = self._gravity * down if own is None else (self._gravity - 1) * own
+        if not more.any():
+            return loading
+        force, still = self._plain.mass[:, None] * more, np.zeros(loading.displacement.shape)
+        added = Loading(force, loading.held, still, amplitude=Amplitude((0.0,), (1.0,), self._plain.duration))
+        return replace(loading, further=(*loading.further, added))
+
+
+def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
+    """Return a session after it was given commands again, each before the frame that it was given before."""
+    left = list(commands)
+    for frame in range(frames):
+        while left and left[0].frame <= frame:
+            one = left.pop(0)
+            live.do(one.kind, one.name, one.place, one.radius, one.value)
+        live.step()
+    return live
+
+
+def _with_materials(problem: Problem, change: Callable[[Material], Material]) -> Problem:
+    """Return a problem with each material changed, that of the body first, then those of its regions."""
+    if problem.material is None:
+        return problem
+    material = change(problem.material)
+    regions = [replace(one, material=change(one.material)) for one in problem.regions]
+    return replace(problem, material=material, regions=regions)
+
+
+def _begins(several: Sequence[Part]) -> tuple[Part, ...]:
+    """Return grasps or spheres at the begin of the frame."""
+    return tuple(replace(one, end=one.begin) for one in several)
+
+
+def _towards(begin: Floats, target: Floats, fastest: float) -> Floats:
+    """Return the target [m], shape (dim,), or the place on the way to it at the largest distance from the begin."""
+    away = target - begin
+    far = float(np.linalg.norm(away))
+    return target if far <= fastest else np.asarray(begin + fastest / far * away)
