@@ -26,6 +26,7 @@ ALLOWED = {
         "exports",
         "fibres",
         "linear",
+        "live",
         "models",
         "outputs",
         "reference",
@@ -49,6 +50,10 @@ ALLOWED = {
         "richardson",
         "solvers",
         "tools",
+        "report",
+        "mesh",
+        "study",
+        "vibration",
     },
     "table1": {
         "report",
@@ -278,6 +283,9 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 

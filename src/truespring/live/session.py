@@ -236,6 +236,16 @@ class Live:
         return self._geometry
 
     @property
+    def models(self) -> Mapping[str, Model]:
+        """The models to which the command "model" changes, by name."""
+        return self._models
+
+    @property
+    def gravity_share(self) -> float:
+        """What gravity is multiplied by, see `gravity`."""
+        return self._gravity
+
+    @property
     def scheme(self) -> str:
         """How steps are taken, in words."""
         return self._stepper.name
