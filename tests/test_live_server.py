@@ -210,7 +210,10 @@ REFUSED: dict[str, tuple[str, dict[str, str]]] = {
 def test_others_are_refused(case: str, client: TestClient) -> None:
     query, headers = REFUSED[case]
     assert client.get(f"/?{query}", headers=headers).status_code == 403
-    with pytest.raises(WebSocketDisconnect), client.websocket_connect(f"/session?{query}", headers={"host": HOST, **headers}):
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(f"/session?{query}", headers={"host": HOST, **headers}),
+    ):
         pass
     assert client.get(f"/?token={TOKEN}").status_code == 200
 

@@ -32,7 +32,7 @@ const REACH = 9.9;
 const find = (id) => document.getElementById(id);
 const canvas = find("scene"), wide = matchMedia("(min-width: 52rem)");
 let socket = null, scene = null, body = null, owner = false, readout = null, lastFrame = null, lastGhost = null;
-let tries = 0, ended = false, lag = null;
+let tries = 0, ended = false, lag = null, drawn = false, from = undefined;
 const counts = { frames: 0, lags: [] };
 
 // --- the connection -------------------------------------------------------------------------------------------------
@@ -67,6 +67,7 @@ function see(data) {
     if (!current) return;
     if (owner && !Number.isNaN(echo)) counts.lags.push(lag = performance.now() - echo);
     lastFrame = { number, time, places, marks: rest };
+    if (!drawn) picture(places);
     if (scene) scene.paint(places, rest);
   } else if (current) {
     lastGhost = { number, time, places, distances: rest, moving: flags === MOVING };
@@ -94,20 +95,23 @@ function height(width) {
 }
 
 function describe(described) {
-  const from = scene && body.dim === described.dim ? scene.view.view() : undefined;
+  from = scene && body.dim === described.dim ? scene.view.view() : undefined;
   if (scene) scene.dispose();
   body = described;
-  lastGhost = null;
-  scene = createLiveScene(canvas, body, { press, drag, drop, keys, height, from });
-  find("missing").hidden = scene !== null;
-  canvas.hidden = scene === null;
-  if (scene) {
-    scene.show(find("compared").checked);
-    scene.paint(body.rest, new Float32Array());
-  }
+  lastGhost = scene = null;
+  drawn = false;
   const counted = `${body.meshNodes} nodes, ${body.elements} elements`;
   find("size").textContent = counted;
   canvas.setAttribute("aria-label", `The body in motion: ${counted}`);
+}
+
+// Begins the picture with the first frame of a body.
+function picture(places) {
+  drawn = true;
+  scene = createLiveScene(canvas, body, { begin: [places], press, drag, drop, keys, height, from });
+  find("missing").hidden = scene !== null;
+  canvas.hidden = scene === null;
+  if (scene) scene.show(find("compared").checked);
 }
 
 new ResizeObserver(() => { if (scene) scene.view.again(); }).observe(canvas.parentElement);
@@ -133,12 +137,12 @@ const actions = {
   },
   push(event, at) {
     const near = scene.node(at, 60), hand = free(), radius = Number(find("radius").value) / 100;
-    if (hand === undefined) return false;
-    const { towards } = scene.view.axes(), surface = near < 0 ? [0, 0, 0] : scene.place(near);
-    const through = body.dim === 2 ? [0, 0, 0] : plus(surface, towards, 0.35 * radius);
-    const place = scene.view.point(at, through);
-    hands.set(event.pointerId, { hand, through, offset: [0, 0, 0] });
-    ask({ kind: "push", hand, place: limited(place), radius });
+    if (near < 0 || hand === undefined) return false;
+    const held = { hand, offset: [0, 0, 0], began: performance.now(), ...(body.dim === 2 ? beside(at, radius) : before(near, radius)) };
+    hands.set(event.pointerId, held);
+    ask({ kind: "push", hand, place: limited(held.from), radius });
+    held.goal = scene.view.point(at, held.through);
+    approach(held);
     return true;
   },
   pin(event, at) {
@@ -154,6 +158,32 @@ const actions = {
   },
 };
 
+// A sphere begins where it does not touch, and comes in over some frames. In space from the eye:
+function before(node, radius) {
+  const { towards } = scene.view.axes(), surface = scene.place(node);
+  return { from: plus(surface, towards, 1.05 * radius), through: plus(surface, towards, 0.4 * radius) };
+}
+
+// In the plane from the boundary, unless it is outside already.
+function beside(at, radius) {
+  const place = scene.view.point(at, [0, 0, 0]);
+  let nearest = [0, 0, 0], far = Infinity;
+  for (const node of body.outline) {
+    const one = scene.place(node), away = Math.hypot(...minus(one, place));
+    if (away < far) [nearest, far] = [one, away];
+  }
+  const outward = Math.hypot(...nearest) || 1;
+  return { from: far > radius ? place : plus(nearest, nearest, (1.05 * radius) / outward), through: [0, 0, 0] };
+}
+
+const IN = 300; // ms until a sphere is where the pointer is
+function approach(held) {
+  if (![...hands.values()].includes(held)) return;
+  const share = Math.min(1, (performance.now() - held.began) / IN);
+  ask({ kind: "move", hand: held.hand, place: limited(plus(held.from, minus(held.goal, held.from), share)) });
+  if (share < 1) setTimeout(() => approach(held), 16);
+}
+
 function press(event, at) {
   canvas.focus({ preventScroll: true });
   if (!owner || event.button > 0 || event.shiftKey) return false;
@@ -166,6 +196,9 @@ function drag(event, at) {
   if (held.line) {
     held.line[1] = at;
     scene.line(held.line);
+  } else if (held.from) {
+    held.goal = scene.view.point(at, held.through);
+    if (performance.now() > held.began + IN) approach(held);
   } else if (held.hand !== undefined) {
     ask({ kind: "move", hand: held.hand, place: limited(plus(scene.view.point(at, held.through), held.offset)) });
   }
@@ -326,6 +359,7 @@ function write(message) {
   list(find("warnings"), message.warnings);
   list(find("notes"), [message.scheme, ...message.notes]);
   list(find("held"), message.marks.map((one) => `${one.name}${one.force ? `: ${one.force}` : ""}`));
+  find("save").hidden = !message.saves;
   settings(message, began);
   if (!message.ghost && lastGhost && scene) {
     lastGhost = null;

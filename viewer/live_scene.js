@@ -33,9 +33,10 @@ function rounded(value) {
 // body: { dim, nodes, size, unit, rest: Float32Array, triangles, edges, outline: Uint32Array, colors }, places in units
 //   of the longest edge of its box about the middle; size is that edge in `unit`
 // hands: press(event, at), drag(event, at), drop(event), keys: what a pointer and further keys do
+// begin: further places that the view holds at the start
 // from: the view of a scene that was there before; height(width): of the picture in pixels
 // Returns null without WebGL.
-export function createLiveScene(canvas, body, { press, drag, drop, keys, height, from }) {
+export function createLiveScene(canvas, body, { begin = [], press, drag, drop, keys, height, from }) {
   const renderer = sharedRenderer();
   if (!renderer) return null;
   const ends = new AbortController();
@@ -125,7 +126,7 @@ export function createLiveScene(canvas, body, { press, drag, drop, keys, height,
 
   const view = createView(canvas, renderer, {
     scenes: [back, front, top], strokes: [rim], render, marks, bar, unit: body.unit, longest: body.size, size: height,
-    include: (add) => add(body.rest), frontal: body.dim === 2, press, drag, drop, keys, from, signal: ends.signal,
+    include: (add) => [body.rest, ...begin].forEach(add), loose: 1.2, frontal: body.dim === 2, press, drag, drop, keys, from, signal: ends.signal,
   });
 
   // --- what may be done with it ---------------------------------------------------------------------------------

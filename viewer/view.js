@@ -172,8 +172,9 @@ export function outliner(triangles, outline, n_nodes) {
 //   include(add): calls add(points) for what the view holds at the start
 //   size(width): its height in pixels, or 0 while there is nothing to see
 //   render(camera): draws the scenes; marks(context): draws words and marks over them
+//   loose: room around that, over its size
 //   frontal: for a plane body, which does not turn; press, drag, drop: what else a pointer does; keys: further keys
-export function createView(canvas, renderer, { scenes, strokes, include, size, render, marks, bar, unit: length, longest, frontal = false, ...more }) {
+export function createView(canvas, renderer, { scenes, strokes, include, size, render, marks, bar, unit: length, longest, frontal = false, loose = 1, ...more }) {
   const context = canvas.getContext("2d"), camera = new OrthographicCamera();
   const options = { signal: more.signal };
 
@@ -199,7 +200,7 @@ export function createView(canvas, renderer, { scenes, strokes, include, size, r
         });
       }
     });
-    return { middle: low.map((one, k) => (one + high[k]) / 2), extent: high.map((one, k) => Math.max(one - low[k], 1e-3) / 2) };
+    return { middle: low.map((one, k) => (one + high[k]) / 2), extent: high.map((one, k) => loose * Math.max(one - low[k], 1e-3) / 2) };
   })();
 
   function look(dense) {

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from truespring.cli.printing import say, show
-from truespring.cli.verb import CONVERGED, Verb, positive, seconds
+from truespring.cli.verb import CONVERGED, Verb, seconds
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,9 @@ def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=_port, default=0, metavar="N", help="port, default: a free one")
     parser.add_argument("--no-browser", action="store_true", help="print the address only, and open no browser")
     parser.add_argument("--no-twin", action="store_true", help="compute no reference beside the model")
-    parser.add_argument("--record", type=Path, metavar="DIR", help="folder for the session as a study, written at the end")
+    parser.add_argument(
+        "--record", type=Path, metavar="DIR", help="folder for the session as a study, written at the end"
+    )
     parser.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds, default: with Ctrl+C")
 
 

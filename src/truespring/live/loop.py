@@ -154,8 +154,9 @@ class Loop:
         moves = self.running or self._single > 0
         if moves:
             self._guarded(self._advance)
+        before = self._overlay
         self._guarded(self._compare)
-        if moves or asked or self._single:
+        if moves or asked or self._overlay is not before:
             self._publish(fresh=bool(asked))
 
     def _guarded(self, done: Callable[[], None]) -> None:
@@ -201,7 +202,7 @@ class Loop:
             if self._gauge is not None:
                 self._gauge.take(ghost, self.ring)
             own = self.ring.at(ghost.time)
-            if ghost.kind == "finer" or own is None:
+            if ghost.kind == "finer" or own is None or own.shape != ghost.positions.shape:
                 continue
             apart = np.linalg.norm(ghost.positions - own, axis=1)
             self._numbers += 1
@@ -299,13 +300,19 @@ class Loop:
     def _facts(self, marks: Sequence[Mark]) -> Facts:
         errors = {} if self._gauge is None else self._gauge.words()
         pace = self.running, self.pace.speed, self.meter.rates()
-        return Facts(*pace, self.still, marks, self._overlay, errors, tuple(self.messages))
+        return Facts(*pace, self.still, marks, self._overlay, errors, tuple(self.messages), self._save is not None)
 
     def _marks(self) -> list[Mark]:
         """Return what acts on the body."""
         positions = self.live.moment.positions
         found = [
-            Mark("pin" if name in self.pins else "grasp", name, one.radius, one.place, one.at + one.mean_motion(positions))
+            Mark(
+                "pin" if name in self.pins else "grasp",
+                name,
+                one.radius,
+                one.place,
+                one.at + one.mean_motion(positions),
+            )
             for name, one in self.live.grasps.items()
         ]
         balls = self.live.spheres.items()

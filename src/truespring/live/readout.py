@@ -33,6 +33,7 @@ class Facts:
         overlay: the last reference; None without one.
         errors: as text, by name.
         messages: of the loop.
+        saves: whether the session can be written to a folder.
     """
 
     running: bool
@@ -43,6 +44,7 @@ class Facts:
     overlay: Overlay | None
     errors: Mapping[str, str]
     messages: Sequence[str]
+    saves: bool
 
 
 class Readout:
@@ -86,6 +88,7 @@ class Readout:
             "errors": {name: facts.errors.get(name) for name in ERRORS},
             "ghost": None if facts.overlay is None else _ghost(facts.overlay, live.time),
             "still": facts.still,
+            "saves": facts.saves,
             "warnings": list(live.warnings),
             "notes": [*live.notes[-_SHOWN:], *list(facts.messages)[-_SHOWN:]],
         }
