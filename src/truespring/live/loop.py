@@ -219,7 +219,7 @@ class Loop:
             "push": lambda one: self.live.push(one.place, name=one.name, radius=one.radius),
             "pin": self._pin,
             "let-go": self._let_go,
-            "release-all": lambda _: [self.live.release(name) for name in self._held()],
+            "release-all": self._release_all,
             "pause": lambda _: self._set_running(False),
             "play": lambda _: self._set_running(True),
             "step": self._step_once,
@@ -255,6 +255,10 @@ class Loop:
         """Release what may have been released already."""
         if order.name in self._held():
             self.live.release(order.name)
+
+    def _release_all(self, order: Order) -> None:
+        for name in self._held():
+            self.live.release(name)
 
     def _set_running(self, running: bool) -> None:
         self.running = running
