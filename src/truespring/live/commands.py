@@ -20,6 +20,8 @@ class Command:
         place: coordinates [m], one value per direction.
         radius: [m].
         value: what the kind needs.
+        elements: of a cut the numbers, in the uncut body, of the elements that it removes; None for those that the blade
+            passes in the present positions. A session that repeats it, or another model of the body, removes the same.
     """
 
     frame: int
@@ -28,6 +30,7 @@ class Command:
     place: tuple[float, ...] = ()
     radius: float | None = None
     value: float | None = None
+    elements: tuple[int, ...] | None = None
 
 
 class Kind(NamedTuple):
@@ -40,6 +43,7 @@ class Kind(NamedTuple):
         bounds: smallest and largest value, both allowed; None without a value.
         name: whether it needs a name.
         repeats: whether a study repeats it, with the same model and material.
+        blade: whether the place is a blade: start, end and, in space, the vector of its depth, with dim values each.
     """
 
     says: str
@@ -48,6 +52,7 @@ class Kind(NamedTuple):
     bounds: tuple[float, float] | None = None
     name: bool = False
     repeats: bool = True
+    blade: bool = False
 
 
 _SIZE = (0.0, math.inf)
@@ -65,6 +70,8 @@ COMMANDS: Mapping[str, Kind] = MappingProxyType(
         "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False),
         "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False),
         "model": Kind("change to another model of the study", name=True, repeats=False),
+        "cut": Kind("remove the elements that a blade passes: its place is start, end and, in space, depth",
+                    repeats=False, blade=True),
         "restart": Kind("bring the body back to its begin, without grasps and spheres"),
     }
 )  # fmt: skip
@@ -80,6 +87,8 @@ def checked(command: Command, dim: int) -> Command:
         raise LiveError(f"{command.kind}: needs a name")
     if kind.place and not _finite(command.place, dim):
         raise LiveError(f"{command.kind}: place = {list(command.place)!r}: give {dim} finite coordinates [m]")
+    if kind.blade:
+        _check_cut(command, dim)
     if kind.radius and not (command.radius is not None and math.isfinite(command.radius) and command.radius > 0):
         raise LiveError(f"{command.kind}: radius = {command.radius!r} m: must be a positive number")
     if kind.bounds is not None:
@@ -88,6 +97,18 @@ def checked(command: Command, dim: int) -> Command:
         if value is None or not math.isfinite(value) or not low <= value <= high:
             raise LiveError(f"{command.kind}: value = {value!r}: must be a number from {low:g} to {high:g}")
     return command
+
+
+def _check_cut(command: Command, dim: int) -> None:
+    """Raise LiveError unless a cut has the place of a blade, or elements."""
+    known = "start and end" if dim == 2 else "start, end and depth"
+    if not (command.elements is not None and not command.place) and not _finite(command.place, dim * dim):
+        raise LiveError(
+            f"{command.kind}: place = {list(command.place)!r}: give {known}, {dim * dim} finite numbers [m] in all"
+        )
+    wrong = [one for one in command.elements or () if not isinstance(one, int) or isinstance(one, bool) or one < 0]
+    if wrong:
+        raise LiveError(f"{command.kind}: elements: {wrong[0]!r} is no number of an element: 0, 1, 2, ...")
 
 
 def _finite(place: Sequence[float], dim: int) -> bool:
