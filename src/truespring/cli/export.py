@@ -27,15 +27,19 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.study import export_study, read_studies, springs_of
+    from truespring.study import export_study, read_studies, refused_targets, springs_of
 
     studies = read_studies(options.study)
+    refused: dict[str, str] = {}
     for study in studies:  # raise errors before any study is solved
-        springs_of(study, options.to, options.model)
+        name = springs_of(study, options.to, options.model)
+        refused |= {f"{study.stem}/{to}": why for to, why in refused_targets(study, options.to, name).items()}
+    for why in refused.values():
+        say(f"not written: {why}")
     reserve(options, studies)
     screen = console(options)
     values: dict[str, Any] = {}
-    converged = True
+    converged = not refused
     for study in studies:
         with progress(options) as advance, writing(options.out):
             written = export_study(study, options.to, options.out, options.model, advance)

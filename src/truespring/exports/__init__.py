@@ -1,5 +1,6 @@
 """Export of spring models to other programs: each target is a function that returns files, and an entry of TARGETS."""
 
+import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,8 @@ class Target:
         program: name in error messages.
         names: names of the files; all but the first are optional.
         takes: supported features of springs and loads; any other makes `check_targets` raise ExportError.
+        expressed: how springs and loads are expressed, as a sentence, for exported.json.
+        left_out: what of the study is not in the files, as a sentence.
         unrun: why no test runs the program on the files; empty if a test does.
     """
 
@@ -44,10 +47,16 @@ class Target:
     program: str
     names: tuple[str, ...]
     takes: frozenset[Feature]
+    expressed: str
+    left_out: str
     unrun: str = ""
 
 
 _DECKS = ("springs.inp", "fem.inp")
+_IN_DECKS = "springs.inp has the springs as SPRINGA elements; fem.inp has the same body as finite elements."
+_NOT_IN_DECKS = "Density and contact are left out; weight is in the nodal forces."
+_ARRAYS = "All springs, elements, constants, supports and loads are arrays; see docs/export/arrays.md."
+_NOTHING = "Nothing of the model is left out."
 _FOLLOWED = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
 
 TARGETS: Mapping[str, Target] = MappingProxyType(
@@ -58,6 +67,8 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             "CalculiX",
             _DECKS,
             SPRINGA,
+            expressed=_IN_DECKS,
+            left_out=_NOT_IN_DECKS,
         ),
         "abaqus": Target(
             abaqus,
@@ -65,6 +76,8 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             "Abaqus",
             _DECKS,
             SPRINGA,
+            expressed=_IN_DECKS,
+            left_out=_NOT_IN_DECKS,
             unrun="Abaqus was not run; CalculiX reads the same keywords",
         ),
         "mujoco": Target(
@@ -73,6 +86,8 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             "MuJoCo",
             ("springs.xml",),
             _FOLLOWED,
+            expressed="Nodes are bodies on slide joints, springs are spatial tendons, loads are actuators.",
+            left_out="The body has no surface and no contact.",
         ),
         "sofa": Target(
             sofa,
@@ -80,10 +95,14 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             "SOFA",
             ("springs_scene.py",),
             _FOLLOWED | {Feature.NEGATIVE},
+            expressed="Springs are a MeshSpringForceField, finite elements a node of their own, loads constant forces.",
+            left_out="Contact is not set up.",
             unrun="SOFA was not run; the scene is checked against the source code of SOFA",
         ),
-        "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL),
-        "json": Target(as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL),
+        "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL, _ARRAYS, _NOTHING),
+        "json": Target(
+            as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL, _ARRAYS, _NOTHING
+        ),
     }
 )
 
@@ -100,13 +119,27 @@ def export(
     """Solve a spring model, write it to `folder` for another program, and return the files written.
 
     `target` is a key of TARGETS. Each file states units, supports, loads and the displacement of the node `probe` at
-    full load, by default the free node that moves most. Raises ExportError if the target is unknown or does not
-    support the model.
+    full load, by default the free node that moves most; exported.json has what to expect, see `expectation`. Raises
+    ExportError if the target is unknown or does not support the model.
     """
     known_targets([target])
     check_targets([target], problem, model)
     exported = solve_springs(problem, model, solver, title, probe)
-    return write_files(target_files(exported, [target])[target], Path(folder))
+    return write_files(with_expectation(exported, target, target_files(exported, [target])[target]), Path(folder))
+
+
+def with_expectation(exported: Exported, target: str, files: Files) -> Files:
+    """Return the files of a target with exported.json, which states what they express and what to expect."""
+    known = TARGETS[target]
+    values = {
+        "target": target,
+        "files": list(files),
+        "expressed": known.expressed,
+        "left_out": known.left_out,
+        "not_run": known.unrun,
+        **exported.expectation,
+    }
+    return {**files, "exported.json": json.dumps(values, indent=2, allow_nan=False) + "\n"}
 
 
 def known_targets(names: Iterable[str]) -> tuple[str, ...]:
@@ -119,20 +152,25 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_targets(names: Collection[str], problem: Problem, model: Model) -> None:
-    """Raise ExportError for an unsupported feature, and for two targets that write the same file; solve nothing."""
+    """Raise ExportError for the first target that does not support the springs and loads; solve nothing."""
+    for error in unsupported(names, problem, model).values():
+        raise error
+
+
+def unsupported(names: Iterable[str], problem: Problem, model: Model) -> dict[str, ExportError]:
+    """Return the targets that do not support the springs and loads, each with the reason; solve nothing.
+
+    Raises ExportError if the model has no springs.
+    """
     if not as_model(model).has_springs:
         raise ExportError(f"{model!r} is not a spring model: use Springs(rule=...) or a SpringNetwork")
-    springs = spring_data(model.potential(problem))
-    written: dict[str, str] = {}
+    springs, found = spring_data(model.potential(problem)), {}
     for name in names:
-        refuse_untaken(name, problem, springs)
-        for file in TARGETS[name].names:
-            if file in written:
-                raise ExportError(
-                    f"targets {written[file]} and {name} both write {file}: export them one at a time, "
-                    "into different folders"
-                )
-            written[file] = name
+        try:
+            refuse_untaken(name, problem, springs)
+        except ExportError as error:
+            found[name] = error
+    return found
 
 
 def refuse_untaken(name: str, problem: Problem, springs: SpringData) -> None:

@@ -85,7 +85,7 @@ class Blade:
         return np.sort(np.concatenate(found))
 
     def _enters(self, simplices: Floats, touched: float) -> Bools:
-        """Return whether simplices, shape (n, k, dim), relative to the start, overlap with the blade by a length [m]."""
+        """Return whether simplices, relative to the start, overlap with the blade by a length [m]; (n, k, dim)."""
         axes = self._axes(simplices)
         length = np.linalg.norm(axes, axis=2)
         theirs, own = axes @ simplices.swapaxes(1, 2), axes @ self.corners.T

@@ -20,8 +20,9 @@ class Command:
         place: coordinates [m], one value per direction.
         radius: [m].
         value: what the kind needs.
-        elements: of a cut the numbers, in the uncut body, of the elements that it removes; None for those that the blade
-            passes in the present positions. A session that repeats it, or another model of the body, removes the same.
+        begin: motion of the patch of a grasp at its begin [m]; empty for the mean displacement of the patch.
+        elements: of a cut the numbers, in the uncut body, of the elements that it removes; None for those that the
+            blade passes now. A session that repeats the command removes the same, whatever its model.
     """
 
     frame: int
@@ -30,6 +31,7 @@ class Command:
     place: tuple[float, ...] = ()
     radius: float | None = None
     value: float | None = None
+    begin: tuple[float, ...] = ()
     elements: tuple[int, ...] | None = None
 
 
@@ -87,6 +89,8 @@ def checked(command: Command, dim: int) -> Command:
         raise LiveError(f"{command.kind}: needs a name")
     if kind.place and not _finite(command.place, dim):
         raise LiveError(f"{command.kind}: place = {list(command.place)!r}: give {dim} finite coordinates [m]")
+    if command.begin and not _finite(command.begin, dim):
+        raise LiveError(f"{command.kind}: begin = {list(command.begin)!r}: give {dim} finite components [m], or none")
     if kind.blade:
         _check_cut(command, dim)
     if kind.radius and not (command.radius is not None and math.isfinite(command.radius) and command.radius > 0):

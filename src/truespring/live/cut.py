@@ -1,7 +1,8 @@
 """Cuts: what is left of a body after blades passed through it, and the state of its remaining nodes."""
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -87,12 +88,12 @@ class Whole:
             raise LiveError(f"cut: the blade passes all {len(passed)} elements, and nothing would remain: move it")
         return passed
 
-    def without(self, removed: Ints, model: Model) -> "tuple[Whole, Remainder]":
-        """Return what is left without some elements, their numbers in the uncut body; and how it lies in this body.
+    def without(self, command: Command, model: Model) -> "tuple[Whole, Remainder]":
+        """Return what a cut with known elements leaves, and how it lies in this body.
 
         `model` is the present one. Raises ModelError if a model cannot be cut.
         """
-        keep = np.flatnonzero(~np.isin(self.elements, removed))
+        keep = np.flatnonzero(~np.isin(self.elements, np.array(command.elements, dtype=np.int64)))
         left: Left = remaining(self.problem, keep)
         of = left.of
         models = {name: one.on_remainder(of) for name, one in self.models.items()}
@@ -150,30 +151,9 @@ def cut_words(n_removed: int, n_parts: int, n_loose: int, gone: Sequence[str]) -
     return words
 
 
-@dataclass(eq=False)
-class Aside:
-    """A cut body that is built in another thread while the body moves on.
-
-    Attributes:
-        command: the cut, with the elements that it removes.
-        problem: the problem of the session when it began.
-        model: the model of the session when it began.
-        made: what is left, the place in the body before, the problem with the changes of the session, and what moves.
-    """
-
-    command: Command
-    problem: Problem
-    model: Model
-    made: "Future[Prepared]"
-
-    def fits(self, command: Command, problem: Problem, model: Model) -> bool:
-        """Return whether it is that of a cut of a session that has not changed since."""
-        return command.elements == self.command.elements and problem is self.problem and model is self.model
-
-
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A cut body.
+    """A cut body, ready to move.
 
     Attributes:
         left: what is left, as stated.
@@ -188,6 +168,46 @@ class Prepared:
     built: Built
 
 
-def in_a_thread() -> ThreadPoolExecutor:
-    """Return what builds cut bodies, one after the other."""
-    return ThreadPoolExecutor(1, thread_name_prefix="truespring cut")
+class Aside:
+    """A cut body that is built in another thread while the body moves on: one at a time.
+
+    Attributes:
+        command: the cut, with the elements that it removes; None without one.
+    """
+
+    def __init__(self) -> None:
+        self.command: Command | None = None
+        self._of: tuple[Problem, Model] | None = None
+        self._made: list[Prepared] = []
+        self._thread: threading.Thread | None = None
+
+    def begin(self, command: Command, problem: Problem, model: Model, prepare: Callable[[Command], Prepared]) -> None:
+        """Begin to build what a cut leaves of a problem; raise LiveError while another cut is built."""
+        if self.command is not None:
+            raise LiveError("cut: another cut is being built: cut again when it is done, or without aside")
+        made: list[Prepared] = []
+        self.command, self._of, self._made = command, (problem, model), made
+
+        def work() -> None:
+            with suppress(Exception):  # it is raised when the session itself builds the cut body
+                made.append(prepare(command))
+
+        self._thread = threading.Thread(target=work, name="truespring cut", daemon=True)
+        self._thread.start()
+
+    def ready(self) -> Command | None:
+        """Return the cut that was built, None without one or while it is built."""
+        return None if self._thread is None or self._thread.is_alive() else self.command
+
+    def made(self, command: Command, problem: Problem, model: Model) -> Prepared | None:
+        """Return what was built of a cut and forget it; None unless it is that cut of the same problem and model."""
+        if self.ready() is None or self.command is None or command.elements != self.command.elements:
+            return None
+        same = self._of is not None and self._of[0] is problem and self._of[1] is model
+        found = self._made[0] if same and self._made else None
+        self.forget()
+        return found
+
+    def forget(self) -> None:
+        """Forget the cut."""
+        self.command, self._of, self._made, self._thread = None, None, [], None

@@ -115,9 +115,7 @@ def _name(kind: str, number: int, problem: Problem) -> str:
     return f"{kind} {number} of {len(problem.mesh.elements)} elements"
 
 
-def _moved(
-    name: str, one: _Acting, problem: Problem, of: Remainder, facets: Mapping[str, Ints]
-) -> _Acting | None:
+def _moved(name: str, one: _Acting, problem: Problem, of: Remainder, facets: Mapping[str, Ints]) -> _Acting | None:
     """Return a load or tool on the facets or nodes that remain of its selection, None without any."""
     on: Selection | None = one.on
     assert on is not None  # what acts on the whole body is not moved

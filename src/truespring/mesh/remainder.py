@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from truespring.arrays import Bools, Floats, Ints
+from truespring.arrays import Bools, Ints
 from truespring.errors import MeshError
 from truespring.mesh.facets import find_facets
 from truespring.mesh.kinds import MIXED
@@ -82,8 +82,16 @@ def remainder(mesh: Mesh, elements: Ints, facets: Mapping[str, Ints] = _NONE) ->
     for name, cells in facets.items():
         there = find_facets(rows, mesh.element, place[cells])
         by_facet[name] = there[there[:, 0] >= 0]
-    known = [_filled(one) for one in (groups, by_element, by_facet)]
-    found = Mesh(mesh.nodes[nodes], table, kind, *known, mesh.notes, element_vectors=mesh.vectors_of(elements))
+    found = Mesh(
+        mesh.nodes[nodes],
+        table,
+        kind,
+        _filled(groups),
+        _filled(by_element),
+        _filled(by_facet),
+        mesh.notes,
+        element_vectors=mesh.vectors_of(elements),
+    )
     if mesh.middles is not None:
         found = replace(found, middles=mesh.middles[edge_numbers(mesh, nodes[found.edges])])
     found.__dict__["is_stepped"] = mesh.is_stepped  # the stiffness of an element does not depend on what is removed
@@ -120,7 +128,7 @@ def _holds(mesh: Mesh, elements: Ints, cells: Ints) -> Bools:
     return np.asarray(shared.max(axis=1).toarray().ravel() == np.diff(by_cell.indptr))
 
 
-def _incidence(cells: Ints, n_nodes: int) -> "sparse.csr_array[Floats]":
+def _incidence(cells: Ints, n_nodes: int) -> "sparse.csr_array[Any]":
     """Return 1 where a cell has a node, shape (n_cells, n_nodes)."""
     rows = np.repeat(np.arange(len(cells)), cells.shape[1])
     found = sparse.csr_array((np.ones(cells.size), (rows, cells.ravel())), shape=(len(cells), n_nodes))

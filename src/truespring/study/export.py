@@ -9,7 +9,15 @@ from typing import Any
 from truespring.comparison import most_moved
 from truespring.equilibrium import Status
 from truespring.errors import ExportError, nearest
-from truespring.exports import Exported, check_targets, known_targets, solve_springs, target_files, write_files
+from truespring.exports import (
+    Exported,
+    known_targets,
+    solve_springs,
+    target_files,
+    unsupported,
+    with_expectation,
+    write_files,
+)
 from truespring.report.result import head_note
 from truespring.study.read import Study
 from truespring.study.run import Progress
@@ -73,8 +81,8 @@ class Exports:
 def springs_of(study: Study, targets: Collection[str], name: str | None = None) -> str:
     """Return the name of the springs model to export: `name`, or the compared model, or the first springs model.
 
-    Solves nothing. Raises ExportError if a target is unknown or cannot represent the model, if the study has no springs
-    model, or if `name` is not one.
+    Solves nothing. Raises ExportError if a target is unknown, if none can represent the model, if the study has no
+    springs model, or if `name` is not one.
     """
     known = known_targets(targets)
     springs = {one: entry for one, entry in study.entries.items() if entry.has_springs}
@@ -85,20 +93,31 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
     if name not in springs:
         what = "is not a springs model" if name in study.entries else f"is not among the models{nearest(name, springs)}"
         raise ExportError(f"{study.file}: model '{name}' {what}; springs: {', '.join(springs)}")
-    with _named(study, name):
-        check_targets(known, study.problem, springs[name])
+    refused = refused_targets(study, known, name)
+    if len(refused) == len(known):
+        raise ExportError("\n".join(refused.values()))
     return name
+
+
+def refused_targets(study: Study, targets: Collection[str], name: str) -> dict[str, str]:
+    """Return the targets that cannot represent the springs model `name` or its loads, each with the reason."""
+    with _named(study, name):
+        found = unsupported(targets, study.problem, study.entries[name])
+    return {target: f"{study.file}: model '{name}': {error}" for target, error in found.items()}
 
 
 def export_study(
     study: Study, targets: Collection[str], out: Path, name: str | None = None, progress: Progress | None = None
 ) -> list[Exports]:
-    """Solve the springs of a study, write them for each target to out/STEM, and return the files of each target.
+    """Solve the springs of a study, write them for each target, and return the files of each target.
 
-    Raises ExportError if a target cannot represent the model or its loads, or if two targets write the same file.
+    The files of one target are written to out/STEM, those of several to out/STEM/TARGET. Targets that cannot represent
+    the model or its loads are left out, see `refused_targets`; raises ExportError if that are all.
     """
     name = springs_of(study, targets, name)
-    model = study.entries[name]
+    model, known = study.entries[name], known_targets(targets)
+    refused = refused_targets(study, known, name)
+    taking = [target for target in known if target not in refused]
 
     def report(load_factor: float, iteration: int, residual: float) -> None:
         if progress:
@@ -109,8 +128,12 @@ def export_study(
     if study.probe is None:
         exported = replace(exported, probe=most_moved(exported.path))
     with _named(study, name):
-        found = target_files(exported, known_targets(targets))
-    return [Exports(target, name, exported, write_files(files, out / study.stem)) for target, files in found.items()]
+        found = target_files(exported, taking)
+    written = []
+    for target, files in found.items():
+        folder = out / study.stem if len(known) == 1 else out / study.stem / target
+        written.append(Exports(target, name, exported, write_files(with_expectation(exported, target, files), folder)))
+    return written
 
 
 @contextmanager
