@@ -81,7 +81,7 @@ class Blade:
             parts = np.array(block.kind.simplices or block.kind.edges)
             simplices = at[near][:, parts]
             meets = self._enters(simplices.reshape(-1, *simplices.shape[2:]), _TOUCHED * size)
-            found.append(numbers[near[meets.reshape(len(near), -1).any(axis=1)]])
+            found.append(numbers[near[meets.reshape(simplices.shape[:2]).any(axis=1)]])
         return np.sort(np.concatenate(found))
 
     def _enters(self, simplices: Floats, touched: float) -> Bools:

@@ -57,6 +57,7 @@ class Whole:
         models: models to which a session can change, by name.
         nodes: numbers of its nodes in the uncut body, ascending, shape (n_nodes,).
         elements: numbers of its elements in the uncut body, ascending, shape (n_elements,).
+        uncut: number of elements of the uncut body.
         lost: names of grasps of the problem that the last cut left without a node.
     """
 
@@ -65,24 +66,31 @@ class Whole:
     models: Mapping[str, Model]
     nodes: Ints
     elements: Ints
+    uncut: int
     lost: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, problem: Problem, model: Model, models: Mapping[str, Model]) -> Self:
         """Return an uncut body."""
         mesh = problem.mesh
-        return cls(problem, model, models, np.arange(mesh.n_nodes), np.arange(len(mesh.elements)))
+        return cls(problem, model, models, np.arange(mesh.n_nodes), np.arange(len(mesh.elements)), len(mesh.elements))
 
     def numbers_of(self, command: Command, positions: Floats) -> Ints:
         """Return the elements that a cut removes, numbers in the uncut body, ascending, shape (n,).
 
-        `positions` are those of the nodes now [m]. Raises LiveError if no element would remain, or for a blade without
-        length or area.
+        `positions` are those of the nodes now [m]. Raises LiveError if no element would remain, for a blade without
+        length or area, and for elements that the body does not have.
         """
         mesh = self.problem.mesh
         if command.elements is None:
             passed = self.elements[Blade.of(command.place, mesh.dim).passed(mesh, positions)]
         else:
+            beyond = max(command.elements, default=0)
+            if beyond >= self.uncut:
+                raise LiveError(
+                    f"cut: element {beyond} does not exist, the body has 0 to {self.uncut - 1}: cut a body with another "
+                    "mesh by the blade alone, without elements"
+                )
             passed = np.intersect1d(np.array(command.elements, dtype=np.int64), self.elements)
         if len(passed) == len(self.elements):
             raise LiveError(f"cut: the blade passes all {len(passed)} elements, and nothing would remain: move it")
@@ -97,10 +105,8 @@ class Whole:
         left: Left = remaining(self.problem, keep)
         of = left.of
         models = {name: one.on_remainder(of) for name, one in self.models.items()}
-        found = Whole(
-            left.problem, model.on_remainder(of), models, self.nodes[of.nodes], self.elements[of.elements], left.lost
-        )
-        return found, of
+        kept = self.nodes[of.nodes], self.elements[of.elements], self.uncut
+        return Whole(left.problem, model.on_remainder(of), models, *kept, left.lost), of
 
 
 def kept_rows(of: Remainder, before: Potential, now: Potential) -> Ints:

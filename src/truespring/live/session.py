@@ -93,6 +93,22 @@ class Live:
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
         log: the commands since the begin.
+
+    Example:
+        >>> import truespring as ts
+        >>> beam = ts.Problem(
+        ...     ts.box((0.04, 0.01, 0.01), (4, 1, 1)),
+        ...     ts.Material(young=3000.0, poisson=0.4, density=1000.0),
+        ...     supports=ts.Fixed(on="left"),
+        ...     loads=ts.Gravity((0.0, 0.0, -9.81)),
+        ... )
+        >>> with ts.Live(beam, ts.Springs(rule="gaussian")) as live:
+        ...     name = live.pull((0.04, 0.01, 0.01), to=(0.04, 0.012, 0.01))  # metres
+        ...     live.step(30)  # half a second
+        ...     name, round(live.time, 6), live.positions.shape
+        ('pull', 0.5, (20, 3))
+        >>> bool(live.forces["pull"][1] < 0)  # the body pulls back, down
+        True
     """
 
     def __init__(
@@ -292,7 +308,13 @@ class Live:
 
     @cached_property
     def surface(self) -> tuple[Ints, Floats]:
-        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each."""
+        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each.
+
+        Of a network of springs, which has no surface, all nodes without area.
+        """
+        mesh = self.problem.mesh
+        if mesh.element == "line":
+            return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
 
     @cached_property
@@ -525,8 +547,9 @@ class Live:
         def changed(one: Material) -> Material:
             return replace(one, young=stiffer * one.young, poisson=one.poisson if poisson is None else poisson)
 
-        changes = _with_materials(problem, changed) if self._changes else problem
-        return replace(changes, dynamics=self._dynamics)
+        if not self._changes and problem.dynamics is self._dynamics:
+            return problem
+        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -683,6 +706,8 @@ class Live:
         nodes, areas = self.surface
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
+        if not stiffest:
+            raise LiveError("a sphere needs the surface of elements, and the body is a network of springs")
         return _CONTACT * (2 / stable) ** 2 / stiffest
 
     def node_at(self, point: int | Sequence[float]) -> int:
@@ -734,8 +759,7 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
     left = list(commands)
     for frame in range(frames):
         while left and left[0].frame <= frame:
-            one = left.pop(0)
-            live.do(one.kind, one.name, one.place, one.radius, one.value)
+            live.repeat(left.pop(0))
         live.step()
     return live
 
