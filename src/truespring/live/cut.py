@@ -88,8 +88,8 @@ class Whole:
             beyond = max(command.elements, default=0)
             if beyond >= self.uncut:
                 raise LiveError(
-                    f"cut: element {beyond} does not exist, the body has 0 to {self.uncut - 1}: cut a body with another "
-                    "mesh by the blade alone, without elements"
+                    f"cut: element {beyond} does not exist, the body has 0 to {self.uncut - 1}: cut a body with "
+                    "another mesh by the blade alone, without elements"
                 )
             passed = np.intersect1d(np.array(command.elements, dtype=np.int64), self.elements)
         if len(passed) == len(self.elements):
