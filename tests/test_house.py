@@ -53,7 +53,6 @@ ALLOWED = {
         "solvers",
         "tools",
         "report",
-        "mesh",
         "study",
         "vibration",
     },
