@@ -26,6 +26,7 @@ from truespring.live.cut import (
     kept_rows,
     loose_parts,
 )
+from truespring.live.standing import standing
 from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
 from truespring.material import Material
 from truespring.models import Model, as_model
@@ -166,7 +167,7 @@ class Live:
             problem = _with_materials(problem, lambda one: replace(one, density=one.density or WATER))
         if problem.dynamics is None:
             self.notes.append("no dynamics are given: the body begins at its equilibrium, without damping")
-            problem = replace(problem, dynamics=Dynamics(1.0, start="equilibrium"))
+            problem = standing(problem)
         return problem
 
     @property
