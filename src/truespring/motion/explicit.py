@@ -27,8 +27,7 @@ def stable_step(body: Body) -> float:
     """
     from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-    nodes, interactions = body.potential.nodes, body.loading.interactions
-    touched = sum((one.largest_stiffness() for one in interactions), np.zeros(len(nodes)))
+    nodes, touched = body.potential.nodes, body.loading.largest_stiffness()
     if not np.isfinite(touched).all():
         return 0.0
     matrix = sparse.csr_array(body.potential.hessian(nodes))
