@@ -9,7 +9,7 @@ from truespring.errors import StudyError, nearest
 from truespring.units import Dimension
 
 #: Columns of a path, then those by which a row is chosen, then those that are only read by live sessions.
-COLUMNS: dict[str, Dimension | None] = {
+PATH_COLUMNS: dict[str, Dimension | None] = {
     "t": "time",
     "x": "length",
     "y": "length",
@@ -21,7 +21,7 @@ COLUMNS: dict[str, Dimension | None] = {
     "value": None,
 }
 #: The word in the column `kind` of the rows of a path.
-PLACE = "place"
+PATH_PLACE = "place"
 _AXES = ("x", "y", "z")
 
 
@@ -33,7 +33,7 @@ def read_path(file: Path, name: str) -> list[list[float]]:
     Raises StudyError with file, line and column for a value that is no finite number and for a place on the way that
     does not ascend, and if no row has the name.
     """
-    table = Columns(file, COLUMNS, ("t", "x", "y"), StudyError, form="t,name,x,y,z")
+    table = Columns(file, PATH_COLUMNS, ("t", "x", "y"), StudyError, form="t,name,x,y,z")
     rows = _rows_of(table, file, name)
     columns = ["t", *(axis for axis in _AXES if axis in table.columns)]
     values = np.stack([table.numbers(column, rows) for column in columns], axis=1)
@@ -56,9 +56,9 @@ def _rows_of(table: Columns, file: Path, name: str) -> list[int]:
     rows = list(range(table.n_rows))
     if "kind" in table.columns:
         kinds = table.texts("kind")
-        rows = [row for row in rows if kinds[row] == PLACE]
+        rows = [row for row in rows if kinds[row] == PATH_PLACE]
         if not rows:
-            raise StudyError(f"{file}:1: no row has kind = '{PLACE}': these are the rows of paths")
+            raise StudyError(f"{file}:1: no row has kind = '{PATH_PLACE}': these are the rows of paths")
     if "name" in table.columns:
         names = table.texts("name")
         known = list(dict.fromkeys(names[row] for row in rows))

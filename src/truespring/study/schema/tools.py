@@ -11,6 +11,7 @@ from truespring.mesh import Mesh, facets_within
 from truespring.study.paths import read_path
 from truespring.study.places import Places
 from truespring.study.schema.values import (
+    FILE,
     FileName,
     Keys,
     Length,
@@ -70,6 +71,7 @@ def _path(value: Any) -> str | list[float] | list[list[float]]:
 _NUMBERS = {"type": "array", "items": {"type": ["number", "string"]}}
 Way = Annotated[
     Any,
+    FILE,
     PlainValidator(as_value_error(_path)),
     WithJsonSchema({"anyOf": [{"type": "string"}, _NUMBERS, {"type": "array", "items": _NUMBERS}]}),
 ]
