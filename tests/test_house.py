@@ -42,6 +42,7 @@ ALLOWED = {
         "conditions",
         "dynamics",
         "equilibrium",
+        "loading",
         "material",
         "mesh",
         "models",

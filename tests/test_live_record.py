@@ -171,6 +171,21 @@ def test_a_change_of_material_ends_the_study(tmp_path: Path) -> None:
     assert [file.name for file in files] == ["pull.csv", "study.toml"] and not (tmp_path / "session.toml").exists()
 
 
+def test_a_cut_ends_the_study_and_is_repeated(tmp_path: Path) -> None:
+    live = opened(study_of(tmp_path))
+    live.step(2)
+    live.pull(TOP, to=(0.03, 0.065, 0.03))
+    live.step(2)
+    live.cut((0.03, 0.061, -0.01), (0.03, 0.061, 0.07), (0.0, -0.02, 0.0))
+    live.step(3)
+    write_session(live, read_study(tmp_path / "block.toml"), tmp_path)
+    assert read_study(tmp_path / "session.toml").problem.duration == pytest.approx(4 / 60)
+    assert any("cannot repeat cut: it ends at 0.06667 s" in note for note in live.notes)
+    again = replay(tmp_path)
+    assert len(again.elements_left) < 8 and again.log.commands == live.log.commands
+    assert np.array_equal(again.positions, live.positions)
+
+
 def test_a_static_study_is_completed(tmp_path: Path) -> None:
     """Density, damping and begin are those that the session assumed; gravity is a load of its own."""
     plain = STUDY[: STUDY.index("[dynamics]")] + STUDY[STUDY.index("[models.springs]") :]

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +21,8 @@ from truespring.study import PATH_COLUMNS, PATH_PLACE, Study, moved_document, re
 SESSION, PULL, BEGUN = "session.toml", "pull.csv", "study.toml"
 # Settings of a session, in the column `kind`, before its commands.
 _SETTINGS = ("frame", "frames", "halvings", "iterations", "model", "scheme")
+# Kind of the rows with the further points of the command before them.
+_FURTHER = "further"
 _HEAD = "# A live session as a study: what was seen is the motion of the compared model, in the steps of the session.\n"
 
 
@@ -111,9 +114,7 @@ def _write_table(file: Path, live: Live, study: Study, acted: Sequence[Life]) ->
         table.writerow({key: heads.get(key, key) for key in table.fieldnames})
         table.writerows(_settings(live, study))
         for one in (*live.log.before, *live.log.commands):
-            values = {"radius": one.radius, "value": one.value}
-            stated = {key: repr(float(value)) for key, value in values.items() if value is not None}
-            table.writerow(_row(one.frame, live, one.kind, one.name, one.place) | stated)
+            table.writerows(_command_rows(one, live))
         for life in acted:
             table.writerows(_row(frame, live, PATH_PLACE, life.name, place) for frame, place in life.places)
 
@@ -128,6 +129,17 @@ def _settings(live: Live, study: Study) -> Iterator[dict[str, str]]:
     yield {"kind": "model", "name": model}
     yield {"kind": "scheme", "name": begun.scheme, "value": repr(begun.longest)}
     yield {"kind": "iterations", "value": repr(live.settings.iterations)}
+
+
+def _command_rows(command: Command, live: Live) -> Iterator[dict[str, str]]:
+    """Yield the row of a command, and a row for each further point of its place."""
+    points = [command.place[k : k + live.dim] for k in range(0, len(command.place), live.dim)] or [()]
+    values = {"radius": command.radius, "value": command.value}
+    stated = {key: repr(float(value)) for key, value in values.items() if value is not None}
+    if command.elements is not None:
+        stated["value"] = " ".join(map(str, command.elements))
+    yield _row(command.frame, live, command.kind, command.name, points[0]) | stated
+    yield from (_row(command.frame, live, _FURTHER, "", point) for point in points[1:])
 
 
 def _row(frame: int, live: Live, kind: str, name: str, place: Sequence[float]) -> dict[str, str]:
@@ -152,7 +164,13 @@ def read_session(folder: str | Path) -> Recorded:
     if missing:
         raise LiveError(f"{file}: no row has kind = '{missing[0]}': the file is not one of a session")
     rows = [row for row in range(table.n_rows) if frames[row] and kinds[row] != PATH_PLACE]
-    commands = [_command(table, file, row, {name: several[row] for name, several in texts.items()}) for row in rows]
+    commands: list[Command] = []
+    for row in rows:
+        one = _command(table, file, row, {name: several[row] for name, several in texts.items()})
+        if one.kind == _FURTHER and commands:
+            begun = commands.pop()
+            one = replace(begun, place=(*begun.place, *one.place))
+        commands.append(one)
     try:
         n_frames, halvings, iterations = (int(settings[key][1]) for key in ("frames", "halvings", "iterations"))
         frame, step = (float(settings[key][1]) for key in ("frame", "scheme"))
@@ -172,8 +190,11 @@ def _command(table: Columns, file: Path, row: int, texts: Mapping[str, str]) -> 
     """Return the command in a row, counted from 0, from its texts by column."""
     try:
         place = tuple(float(texts[axis]) for axis in AXES if texts.get(axis))
+        known = int(texts["frame"]), texts["kind"], texts["name"], place
+        if texts["kind"] in COMMANDS and COMMANDS[texts["kind"]].blade:
+            return Command(*known, elements=tuple(int(one) for one in texts["value"].split()))
         radius, value = (float(texts[key]) if texts.get(key) else None for key in ("radius", "value"))
-        return Command(int(texts["frame"]), texts["kind"], texts["name"], place, radius, value)
+        return Command(*known, radius, value)
     except ValueError as error:
         raise LiveError(f"{file}:{table.line(row)}: {error}") from None
 

@@ -10,6 +10,7 @@ from truespring.live.lives import Life, gravity
 from truespring.live.session import Live, steps_in
 from truespring.material import Material
 from truespring.study import Study, moved_document
+from truespring.tools import Grasp, Tool
 
 # About so many states are recorded.
 _RECORDS = 100
@@ -59,7 +60,7 @@ def _set_materials(document: dict[str, Any], live: Live, study: Study) -> None:
     regions = zip(document.get("region", []), begun.regions, stated.regions, strict=True)
     several += [(table, mine.material, theirs.material) for table, mine, theirs in regions]
     for table, mine, theirs in several:
-        if mine is not None and mine != theirs:
+        if table is not None and mine is not None and mine != theirs:
             _set_material(table, mine)
 
 
@@ -74,16 +75,21 @@ def _set_material(table: dict[str, Any], material: Material) -> None:
 def _set_histories(document: dict[str, Any], live: Live, study: Study) -> None:
     """Write the histories of supports and loads that are not those of the study."""
     begun, stated = live.begun.problem, study.problem
-    for key, mine, theirs in (("support", begun.supports, stated.supports), ("load", begun.loads, stated.loads)):
-        for table, one, other in zip(document.get(key, []), mine, theirs, strict=True):
-            if one.over is not None and one.over != other.over:
-                table["over"] = [[float(value) for value in row] for row in one.over]
+    several = {
+        "support": [(one.over, other.over) for one, other in zip(begun.supports, stated.supports, strict=True)],
+        "load": [(one.over, other.over) for one, other in zip(begun.loads, stated.loads, strict=True)],
+    }
+    for key, histories in several.items():
+        for table, (mine, theirs) in zip(document.get(key, []), histories, strict=True):
+            if mine is not None and mine != theirs:
+                table["over"] = [[float(value) for value in row] for row in mine]
 
 
 def _set_touching(document: dict[str, Any], live: Live, duration: float) -> None:
     """Let the tools and grasps of the study act up to the end of the session: they rest at the end of their path."""
     begun = live.begun.problem
-    for key, several in (("tool", begun.tools), ("grasp", begun.grasps)):
+    touching: dict[str, Sequence[Tool | Grasp]] = {"tool": begun.tools, "grasp": begun.grasps}
+    for key, several in touching.items():
         kept = []
         for table, one in zip(document.get(key, []), several, strict=True):
             rows = np.asarray(one.path, dtype=float)
