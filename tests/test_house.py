@@ -26,6 +26,7 @@ ALLOWED = {
         "exports",
         "fibres",
         "linear",
+        "live",
         "models",
         "outputs",
         "reference",
@@ -53,6 +54,9 @@ ALLOWED = {
         "solvers",
         "study",
         "tools",
+        "report",
+        "study",
+        "vibration",
     },
     "table1": {
         "report",
@@ -282,6 +286,9 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 

@@ -299,6 +299,11 @@ class Live:
         return self._left.models
 
     @property
+    def gravity_share(self) -> float:
+        """What gravity is multiplied by, see `gravity`."""
+        return self._gravity
+
+    @property
     def scheme(self) -> str:
         """How steps are taken, in words."""
         return self._stepper.name
