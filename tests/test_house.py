@@ -55,7 +55,6 @@ ALLOWED = {
         "study",
         "tools",
         "report",
-        "study",
         "vibration",
     },
     "table1": {
