@@ -42,6 +42,8 @@ class Kind(NamedTuple):
         bounds: smallest and largest value, both allowed; None without a value.
         name: whether it needs a name.
         repeats: whether a study repeats it, with the same model and material.
+        holds: whether it changes grasps and spheres only, not the body.
+        latest: whether the latest command of the kind replaces those before it.
     """
 
     says: str
@@ -50,6 +52,8 @@ class Kind(NamedTuple):
     bounds: tuple[float, float] | None = None
     name: bool = False
     repeats: bool = True
+    holds: bool = False
+    latest: bool = False
 
 
 _SIZE = (0.0, math.inf)
@@ -58,16 +62,18 @@ _SIZE = (0.0, math.inf)
 COMMANDS: Mapping[str, Kind] = MappingProxyType(
     {
         "grasp": Kind("hold the patch within `radius` of a place of the undeformed body by springs of `value` N/m",
-                      place=True, radius=True, bounds=_SIZE, name=True),
-        "sphere": Kind("add a sphere at a place, of `value` Pa/m", place=True, radius=True, bounds=_SIZE, name=True),
-        "move": Kind("move a grasp or sphere to a place", place=True, name=True),
-        "release": Kind("remove a grasp, pin or sphere", name=True),
-        "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0)),
-        "young": Kind("multiply Young's moduli of the study by `value`", bounds=(1e-3, 1e3), repeats=False),
-        "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False),
-        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False),
-        "model": Kind("change to another model of the study", name=True, repeats=False),
-        "restart": Kind("bring the body back to its begin, without grasps and spheres"),
+                      place=True, radius=True, bounds=_SIZE, name=True, holds=True),
+        "sphere": Kind("add a sphere at a place, of `value` Pa/m",
+                       place=True, radius=True, bounds=_SIZE, name=True, holds=True),
+        "move": Kind("move a grasp or sphere to a place", place=True, name=True, holds=True),
+        "release": Kind("remove a grasp, pin or sphere", name=True, holds=True),
+        "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0), latest=True),
+        "young": Kind("multiply Young's moduli of the study by `value`",
+                      bounds=(1e-3, 1e3), repeats=False, latest=True),
+        "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False, latest=True),
+        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False, latest=True),
+        "model": Kind("change to another model of the study", name=True, repeats=False, latest=True),
+        "restart": Kind("bring the body back to its begin, without grasps and spheres", holds=True),
     }
 )  # fmt: skip
 

@@ -15,6 +15,7 @@ from truespring.equilibrium import moving_body
 from truespring.errors import LiveError
 from truespring.live.actions import Ball, Grip
 from truespring.live.commands import Command, Log, checked
+from truespring.live.state import State
 from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
 from truespring.material import Material
 from truespring.models import Model, as_model
@@ -205,15 +206,26 @@ class Live:
         """The state, with the further nodes of second-order elements."""
         return self._moment
 
-    def put(self, moment: Moment) -> None:
-        """Go on from another state, with the further nodes of second-order elements."""
-        self._moment = moment
-        self._stepper.forget()
+    @property
+    def state(self) -> State:
+        """The state with all that holds the body, for another session."""
+        held = dict(self._grips), dict(self._balls), dict(self._targets)
+        return State(self.log.frames, self._moment, *held, self._stepper.before)
 
-    def take_steps_of(self, step: float) -> None:
-        """Take steps of at most another length [s] from now on."""
-        self.settings = replace(self.settings, step=step)
+    def go_on(self, state: State, moment: Moment | None = None) -> None:
+        """Go on from the state of another session of the body, or with its grasps and spheres from `moment`."""
+        self._moment = state.moment if moment is None else moment
+        self._grips, self._balls = dict(state.grips), dict(state.balls)
+        self._targets = dict(state.targets)
+        self._stepper.forget()
+        self._stepper.before = state.before if moment is None else None
+
+    def choose(self, scheme: str, step: float | str, iterations: int) -> None:
+        """Take other steps from now on, see `Settings`."""
+        self.settings = replace(self.settings, scheme=scheme, step=step, iterations=iterations)
+        before = self._stepper.before
         self._choose()
+        self._stepper.before = before
 
     @property
     def time(self) -> float:
@@ -234,6 +246,11 @@ class Live:
     def geometry(self) -> Geometry:
         """Functions of the mesh for solvers."""
         return self._geometry
+
+    @property
+    def models(self) -> Mapping[str, Model]:
+        """The models to which the command "model" changes, by name."""
+        return self._models
 
     @property
     def scheme(self) -> str:
