@@ -1,7 +1,7 @@
 """The input of every export target: the problem, the springs, and the expected equilibrium."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -32,6 +32,7 @@ class Exported:
         load_steps: number of load levels.
         remarks: further sentences for the header of the files.
         note: the study's note, such as how its springs were calibrated; empty if there is none.
+        options: values of the target's options by name.
     """
 
     title: str
@@ -41,6 +42,7 @@ class Exported:
     load_steps: int
     remarks: tuple[str, ...] = ()
     note: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def state(self) -> State | None:

@@ -1,6 +1,6 @@
 """Export the springs of a study to other simulators."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +11,8 @@ from truespring.equilibrium import Status
 from truespring.errors import ExportError, nearest
 from truespring.exports import (
     Exported,
+    OptionValue,
+    check_options,
     known_targets,
     solve_springs,
     target_files,
@@ -78,13 +80,19 @@ class Exports:
         )
 
 
-def springs_of(study: Study, targets: Collection[str], name: str | None = None) -> str:
+def springs_of(
+    study: Study,
+    targets: Collection[str],
+    name: str | None = None,
+    options: Mapping[str, OptionValue] | None = None,
+) -> str:
     """Return the name of the springs model to export: `name`, or the compared model, or the first springs model.
 
-    Solves nothing. Raises ExportError if a target is unknown, if none can represent the model, if the study has no
-    springs model, or if `name` is not one.
+    Solves nothing. Raises ExportError if a target or option is unknown, if no target can represent the model, if the
+    study has no springs model, or if `name` is not one.
     """
     known = known_targets(targets)
+    check_options(known, options)
     springs = {one: entry for one, entry in study.entries.items() if entry.has_springs}
     if not springs:
         raise ExportError(f"{study.file}: no springs model among {', '.join(study.entries)}: add one to [models]")
@@ -107,14 +115,19 @@ def refused_targets(study: Study, targets: Collection[str], name: str) -> dict[s
 
 
 def export_study(
-    study: Study, targets: Collection[str], out: Path, name: str | None = None, progress: Progress | None = None
+    study: Study,
+    targets: Collection[str],
+    out: Path,
+    name: str | None = None,
+    progress: Progress | None = None,
+    options: Mapping[str, OptionValue] | None = None,
 ) -> list[Exports]:
     """Solve the springs of a study, write them for each target, and return the files of each target.
 
     The files of one target are written to out/STEM, those of several to out/STEM/TARGET. Targets that cannot represent
     the model or its loads are left out, see `refused_targets`; raises ExportError if that are all.
     """
-    name = springs_of(study, targets, name)
+    name = springs_of(study, targets, name, options)
     model, known = study.entries[name], known_targets(targets)
     refused = refused_targets(study, known, name)
     taking = [target for target in known if target not in refused]
@@ -128,7 +141,7 @@ def export_study(
     if study.probe is None:
         exported = replace(exported, probe=most_moved(exported.path))
     with _named(study, name):
-        found = target_files(exported, taking)
+        found = target_files(exported, taking, options)
     written = []
     for target, files in found.items():
         folder = out / study.stem if len(known) == 1 else out / study.stem / target
