@@ -155,7 +155,7 @@ class Measures:
     def _relative(self, positions: Floats, right: Floats) -> float:
         problem = self._live.problem
         if self._mesh is not problem.mesh:
-            self._mesh, self._compared = problem.mesh, ~problem.loading.held.all(axis=1)
+            self._mesh, self._compared = problem.mesh, ~np.asarray(problem.loading.held.all(axis=1))
         return relative(positions, right, problem.mesh.nodes, self._compared)
 
     def _at_rest(self, ghost: Ghost, frame: Floats | None) -> Measured | None:

@@ -114,8 +114,8 @@ class Twin:
     def _moves(self) -> bool:
         """Whether a grasp or sphere is on its way to where it was asked to go."""
         state = self._live.state
-        held = {**state.grips, **state.balls}
-        return any((one.end != state.targets[name]).any() for name, one in held.items())
+        ends = {name: one.end for several in (state.grips, state.balls) for name, one in several.items()}
+        return any((end != state.targets[name]).any() for name, end in ends.items())
 
     def news(self) -> list[Ghost]:
         """Return what was found since the last call, oldest first, without what belongs to a run before a restart."""
