@@ -26,6 +26,7 @@ ALLOWED = {
         "exports",
         "fibres",
         "linear",
+        "live",
         "models",
         "outputs",
         "reference",
@@ -41,7 +42,9 @@ ALLOWED = {
         "conditions",
         "dynamics",
         "equilibrium",
+        "loading",
         "material",
+        "mesh",
         "models",
         "motion",
         "potential",
@@ -49,6 +52,9 @@ ALLOWED = {
         "richardson",
         "solvers",
         "tools",
+        "report",
+        "study",
+        "vibration",
     },
     "table1": {
         "report",
@@ -278,6 +284,9 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 

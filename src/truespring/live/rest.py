@@ -112,10 +112,10 @@ def steady(live: Live, held: State, grow: bool = False) -> Loading:
 
     nodes, times = body.potential.nodes, (0.0, span)
     acting: list[Interaction] = [Still(one, level) for one in body.loading.interactions]
-    for grip in held.grips.values():
+    for grip in (one.on(live.acted_on) for one in held.grips.values()):
         there = replace(grip, begin=np.zeros_like(grip.end)) if grow else grip.settled
         acting.append(there.interaction(nodes, times, span))
-    acting += [one.settled.interaction(live.surface, len(nodes), times, span) for one in held.balls.values()]
+    acting += [one.settled.interaction(live.touched, len(nodes), times, span) for one in held.balls.values()]
     return replace(body.loading.mapped(constant), interactions=tuple(acting))
 
 
