@@ -138,7 +138,7 @@ def test_the_moving_reference_is_that_of_dynamics() -> None:
         assert ghost.time == pytest.approx(state.moving.time)
 
 
-@pytest.mark.parametrize("scheme", ["leapfrog", "bdf2"])
+@pytest.mark.parametrize("scheme", ["leapfrog", pytest.param("bdf2", marks=pytest.mark.verification)])
 def test_the_error_of_time_is_that_against_much_finer_steps(scheme: str) -> None:
     frame = 1 / 60
     undamped = ts.Dynamics(1.0, scheme=scheme)

@@ -57,7 +57,7 @@ class Twin:
         job = Job(live.problem, reference, live.model, live.models, live.settings)
         self.notes: list[str] = []
         self.ended = ""
-        self._log, self._told = live.log, 0
+        self._log, self._told, self._frame = live.log, 0, -1
         self._run, self._quiet, self._state_due, self._closing = 0, 0, True, False
         self._found: deque[Ghost] = deque(maxlen=_KEPT)
         self._to_send: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -89,9 +89,12 @@ class Twin:
 
         A body that was still for some frames, while no command came, is held: its equilibrium is looked for.
         """
-        self._quiet = self._quiet + 1 if still and not self._moves else 0
+        advanced, self._frame = n != self._frame, n
+        if advanced:
+            self._quiet = self._quiet + 1 if still and not self._moves else 0
         held = self._quiet >= _STILL
-        state = self._live.state if self._quiet == _STILL or self._state_due else None
+        begins = advanced and self._quiet == _STILL
+        state = self._live.state if begins or self._state_due else None
         self._state_due = False
         live = self._live
         self._put("frames", n, held, live.step_length, state)
