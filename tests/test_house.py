@@ -39,6 +39,7 @@ ALLOWED = {
     },
     "live": {
         "coarsening",
+        "columns",
         "conditions",
         "dynamics",
         "equilibrium",
@@ -51,9 +52,9 @@ ALLOWED = {
         "problem",
         "richardson",
         "solvers",
+        "study",
         "tools",
         "report",
-        "study",
         "vibration",
     },
     "table1": {

@@ -68,6 +68,7 @@ class Follower:
         ahead = any(not COMMANDS[one.kind].holds for one in self._left)
         for one in self._changes:
             self._carry_out(one)
+        self.live.settle()
         self._first = [one for one in self._first if COMMANDS[one.kind].holds]
         self._left = deque(one for one in self._left if COMMANDS[one.kind].holds)
         self.waits |= ahead
@@ -137,4 +138,4 @@ def _condensed(commands: Iterable[Command]) -> list[Command]:
     several = list(commands)
     last = {one.kind: number for number, one in enumerate(several)}
     kept = enumerate(several)
-    return [one for number, one in kept if not COMMANDS[one.kind].latest or last[one.kind] == number]
+    return [one for number, one in kept if not COMMANDS[one.kind].lasts or last[one.kind] == number]

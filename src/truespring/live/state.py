@@ -18,6 +18,7 @@ class State:
         grips: grasps and pins by name.
         balls: spheres by name.
         targets: where grasps and spheres were asked to go: motion, or centre [m], shape (dim,), by name.
+        gravity: weight beyond that of the loads, over that of full gravity, at begin and end of the next frame [-].
         before: positions and velocities a step before, for schemes over two steps; None without.
     """
 
@@ -26,4 +27,5 @@ class State:
     grips: Mapping[str, Grip]
     balls: Mapping[str, Ball]
     targets: Mapping[str, Floats]
+    gravity: tuple[float, float]
     before: Moment | None = None
