@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Amplitude, Loading
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
-from truespring.live.actions import Ball, Grip
+from truespring.live.actions import Ball, Grip, HasBody, Weight
 from truespring.live.commands import Command, Log, checked
 from truespring.live.cut import (
     Aside,
@@ -27,12 +26,15 @@ from truespring.live.cut import (
     loose_parts,
 )
 from truespring.live.standing import standing
+from truespring.live.state import State
 from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.loading import Body as LoadedBody
 from truespring.material import Material
 from truespring.models import Model, as_model
 from truespring.motion.explicit import SAFE, Leapfrog
 from truespring.motion.follow import balance_of, begin_of
 from truespring.motion.implicit import Implicit
+from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -52,6 +54,8 @@ _PATCH, _SHARE = 1.6, 0.05
 _PINNED = 10.0
 # Energy that a frame may gain without work, over the largest energy so far: more is an instability.
 _GAIN = 0.05
+# An oscillation over the size of the body that is no instability but a rounding error.
+_SMALL = 1e-9
 # The step is halved up to so many times.
 _HALVINGS = 6
 # Largest motion in a frame: of a sphere over its radius, of a grasp over the size of the body.
@@ -81,6 +85,26 @@ class Settings:
     iterations: int = 0
 
 
+class Begun(NamedTuple):
+    """What a session begins with, at first or after a restart.
+
+    Attributes:
+        problem: the completed problem, with changed material and damping.
+        model: the model.
+        gravity: the share of gravity [-].
+        scheme: the scheme, a word of `Dynamics`.
+        longest: the longest time step [s].
+        start: "rest", or "equilibrium" if that was found.
+    """
+
+    problem: Problem
+    model: Model
+    gravity: float
+    scheme: str
+    longest: float
+    start: str
+
+
 class Live:
     """A body that moves while it is pulled, pushed and pinned: call `pull` and the like, then `step`.
 
@@ -94,6 +118,7 @@ class Live:
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
         log: the commands since the begin.
+        begun: what the session begins with.
 
     Example:
         >>> import truespring as ts
@@ -148,6 +173,7 @@ class Live:
         self._clear()
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def __enter__(self) -> Self:
         return self
@@ -186,16 +212,16 @@ class Live:
     def _build(self, ready: Built | None = None) -> None:
         """Build the body of the present problem and model, unless it is ready, and choose how it moves."""
         made = built(self.problem, self.model) if ready is None else ready
-        for size in ("surface", "edge", "contact_stiffness"):
+        for size in ("surface", "touched", "edge", "contact_stiffness"):
             self.__dict__.pop(size, None)
         self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
-        self.body = self._plain
+        self._weight = self._weight_of(self._gravity)
+        self.body = self._weighted()
         self._halved, self._largest = 0, 0.0
         self._choose()
 
     def _choose(self) -> None:
-        """Choose how steps are taken, under the present gravity."""
-        self.body = replace(self._plain, loading=self._weighted(self._plain.loading))
+        """Choose how steps are taken."""
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
@@ -205,19 +231,19 @@ class Live:
                 raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
             safe = SAFE * self._stable
             self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self.body)
-            plain = StepByStep(Leapfrog(self.body), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self.body, springs)
+            springs = fitting(self._plain)
+            plain = StepByStep(Leapfrog(self._plain), "leapfrog")
+            self._stepper = plain if springs is None else Compiled(self._plain, springs)
             return
         scheme = "bdf2" if wanted == "auto" else wanted
         self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
         balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self.body, balance, scheme, settings.iterations), scheme)
+        self._stepper = StepByStep(Implicit(self._plain, balance, scheme, settings.iterations), scheme)
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
         begin = begin_of(self.body, self._dynamics, Newton(), None, self._geometry)
-        positions = begin.positions
+        positions, self._start = begin.positions, self._dynamics.start if begin.converged else "rest"
         if not begin.converged:
             self.notes.append(f"{begin.reason}; it begins undeformed")
             positions = self.body.placed(self.body.potential.nodes, 0.0)
@@ -225,6 +251,10 @@ class Live:
         if self._dynamics.velocity is not None:
             velocity = np.where(self.body.held, 0.0, self._dynamics.velocity)
         return Moment(0.0, positions, velocity)
+
+    def _begun(self) -> Begun:
+        """Return what the session begins with, for its record."""
+        return Begun(self.problem, self.model, self._gravity, self.scheme.split(",")[0], self._longest, self._start)
 
     # --- what it is ---------------------------------------------------------------------------------------------
 
@@ -238,15 +268,34 @@ class Live:
         """The state, with the further nodes of second-order elements."""
         return self._moment
 
-    def put(self, moment: Moment) -> None:
-        """Go on from another state, with the further nodes of second-order elements."""
-        self._moment = moment
-        self._stepper.forget()
+    @property
+    def state(self) -> State:
+        """The state with all that holds the body, for another session."""
+        held = dict(self._grips), dict(self._balls), dict(self._targets)
+        gravity = self._weight.begin, self._weight.end
+        return State(self.log.frames, self._moment, *held, gravity, self._stepper.before)
 
-    def take_steps_of(self, step: float) -> None:
-        """Take steps of at most another length [s] from now on."""
-        self.settings = replace(self.settings, step=step)
+    def go_on(self, state: State, moment: Moment | None = None) -> None:
+        """Go on from the state of another session of the body, or with its grasps and spheres from `moment`."""
+        self._moment = state.moment if moment is None else moment
+        self._grips = {name: one.on(self.acted_on) for name, one in state.grips.items()}
+        self._balls = dict(state.balls)
+        self._targets = dict(state.targets)
+        self._weight = replace(self._weight, begin=state.gravity[0], end=state.gravity[1])
+        self._stepper.forget()
+        self._stepper.before = state.before if moment is None else None
+
+    def settle(self) -> None:
+        """Take gravity as it was asked for, without a frame in which it changes."""
+        self._weight = self._weight.settled
+        self.body = self._weighted()
+
+    def choose(self, scheme: str, step: float | str, iterations: int) -> None:
+        """Take other steps from now on, see `Settings`."""
+        self.settings = replace(self.settings, scheme=scheme, step=step, iterations=iterations)
+        before = self._stepper.before
         self._choose()
+        self._stepper.before = before
 
     @property
     def time(self) -> float:
@@ -286,8 +335,12 @@ class Live:
     @property
     def steps_a_frame(self) -> int:
         """The number of steps of a frame."""
-        longest = self._longest / 2**self._halved
-        return max(1, int(np.ceil(self.settings.frame / longest - _SAME)))
+        return steps_in(self.settings.frame, self._longest / 2**self._halved)
+
+    @property
+    def halved(self) -> bool:
+        """Whether the step was halved because energy rose without work."""
+        return self._halved > 0
 
     @property
     def step_length(self) -> float:
@@ -322,6 +375,18 @@ class Live:
         if mesh.element == "line":
             return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
+
+    @property
+    def acted_on(self) -> LoadedBody:
+        """The body that grasps and spheres act on, with the further nodes of second-order elements."""
+        potential = self.body.potential
+        return potential.body if isinstance(potential, HasBody) else self.problem.body
+
+    @cached_property
+    def touched(self) -> tuple[Ints, Floats]:
+        """As `surface`, with the further nodes of second-order elements: what spheres push."""
+        body = self.acted_on
+        return self.surface if body.second_order is None else surface(body, None)
 
     @cached_property
     def edge(self) -> float:
@@ -479,7 +544,7 @@ class Live:
         command = checked(replace(command, frame=self.log.frames), self.dim)
         command = self._carried_out(command)
         if command.kind == "restart":
-            self.log = Log(self.settings.frame)
+            self.log = self.log.begun_again()
         else:
             self.log.commands.append(command)
 
@@ -504,9 +569,9 @@ class Live:
         self._require_free(command.name)
         at, radius = np.array(command.place), command.radius
         assert radius is not None and command.value is not None  # see `checked`
-        body, still = self.problem.body, np.zeros(self.dim)
+        body, still = self.acted_on, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
-        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still)
+        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still, self.time)
         motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
         self._grips[command.name] = replace(grip, begin=motion, end=motion)
         self._targets[command.name] = motion
@@ -517,7 +582,7 @@ class Live:
         self._require_free(command.name)
         centre = np.array(command.place)
         assert command.radius is not None and command.value is not None  # see `checked`
-        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre)
+        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre, self.time)
         self._targets[command.name] = centre
         self._note_place(command.name)
 
@@ -538,7 +603,7 @@ class Live:
     def _do_gravity(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
         self._gravity = command.value
-        self._choose()
+        self._weight = replace(self._weight, end=self._weight_of(command.value).end)
 
     def _do_material(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -610,6 +675,7 @@ class Live:
             self.problem = self._changed(self._whole.problem)
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def _require_free(self, name: str) -> None:
         """Raise LiveError if a grasp or sphere has a name."""
@@ -628,7 +694,7 @@ class Live:
 
     @property
     def _acting(self) -> Acting:
-        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface)
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.touched, self._weight)
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
@@ -654,6 +720,8 @@ class Live:
             self._note_place(name)
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
+        if self._weight.moves:
+            self.settle()
 
     def _cut_what_is_ready(self) -> None:
         """Carry out the cut that another thread has built, if there is one."""
@@ -684,8 +752,14 @@ class Live:
         if not np.isfinite(after):  # an inverted element: its energy is not known
             after = self._kinetic(taken.moment)
         before = before if np.isfinite(before) else after
-        self._largest = max(self._largest, abs(taken.done), before)
+        self._largest = max(self._largest, abs(taken.done), before, self._rounding)
         return after - before - taken.done + taken.damped <= _GAIN * self._largest
+
+    @property
+    def _rounding(self) -> float:
+        """An energy far above rounding errors [J]: of an oscillation by _SMALL of the size that limits the step."""
+        step = self._stable if 0 < self._stable < np.inf else self.settings.frame
+        return float(self.body.mass.sum()) * (_SMALL * self.size / step) ** 2
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
@@ -709,7 +783,7 @@ class Live:
     @cached_property
     def contact_stiffness(self) -> float:
         """The pressure per depth of a sphere [Pa/m]: that which does not shorten the step much."""
-        nodes, areas = self.surface
+        nodes, areas = self.touched
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
         if not stiffest:
@@ -747,17 +821,28 @@ class Live:
         own = [one for load in self._whole.problem.loads if (one := load.acceleration_of_body) is not None]
         return np.asarray(np.sum(own, axis=0)) if own else None
 
-    def _weighted(self, loading: Loading) -> Loading:
-        """Return a loading with the present share of gravity."""
-        own = self._own_gravity
+    @property
+    def full_gravity(self) -> Floats:
+        """The acceleration of gravity at share 1 [m/s^2], shape (dim,)."""
         down = np.zeros(self.dim)
         down[-1] = -GRAVITY
-        more = self._gravity * down if own is None else (self._gravity - 1) * own
-        if not more.any():
-            return loading
-        force, still = self._plain.mass[:, None] * more, np.zeros(loading.displacement.shape)
-        added = Loading(force, loading.held, still, amplitude=Amplitude((0.0,), (1.0,), self._plain.duration))
-        return replace(loading, further=(*loading.further, added))
+        return down if self._own_gravity is None else self._own_gravity
+
+    def _weight_of(self, share: float) -> Weight:
+        """Return the weight beyond the loads of the problem at a share of gravity."""
+        more = share if self._own_gravity is None else share - 1
+        return Weight(self._plain.mass[:, None] * self.full_gravity, more, more)
+
+    def _weighted(self) -> Body:
+        """Return the body with the present weight."""
+        plain = self._plain
+        loading = self._weight.settled.added_to(plain.loading, (0.0, plain.duration), plain.duration)
+        return replace(plain, loading=loading)
+
+
+def steps_in(frame: float, longest: float) -> int:
+    """Return the number of steps of a frame [s] of at most a length [s]."""
+    return max(1, int(np.ceil(frame / longest - _SAME)))
 
 
 def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
