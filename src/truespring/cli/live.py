@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from truespring.cli.printing import say, show
+from truespring.cli.printing import say, show, writing
 from truespring.cli.verb import CONVERGED, Verb, seconds
 
 
@@ -80,6 +80,10 @@ def _run(options: argparse.Namespace) -> int:
         for line in (*loop.messages, *loop.live.notes):
             say(f"note: {line}")
     serve(loop, title, port=options.port, seconds=options.seconds, opened=known)
+    with writing(options.record or Path()):
+        written = loop.save()
+    if written:
+        say(written)
     return CONVERGED
 
 

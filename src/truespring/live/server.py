@@ -2,11 +2,12 @@
 
 import asyncio
 import secrets
+import signal
 import socket
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.resources import files
 from importlib.util import find_spec
 from string import Template
@@ -219,6 +220,21 @@ def require() -> None:
             raise LiveError(f"live needs the package {name}: pip install 'truespring[live]'")
 
 
+@contextmanager
+def _interrupted(end: Callable[[], None]) -> Iterator[None]:
+    """Call a function where the process is interrupted or terminated within the block, instead of ending at once."""
+    known = (signal.SIGINT, signal.SIGTERM)
+    if threading.current_thread() is not threading.main_thread():  # only that may change what a signal does
+        yield
+        return
+    former = [signal.signal(one, lambda *_: end()) for one in known]
+    try:
+        yield
+    finally:
+        for one, before in zip(known, former, strict=True):
+            signal.signal(one, before)
+
+
 def serve(
     loop: Loop,
     title: str,
@@ -246,6 +262,7 @@ def serve(
     limits: dict[str, Any] = {"ws_max_size": LARGEST, "ws_per_message_deflate": False, "ws": "websockets-sansio"}
     quiet: dict[str, Any] = {"log_level": "error", "access_log": False, "server_header": False, "lifespan": "off"}
     running = uvicorn.Server(uvicorn.Config(application(server), timeout_graceful_shutdown=1, **limits, **quiet))
+    running.capture_signals = nullcontext  # type: ignore[method-assign,assignment]  # it would end the process at once
     ends = threading.Timer(seconds or 0.0, lambda: setattr(running, "should_exit", True))
     ends.daemon = True
     loop.start()
@@ -253,7 +270,8 @@ def serve(
         if seconds is not None:
             ends.start()
         opened(f"http://{ADDRESS}:{own.getsockname()[1]}/?token={server.token}")
-        running.run(sockets=[own])
+        with _interrupted(lambda: setattr(running, "should_exit", True)):
+            running.run(sockets=[own])
     finally:
         ends.cancel()
         loop.stop()

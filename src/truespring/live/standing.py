@@ -15,10 +15,10 @@ def standing(problem: Problem) -> Problem:
 
 
 def resting(problem: Problem) -> Problem:
-    """Return a problem as a motion from rest, of as many loads and supports with as many rows, whose shares are zero."""
-    loads, supports = ([_at_rest(one) for one in several] for several in (problem.loads, problem.supports))
+    """Return a problem as a motion from rest: loads and supports are the same, but their shares are zero."""
     dynamics = replace(problem.dynamics or Dynamics(1.0), start="rest", velocity=None)
-    return replace(problem, loads=loads, supports=supports, dynamics=dynamics)
+    loads, supports = map(_at_rest, problem.loads), map(_at_rest, problem.supports)
+    return replace(problem, loads=list(loads), supports=list(supports), dynamics=dynamics)
 
 
 def _at_end(part: Any) -> Any:
