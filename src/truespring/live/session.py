@@ -15,7 +15,8 @@ from truespring.equilibrium import moving_body
 from truespring.errors import LiveError
 from truespring.live.actions import Ball, Grip
 from truespring.live.commands import Command, Log, checked
-from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.live.compiled import Compiled, fitting
+from truespring.live.steppers import Acting, Frame, StepByStep, Stepper
 from truespring.material import Material
 from truespring.models import Model, as_model
 from truespring.motion.explicit import SAFE, Leapfrog, stable_step
@@ -514,7 +515,7 @@ class Live:
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
-        return self._kinetic(moment) + self.body.potential.energy(moment.positions) + acting.stored(moment.positions)
+        return self._kinetic(moment) + self._stepper.elastic(moment.positions) + acting.stored(moment.positions)
 
     def _kinetic(self, moment: Moment) -> float:
         return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2

@@ -1,4 +1,4 @@
-"""Ways to take the steps of a frame: compiled loops where a potential has the form for them, else step by step."""
+"""Ways to take the steps of a frame, and the one that takes steps of any scheme."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,6 @@ from truespring.motion.advance import Advance, Scheme
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
 from truespring.motion.stages import History, Moment
-from truespring.potential import ConstantSprings, Explicit
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,66 +69,9 @@ class Stepper(Protocol):
         """Forget what is kept of the last state: the next frame begins at another one."""
         ...
 
-
-class Compiled:
-    """Steps of leapfrog in one compiled loop, for springs of constant stiffness under loads that do not change."""
-
-    name = "leapfrog, compiled"
-
-    def __init__(self, body: Body, springs: ConstantSprings) -> None:
-        """Store what the loop reads."""
-        dim = body.potential.nodes.shape[1]
-        k, n_elements = springs.cells[0].shape[1], len(springs.cells[0])
-        self.body, self._springs = body, springs
-        self._zero = (0.0,) * dim
-        self._work = np.empty((n_elements, k, dim)), np.empty(n_elements), np.empty((1, n_elements))
-        self._free = (~body.held).astype(float)
-        self._force: Floats | None = None
-
-    def forget(self) -> None:
-        """Forget the force at the end of the last frame."""
-        self._force = None
-
-    def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
-        """Return the frame after n steps of length h [s] from a state."""
-        from truespring.kernels import leapfrog
-
-        body, springs = self.body, self._springs
-        external = np.ascontiguousarray(body.loading.dead_force(last.time / body.duration))
-        x, v, dim = last.positions.copy(), last.velocity.copy(), len(self._zero)
-        grips, balls = self._arrays(acting, dim)
-        held = np.zeros((len(acting.grips), dim)), np.zeros((len(acting.balls), dim))
-        loop = (springs.springs, springs.cells, springs.form, self._work)
-        if self._force is None:
-            self._force = np.empty_like(x)
-            leapfrog.forces(x, *loop, external, self._force, self._zero)
-            leapfrog.pull(x, grips, 0.0, self._force, held[0])
-            leapfrog.push(x, balls, 0.0, self._force, held[1])
-        account, force = np.zeros(2), self._force.copy()
-        known = (body.mass, self._free, external, *loop, grips, balls, held, account, self._zero)
-        leapfrog.steps(n, h, body.damping.mass, x, v, force, *known)
-        self._force = force
-        done, damped = account
-        done += float((external * (x - last.positions)).sum())
-        return Frame(Moment(last.time + n * h, x, v), float(done), float(damped), np.concatenate(held))
-
-    @staticmethod
-    def _arrays(acting: Acting, dim: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return grasps and spheres as arrays, see `kernels.leapfrog.steps`."""
-        grips, balls = acting.grips, acting.balls
-        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-        ends = [[one.begin for one in grips], [one.end for one in grips]]
-        held = (
-            np.concatenate([none, *(one.nodes for one in grips)]),
-            np.concatenate([none, *(np.full(len(one.nodes), g) for g, one in enumerate(grips))]),
-            np.concatenate([nothing, *(one.stiffness for one in grips)]),
-            np.concatenate([np.zeros((0, dim)), *(one.rest for one in grips)]),
-            *(stacked(end, dim) for end in ends),
-        )
-        centres = [[one.begin for one in balls], [one.end for one in balls]]
-        sizes = [np.array([one.radius for one in balls]), np.array([one.stiffness for one in balls])]
-        nodes, areas = acting.surface
-        return held, (nodes, areas, *sizes, *(stacked(one, dim) for one in centres))
+    def elastic(self, positions: Floats) -> float:
+        """Return the elastic energy [J] at positions [m], shape (n_nodes, dim); it may be infinite where inverted."""
+        ...
 
 
 class StepByStep:
@@ -146,6 +88,10 @@ class StepByStep:
         """Forget the state before the last one, and the force at it."""
         self._before = None
         self._scheme.forget()
+
+    def elastic(self, positions: Floats) -> float:
+        """Return the elastic energy [J], infinite where the law is not defined."""
+        return self._body.potential.energy(positions)
 
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
         """Return the frame after n steps of length h [s] from a state."""
@@ -168,15 +114,6 @@ class StepByStep:
         touches = loading.touches(history.last.positions, level)[len(body.loading.interactions) :]
         forces = stacked([one.force for one in touches], nodes.shape[1])
         return Frame(history.last, account.done, account.damped, forces)
-
-
-def fitting(body: Body) -> ConstantSprings | None:
-    """Return the springs of a body if compiled steps take all that acts on it, else None."""
-    loading = body.loading
-    still = all(len(part.amplitude.places) == 1 for part in loading.parts)
-    if body.damper is not None or loading.interactions or loading.follows or not still:
-        return None
-    return body.potential.constant_springs if isinstance(body.potential, Explicit) else None
 
 
 def names(one: Sequence[Grip | Ball]) -> tuple[str, ...]:
