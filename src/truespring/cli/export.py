@@ -23,22 +23,35 @@ def _add(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="springs model to export, default: the compared model if it is one, else the first",
     )
+    parser.add_argument(
+        "--option",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="option of a target, or TARGET.KEY=VALUE for one of several; repeat for several options",
+    )
     add_out(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
-    from truespring.study import export_study, read_studies, springs_of
+    from truespring.exports import read_options
+    from truespring.study import export_study, read_studies, refused_targets, springs_of
 
+    chosen = read_options(options.option)
     studies = read_studies(options.study)
+    refused: dict[str, str] = {}
     for study in studies:  # raise errors before any study is solved
-        springs_of(study, options.to, options.model)
+        name = springs_of(study, options.to, options.model, chosen)
+        refused |= {f"{study.stem}/{to}": why for to, why in refused_targets(study, options.to, name).items()}
+    for why in refused.values():
+        say(f"not written: {why}")
     reserve(options, studies)
     screen = console(options)
     values: dict[str, Any] = {}
-    converged = True
+    converged = not refused
     for study in studies:
         with progress(options) as advance, writing(options.out):
-            written = export_study(study, options.to, options.out, options.model, advance)
+            written = export_study(study, options.to, options.out, options.model, advance, chosen)
         for one in written:
             if options.quiet and not options.json:
                 show(*one.files)

@@ -1,91 +1,26 @@
 """Export of spring models to other programs: each target is a function that returns files, and an entry of TARGETS."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+import json
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
 from truespring.errors import ExportError, nearest
-from truespring.exports.abaqus import abaqus
-from truespring.exports.arrays import as_json, npz
-from truespring.exports.calculix import calculix
-from truespring.exports.decks import SPRINGA
 from truespring.exports.exported import Exported as Exported
 from truespring.exports.exported import solve_springs as solve_springs
 from truespring.exports.exported import spring_data
-from truespring.exports.features import ALL, Feature, UntakenError, refuse_others
-from truespring.exports.mujoco import mujoco
-from truespring.exports.sofa import sofa
+from truespring.exports.features import UntakenError, refuse_others
+from truespring.exports.options import OptionValue as OptionValue
+from truespring.exports.options import options_of
+from truespring.exports.options import read_options as read_options
+from truespring.exports.table import TARGETS as TARGETS
+from truespring.exports.target import Files as Files
+from truespring.exports.target import Target as Target
 from truespring.models import Model, as_model
 from truespring.models.spring_data import SpringData
 from truespring.outputs import Output
 from truespring.problem import Problem
 from truespring.solvers import Solver
-
-#: The content of each file by its name: text, or bytes.
-Files = Mapping[str, str | bytes]
-
-
-@dataclass(frozen=True)
-class Target:
-    """A program or format that spring models are exported to.
-
-    Attributes:
-        files: returns the files of solved springs, whose features are all in `takes`.
-        about: one-line description of the files.
-        program: name in error messages.
-        names: names of the files; all but the first are optional.
-        takes: supported features of springs and loads; any other makes `check_targets` raise ExportError.
-        unrun: why no test runs the program on the files; empty if a test does.
-    """
-
-    files: Callable[[Exported], Files]
-    about: str
-    program: str
-    names: tuple[str, ...]
-    takes: frozenset[Feature]
-    unrun: str = ""
-
-
-_DECKS = ("springs.inp", "fem.inp")
-_FOLLOWED = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
-
-TARGETS: Mapping[str, Target] = MappingProxyType(
-    {
-        "calculix": Target(
-            calculix,
-            "CalculiX decks: springs.inp of SPRINGA elements, fem.inp of finite elements",
-            "CalculiX",
-            _DECKS,
-            SPRINGA,
-        ),
-        "abaqus": Target(
-            abaqus,
-            "the same for Abaqus",
-            "Abaqus",
-            _DECKS,
-            SPRINGA,
-            unrun="Abaqus was not run; CalculiX reads the same keywords",
-        ),
-        "mujoco": Target(
-            mujoco,
-            "MuJoCo MJCF: springs.xml of bodies on slide joints and spatial tendons",
-            "MuJoCo",
-            ("springs.xml",),
-            _FOLLOWED,
-        ),
-        "sofa": Target(
-            sofa,
-            "a Python scene for SOFA, of springs and finite elements; experimental",
-            "SOFA",
-            ("springs_scene.py",),
-            _FOLLOWED | {Feature.NEGATIVE},
-            unrun="SOFA was not run; the scene is checked against the source code of SOFA",
-        ),
-        "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL),
-        "json": Target(as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL),
-    }
-)
 
 
 def export(
@@ -96,17 +31,40 @@ def export(
     solver: Solver | None = None,
     title: str = "Springs",
     probe: int | None = None,
+    options: Mapping[str, OptionValue] | None = None,
 ) -> tuple[Path, ...]:
     """Solve a spring model, write it to `folder` for another program, and return the files written.
 
-    `target` is a key of TARGETS. Each file states units, supports, loads and the displacement of the node `probe` at
-    full load, by default the free node that moves most. Raises ExportError if the target is unknown or does not
+    `target` is a key of TARGETS, `options` are those of the target by name. Each file states units, supports, loads and
+    the displacement of the node `probe` at full load, by default the free node that moves most; exported.json has what
+    to expect, see `expectation`. Raises ExportError if the target or an option is unknown, or if the target does not
     support the model.
     """
     known_targets([target])
+    check_options([target], options)
     check_targets([target], problem, model)
     exported = solve_springs(problem, model, solver, title, probe)
-    return write_files(target_files(exported, [target])[target], Path(folder))
+    files = target_files(exported, [target], options)[target]
+    return write_files(with_expectation(exported, target, files), Path(folder))
+
+
+def check_options(names: Collection[str], options: Mapping[str, OptionValue] | None) -> None:
+    """Raise ExportError for an option that none of the targets has, or a value that it cannot have."""
+    options_of(options or {}, names, TARGETS)
+
+
+def with_expectation(exported: Exported, target: str, files: Files) -> Files:
+    """Return the files of a target with exported.json, which states what they express and what to expect."""
+    known = TARGETS[target]
+    values = {
+        "target": target,
+        "files": list(files),
+        "expressed": known.expressed,
+        "left_out": known.left_out,
+        "not_run": known.unrun,
+        **exported.expectation,
+    }
+    return {**files, "exported.json": json.dumps(values, indent=2, allow_nan=False) + "\n"}
 
 
 def known_targets(names: Iterable[str]) -> tuple[str, ...]:
@@ -119,20 +77,25 @@ def known_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_targets(names: Collection[str], problem: Problem, model: Model) -> None:
-    """Raise ExportError for an unsupported feature, and for two targets that write the same file; solve nothing."""
+    """Raise ExportError for the first target that does not support the springs and loads; solve nothing."""
+    for error in unsupported(names, problem, model).values():
+        raise error
+
+
+def unsupported(names: Iterable[str], problem: Problem, model: Model) -> dict[str, ExportError]:
+    """Return the targets that do not support the springs and loads, each with the reason; solve nothing.
+
+    Raises ExportError if the model has no springs.
+    """
     if not as_model(model).has_springs:
         raise ExportError(f"{model!r} is not a spring model: use Springs(rule=...) or a SpringNetwork")
-    springs = spring_data(model.potential(problem))
-    written: dict[str, str] = {}
+    springs, found = spring_data(model.potential(problem)), {}
     for name in names:
-        refuse_untaken(name, problem, springs)
-        for file in TARGETS[name].names:
-            if file in written:
-                raise ExportError(
-                    f"targets {written[file]} and {name} both write {file}: export them one at a time, "
-                    "into different folders"
-                )
-            written[file] = name
+        try:
+            refuse_untaken(name, problem, springs)
+        except ExportError as error:
+            found[name] = error
+    return found
 
 
 def refuse_untaken(name: str, problem: Problem, springs: SpringData) -> None:
@@ -144,11 +107,14 @@ def refuse_untaken(name: str, problem: Problem, springs: SpringData) -> None:
         raise ExportError(f"{error}; targets that support it: {others}") from None
 
 
-def target_files(exported: Exported, names: Collection[str]) -> dict[str, Files]:
-    """Return the files of each target; raise ExportError for a feature that a target does not support."""
+def target_files(
+    exported: Exported, names: Collection[str], options: Mapping[str, OptionValue] | None = None
+) -> dict[str, Files]:
+    """Return the files of each target; raise ExportError for features and options that a target does not support."""
+    chosen = options_of(options or {}, TARGETS, TARGETS)  # an option of a target that is not among these has no effect
     for name in names:
         refuse_untaken(name, exported.problem, exported.springs)
-    return {name: TARGETS[name].files(exported) for name in names}
+    return {name: TARGETS[name].files(replace(exported, options=chosen[name])) for name in names}
 
 
 def write_files(files: Files, folder: Path) -> tuple[Path, ...]:

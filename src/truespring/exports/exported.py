@@ -1,9 +1,10 @@
 """The input of every export target: the problem, the springs, and the expected equilibrium."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Exported:
         load_steps: number of load levels.
         remarks: further sentences for the header of the files.
         note: the study's note, such as how its springs were calibrated; empty if there is none.
+        options: values of the target's options by name.
     """
 
     title: str
@@ -40,6 +42,7 @@ class Exported:
     load_steps: int
     remarks: tuple[str, ...] = ()
     note: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def state(self) -> State | None:
@@ -163,6 +166,35 @@ class Exported:
     def expected(self) -> tuple[str, ...]:
         """Sentences on the equilibrium at full load, and the warnings of the solution."""
         return tuple(self._expected())
+
+    @property
+    def expectation(self) -> dict[str, Any]:
+        """The equilibrium to expect at full load, as JSON values in SI units; None where it was not reached.
+
+        Displacement of the probe and the largest one [m], force of the loads and of the supports on the body [N], and
+        elastic energy [J].
+        """
+        state, mesh = self.state, self.problem.mesh
+        known = {
+            "model": self.path.label,
+            "truespring": version("truespring"),
+            "status": str(self.path.status),
+            "load_factor": self.path.load_factor,
+            "probe": {"node": self.probe, "position": mesh.nodes[self.probe].tolist()},
+            "expected": None,
+            "warnings": list(self.path.warnings),
+            "notes": list(self.notes),
+        }
+        if state is None:
+            return known
+        expected = {
+            "probe_displacement": state.displacement[self.probe].tolist(),
+            "largest_displacement": float(np.linalg.norm(state.displacement, axis=1).max()),
+            "applied_force": state.applied_force.tolist(),
+            "support_force": state.reaction.sum(axis=0).tolist(),
+            "energy": state.energy,
+        }
+        return known | {"expected": expected}
 
     def _expected(self) -> Iterator[str]:
         if self.state is None:

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from truespring.errors import ExportError
-from truespring.models import stiff_fibres
+from truespring.models import LAWS, stiff_fibres
 from truespring.models.pair_laws import STRAIGHT
 from truespring.models.spring_data import COUPLING, PRESSURE, VOLUME_TERM, SpringData
 from truespring.problem import Problem
@@ -21,6 +21,8 @@ class Feature(StrEnum):
     VOLUME_TERM = VOLUME_TERM
     COUPLING = COUPLING
     PRESSURE = PRESSURE
+    STIFFENING = "law of Gaussian springs that stiffen"
+    FIBRES = "fibres of Gaussian springs"
     NEGATIVE = "negative stiffness"
     PRESTRESS = "prestress"
     FORCE_LAW = "force law"
@@ -47,6 +49,7 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
             "springs of zero rest length, as those of the rule gaussian, are kept apart by a pressure in each element: "
             "use npz or json, or a rule of straight springs such as isotropic",
         )
+        yield from _of_gaussian(springs)
     network = springs.network
     if network is not None:
         below = np.flatnonzero(network.stiffness < 0)
@@ -74,6 +77,15 @@ def features(problem: Problem, springs: SpringData) -> Iterator[tuple[Feature, s
     for load in problem.loads:
         if load.follows:
             yield Feature.FOLLOWING, f"{load.words()} follows the body: use {load.instead}, or finite elements instead"
+
+
+def _of_gaussian(springs: SpringData) -> Iterator[tuple[Feature, str]]:
+    """Yield the features of Gaussian springs beyond springs of constant stiffness."""
+    law = springs.arrays["law"]
+    if not LAWS[law].constant_springs:
+        yield Feature.STIFFENING, f"law = '{law}' changes the stiffness of all springs of an element: use neo-hookean"
+    if any(name == "k1" or name.startswith("k1_") for name in springs.arrays):
+        yield Feature.FIBRES, "the material has fibres: remove them, or set their k1 to 0"
 
 
 def refuse_others(problem: Problem, springs: SpringData, takes: Collection[Feature], program: str) -> None:

@@ -20,6 +20,7 @@ class Command:
         place: coordinates [m], one value per direction.
         radius: [m].
         value: what the kind needs.
+        begin: motion of the patch of a grasp at its begin [m]; empty for the mean displacement of the patch.
     """
 
     frame: int
@@ -28,6 +29,7 @@ class Command:
     place: tuple[float, ...] = ()
     radius: float | None = None
     value: float | None = None
+    begin: tuple[float, ...] = ()
 
 
 class Kind(NamedTuple):
@@ -80,6 +82,8 @@ def checked(command: Command, dim: int) -> Command:
         raise LiveError(f"{command.kind}: needs a name")
     if kind.place and not _finite(command.place, dim):
         raise LiveError(f"{command.kind}: place = {list(command.place)!r}: give {dim} finite coordinates [m]")
+    if command.begin and not _finite(command.begin, dim):
+        raise LiveError(f"{command.kind}: begin = {list(command.begin)!r}: give {dim} finite components [m], or none")
     if kind.radius and not (command.radius is not None and math.isfinite(command.radius) and command.radius > 0):
         raise LiveError(f"{command.kind}: radius = {command.radius!r} m: must be a positive number")
     if kind.bounds is not None:

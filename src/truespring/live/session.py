@@ -25,7 +25,7 @@ from truespring.motion.implicit import Implicit
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
 from truespring.problem import Problem
-from truespring.solvers import Newton
+from truespring.solvers import Geometry, Newton
 from truespring.tools import Grasp
 from truespring.tools.surface import surface
 
@@ -206,6 +206,16 @@ class Live:
         """The state, with the further nodes of second-order elements."""
         return self._moment
 
+    def put(self, moment: Moment) -> None:
+        """Go on from another state, with the further nodes of second-order elements."""
+        self._moment = moment
+        self._stepper.forget()
+
+    def take_steps_of(self, step: float) -> None:
+        """Take steps of at most another length [s] from now on."""
+        self.settings = replace(self.settings, step=step)
+        self._choose()
+
     @property
     def time(self) -> float:
         """The time [s]."""
@@ -220,6 +230,11 @@ class Live:
     def velocities(self) -> Floats:
         """Velocities of the nodes of the mesh [m/s], shape (n_nodes, dim); a copy."""
         return self._moment.velocity[: self.problem.mesh.n_nodes].copy()
+
+    @property
+    def geometry(self) -> Geometry:
+        """Functions of the mesh for solvers."""
+        return self._geometry
 
     @property
     def scheme(self) -> str:
@@ -357,9 +372,18 @@ class Live:
     ) -> None:
         """Carry out a command, one of COMMANDS, before the next frame; raise LiveError if it is wrong."""
         there = tuple(float(one) for one in place)
-        command = checked(Command(self.log.frames, kind, name, there, radius, value), self.dim)
+        self.repeat(Command(self.log.frames, kind, name, there, radius, value))
+
+    def repeat(self, command: Command) -> None:
+        """Carry out a command of another session of the body before the next frame; a grasp begins where it did there.
+
+        The models of the two sessions may differ. Raises LiveError if the command is wrong.
+        """
+        command = checked(replace(command, frame=self.log.frames), self.dim)
         self._carry_out(command)
-        if kind == "restart":
+        if command.kind == "grasp":
+            command = replace(command, begin=tuple(self._grips[command.name].begin.tolist()))
+        if command.kind == "restart":
             self.log = Log(self.settings.frame)
         else:
             self.log.commands.append(command)
@@ -387,7 +411,7 @@ class Live:
         body, still = self.problem.body, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
         grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still)
-        motion = grip.mean_motion(self._moment.positions)
+        motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
         self._grips[command.name] = replace(grip, begin=motion, end=motion)
         self._targets[command.name] = motion
         self._note_place(command.name)

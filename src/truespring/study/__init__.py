@@ -2,6 +2,7 @@
 
 from truespring.study.changes import value_at as value_at
 from truespring.study.export import export_study as export_study
+from truespring.study.export import refused_targets as refused_targets
 from truespring.study.export import springs_of as springs_of
 from truespring.study.last_level import require_last_level as require_last_level
 from truespring.study.moduli import Realised as Realised

@@ -1,6 +1,6 @@
 """Export the springs of a study to other simulators."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +9,17 @@ from typing import Any
 from truespring.comparison import most_moved
 from truespring.equilibrium import Status
 from truespring.errors import ExportError, nearest
-from truespring.exports import Exported, check_targets, known_targets, solve_springs, target_files, write_files
+from truespring.exports import (
+    Exported,
+    OptionValue,
+    check_options,
+    known_targets,
+    solve_springs,
+    target_files,
+    unsupported,
+    with_expectation,
+    write_files,
+)
 from truespring.report.result import head_note
 from truespring.study.read import Study
 from truespring.study.run import Progress
@@ -70,13 +80,19 @@ class Exports:
         )
 
 
-def springs_of(study: Study, targets: Collection[str], name: str | None = None) -> str:
+def springs_of(
+    study: Study,
+    targets: Collection[str],
+    name: str | None = None,
+    options: Mapping[str, OptionValue] | None = None,
+) -> str:
     """Return the name of the springs model to export: `name`, or the compared model, or the first springs model.
 
-    Solves nothing. Raises ExportError if a target is unknown or cannot represent the model, if the study has no springs
-    model, or if `name` is not one.
+    Solves nothing. Raises ExportError if a target or option is unknown, if no target can represent the model, if the
+    study has no springs model, or if `name` is not one.
     """
     known = known_targets(targets)
+    check_options(known, options)
     springs = {one: entry for one, entry in study.entries.items() if entry.has_springs}
     if not springs:
         raise ExportError(f"{study.file}: no springs model among {', '.join(study.entries)}: add one to [models]")
@@ -85,20 +101,36 @@ def springs_of(study: Study, targets: Collection[str], name: str | None = None) 
     if name not in springs:
         what = "is not a springs model" if name in study.entries else f"is not among the models{nearest(name, springs)}"
         raise ExportError(f"{study.file}: model '{name}' {what}; springs: {', '.join(springs)}")
-    with _named(study, name):
-        check_targets(known, study.problem, springs[name])
+    refused = refused_targets(study, known, name)
+    if len(refused) == len(known):
+        raise ExportError("\n".join(refused.values()))
     return name
 
 
-def export_study(
-    study: Study, targets: Collection[str], out: Path, name: str | None = None, progress: Progress | None = None
-) -> list[Exports]:
-    """Solve the springs of a study, write them for each target to out/STEM, and return the files of each target.
+def refused_targets(study: Study, targets: Collection[str], name: str) -> dict[str, str]:
+    """Return the targets that cannot represent the springs model `name` or its loads, each with the reason."""
+    with _named(study, name):
+        found = unsupported(targets, study.problem, study.entries[name])
+    return {target: f"{study.file}: model '{name}': {error}" for target, error in found.items()}
 
-    Raises ExportError if a target cannot represent the model or its loads, or if two targets write the same file.
+
+def export_study(
+    study: Study,
+    targets: Collection[str],
+    out: Path,
+    name: str | None = None,
+    progress: Progress | None = None,
+    options: Mapping[str, OptionValue] | None = None,
+) -> list[Exports]:
+    """Solve the springs of a study, write them for each target, and return the files of each target.
+
+    The files of one target are written to out/STEM, those of several to out/STEM/TARGET. Targets that cannot represent
+    the model or its loads are left out, see `refused_targets`; raises ExportError if that are all.
     """
-    name = springs_of(study, targets, name)
-    model = study.entries[name]
+    name = springs_of(study, targets, name, options)
+    model, known = study.entries[name], known_targets(targets)
+    refused = refused_targets(study, known, name)
+    taking = [target for target in known if target not in refused]
 
     def report(load_factor: float, iteration: int, residual: float) -> None:
         if progress:
@@ -109,8 +141,12 @@ def export_study(
     if study.probe is None:
         exported = replace(exported, probe=most_moved(exported.path))
     with _named(study, name):
-        found = target_files(exported, known_targets(targets))
-    return [Exports(target, name, exported, write_files(files, out / study.stem)) for target, files in found.items()]
+        found = target_files(exported, taking, options)
+    written = []
+    for target, files in found.items():
+        folder = out / study.stem if len(known) == 1 else out / study.stem / target
+        written.append(Exports(target, name, exported, write_files(with_expectation(exported, target, files), folder)))
+    return written
 
 
 @contextmanager
