@@ -9,7 +9,8 @@ With the sums over the corners a_1 of x times the sign of xi, h_1 of x times the
 three signs, and so on, the volume is that of `measures.hexahedra`, and the energy of the springs is half the sum of the
 squares of the modes times their stiffness.
 
-Shapes: x, force (3, n_nodes); columns (n_batches, 4, WIDTH), the nodes around xi; constants (n_batches, CONSTANTS,
+Shapes: x, force (3, n_nodes); columns (n_batches, 4, WIDTH), the nodes around xi; straight (n_batches, 4, WIDTH //
+GROUP), whether GROUP nodes have consecutive numbers; constants (n_batches, CONSTANTS,
 WIDTH): stiffness of a_1, a_2, a_3, h_1, h_2, h_3, g [N/m], the inverse of the undeformed volume [1/m^3], 1 for an
 element and 0 for none, and the offset and slope of the pressure [Pa]; work (ROWS, WIDTH + 2 _PAD).
 """
@@ -25,6 +26,8 @@ from truespring.kernels.threads import FASTMATH, kernel
 
 #: Number of columns of a batch.
 WIDTH = 32
+#: Number of nodes that are read or written at once if their numbers are consecutive.
+GROUP = 8
 #: Rows of `constants`.
 CONSTANTS = 11
 # First rows of the work array: positions and forces of nodes, 4 rows for each direction; sums over columns, 4 each;
@@ -41,12 +44,18 @@ _part = numba.njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy
 
 
 @_part
-def _gather(x: Any, columns: Any, batch: int, d: int, work: Any) -> None:
+def _gather(x: Any, columns: Any, straight: Any, batch: int, d: int, work: Any) -> None:
     """Write the positions of the nodes of columns in a direction."""
     b = unsigned(batch)
     for c in range(4):
-        for j in range(WIDTH):
-            work[_NODES + 4 * d + c, j] = x[d, unsigned(columns[b, c, j])]
+        for k in range(WIDTH // GROUP):
+            o, first = GROUP * k, unsigned(columns[b, c, GROUP * k])
+            if straight[b, c, k]:
+                for i in range(GROUP):
+                    work[_NODES + 4 * d + c, o + i] = x[d, first + unsigned(i)]
+            else:
+                for i in range(GROUP):
+                    work[_NODES + 4 * d + c, o + i] = x[d, unsigned(columns[b, c, o + i])]
 
 
 @_part
@@ -175,19 +184,25 @@ def _sum_forces(d: int, work: Any) -> None:
 
 
 @_part
-def _scatter(columns: Any, batch: int, d: int, work: Any, force: Any) -> None:
+def _scatter(columns: Any, straight: Any, batch: int, d: int, work: Any, force: Any) -> None:
     """Subtract the forces on the nodes of columns in a direction."""
     b = unsigned(batch)
     for c in range(4):
-        for j in range(WIDTH):
-            force[d, unsigned(columns[b, c, j])] -= work[_NODES + 4 * d + c, j]
+        for k in range(WIDTH // GROUP):
+            o, first = GROUP * k, unsigned(columns[b, c, GROUP * k])
+            if straight[b, c, k]:
+                for i in range(GROUP):
+                    force[d, first + unsigned(i)] -= work[_NODES + 4 * d + c, o + i]
+            else:
+                for i in range(GROUP):
+                    force[d, unsigned(columns[b, c, o + i])] -= work[_NODES + 4 * d + c, o + i]
 
 
 @_part
-def _measure(x: Any, columns: Any, constants: Any, batch: int, work: Any) -> int:
+def _measure(x: Any, columns: Any, straight: Any, constants: Any, batch: int, work: Any) -> int:
     """Write modes, derivatives and changes of volume of a batch; return the value of `_find_changes`."""
     for d in range(3):
-        _gather(x, columns, batch, d, work)
+        _gather(x, columns, straight, batch, d, work)
     _sum_columns(0, work)
     _sum_columns(1, work)
     _sum_columns(2, work)
@@ -201,12 +216,12 @@ def _measure(x: Any, columns: Any, constants: Any, batch: int, work: Any) -> int
 
 
 @kernel
-def subtract_forces(x: Any, columns: Any, constants: Any, force: Any) -> None:
+def subtract_forces(x: Any, columns: Any, straight: Any, constants: Any, force: Any) -> None:
     """Subtract the internal forces of hexahedra from the forces on their nodes."""
     work = np.empty((_ROWS, WIDTH + 2 * _PAD))
     work[:] = 0.0
     for batch in range(len(columns)):
-        outside = _measure(x, columns, constants, batch, work)
+        outside = _measure(x, columns, straight, constants, batch, work)
         _find_pressures(constants, batch, outside, work)
         _find_forces(constants, batch, 0, work)
         _find_forces(constants, batch, 1, work)
@@ -215,17 +230,17 @@ def subtract_forces(x: Any, columns: Any, constants: Any, force: Any) -> None:
         _sum_forces(1, work)
         _sum_forces(2, work)
         for d in range(3):
-            _scatter(columns, batch, d, work, force)
+            _scatter(columns, straight, batch, d, work, force)
 
 
 @kernel
-def energy(x: Any, columns: Any, constants: Any) -> float:
+def energy(x: Any, columns: Any, straight: Any, constants: Any) -> float:
     """Return the energy of hexahedra, but for a constant [J]."""
     work = np.empty((_ROWS, WIDTH + 2 * _PAD))
     work[:] = 0.0
     total = 0.0
     for batch in range(len(columns)):
-        _measure(x, columns, constants, batch, work)
+        _measure(x, columns, straight, constants, batch, work)
         for j in range(WIDTH):
             if constants[batch, 8, j] > 0:
                 own = density(1 + work[_CHANGE, j], 0.0, constants[batch, 9, j], constants[batch, 10, j])

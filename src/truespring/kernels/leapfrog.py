@@ -3,10 +3,12 @@
 One thread, and the same order of all sums in each run. Positions, velocities and forces have shape (dim, n_nodes), so
 that loops over nodes use vector registers.
 
-A `body` is (columns, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other elements as
-starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and for each kind of the other elements
-(elements (n, k), simplices (n_simplices, dim + 1), weight of a simplex, undeformed volumes, across, offset and slope of
-the pressure (n,) each, see `kernels.pressures`). `zero` is a tuple of dim zeros.
+A `body` is (columns, straight, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other elements as
+starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements of all kinds: node
+numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for each kind the
+number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,), and
+undeformed volumes, across, offset and slope of the pressure (n_elements,), see `kernels.pressures`. `zero` is a tuple
+of dim zeros.
 """
 
 import math
@@ -20,6 +22,9 @@ from truespring.kernels.pressures import density, pressure
 from truespring.kernels.small import minus, plus, scaled, unsigned
 from truespring.kernels.threads import kernel
 from truespring.kernels.volumes import slopes
+
+# Most nodes of an element.
+_MOST = 32
 
 
 def _at(x, i, zero):
@@ -48,14 +53,15 @@ def _subtract_springs(x: Any, starts: Any, others: Any, weights: Any, force: Any
 
 
 @kernel
-def _measure(x: Any, nodes: Any, simplices: Any, weight: float, at: Any, slope: Any, zero: Any) -> float:
+def _measure(x: Any, e: int, cells: Any, at: Any, slope: Any, zero: Any) -> float:
     """Write the derivatives of an element's volume, shape (k, 3), return the volume; `at` is a work array (k, 3)."""
-    own, total = np.arange(len(nodes)), 0.0
-    for a in range(len(nodes)):
+    numbers, starts, kinds, counts, simplices, weights = cells[:6]
+    first, k, kind, total = starts[e], starts[e + 1] - starts[e], kinds[e], 0.0
+    for a in range(k):
         for c in range(len(zero)):
-            at[a, c] = x[c, unsigned(nodes[a])]
-    slopes(at, own, simplices, weight, slope, zero)
-    for a in range(len(nodes)):
+            at[a, c] = x[c, unsigned(numbers[first + a])]
+    slopes(at, np.arange(k), simplices[kind, : counts[kind]], weights[kind], slope, zero)
+    for a in range(k):
         for c in range(len(zero)):
             total += slope[a, c] * (at[a, c] - at[0, c])
     return total / len(zero)
@@ -63,46 +69,43 @@ def _measure(x: Any, nodes: Any, simplices: Any, weight: float, at: Any, slope: 
 
 @kernel
 def _subtract_pressures(x: Any, cells: Any, force: Any, zero: Any) -> None:
-    """Subtract the forces of the pressure in elements of one kind from those on their nodes."""
-    elements, simplices, weight, undeformed, across, offset, by_log = cells
-    k = elements.shape[1]
-    at, slope = np.zeros((k, 3)), np.empty((k, 3))
-    for e in range(len(elements)):
-        volume = _measure(x, elements[e], simplices, weight, at, slope, zero)
+    """Subtract the forces of the pressure in elements from those on their nodes."""
+    numbers, starts = cells[:2]
+    undeformed, across, offset, by_log = cells[6:]
+    at, slope = np.zeros((_MOST, 3)), np.empty((_MOST, 3))
+    for e in range(len(undeformed)):
+        volume = _measure(x, e, cells, at, slope, zero)
         p = pressure(volume / undeformed[e], across[e], offset[e], by_log[e])
-        for a in range(k):
+        for a in range(starts[e + 1] - starts[e]):
             for c in range(len(zero)):
-                force[c, unsigned(elements[e, a])] -= p * slope[a, c]
+                force[c, unsigned(numbers[starts[e] + a])] -= p * slope[a, c]
 
 
 @kernel
-def subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
+def _subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
     """Subtract the internal force of a body from the forces on its nodes [N], shape (dim, n_nodes)."""
-    lattice, constants, springs, cells = body
-    columns.subtract_forces(x, lattice, constants, force)
+    lattice, straight, constants, springs, cells = body
+    columns.subtract_forces(x, lattice, straight, constants, force)
     if len(springs[1]) > 0:
         _subtract_springs(x, springs[0], springs[1], springs[2], force, zero)
-    for m in range(len(cells)):
-        _subtract_pressures(x, cells[m], force, zero)
+    _subtract_pressures(x, cells, force, zero)
 
 
 @kernel
 def energy(x: Any, body: Any, zero: Any) -> float:
     """Return the energy of a body, but for a constant [J]; finite in inverted elements, too, see `pressure`."""
-    lattice, constants, springs, cells = body
-    total = columns.energy(x, lattice, constants)
+    lattice, straight, constants, springs, cells = body
+    total = columns.energy(x, lattice, straight, constants)
     for i in range(len(springs[0]) - 1):
         for p in range(springs[0][i], springs[0][i + 1]):
             for c in range(len(zero)):
                 away = x[c, i] - x[c, unsigned(springs[1][p])]
                 total += springs[2][p] / 4 * away * away
-    for m in range(len(cells)):
-        elements, simplices, weight, undeformed, across, offset, by_log = cells[m]
-        k = elements.shape[1]
-        at, slope = np.zeros((k, 3)), np.empty((k, 3))
-        for e in range(len(elements)):
-            ratio = _measure(x, elements[e], simplices, weight, at, slope, zero) / undeformed[e]
-            total += undeformed[e] * density(ratio, across[e], offset[e], by_log[e])
+    undeformed, across, offset, by_log = cells[6:]
+    at, slope = np.zeros((_MOST, 3)), np.empty((_MOST, 3))
+    for e in range(len(undeformed)):
+        ratio = _measure(x, e, cells, at, slope, zero) / undeformed[e]
+        total += undeformed[e] * density(ratio, across[e], offset[e], by_log[e])
     return total
 
 
@@ -181,17 +184,6 @@ def _dissipated(v: Any, inverse: Any) -> float:
 
 
 @kernel
-def forces(
-    x: Any, body: Any, external: Any, grips: Any, balls: Any, share: float, force: Any, held: Any, zero: Any
-) -> None:
-    """Write all forces on the nodes at a share of the frame; arguments as in `steps`."""
-    force[:] = external
-    subtract_forces(x, body, force, zero)
-    _pull(x, grips, share, force, held[0])
-    _push(x, balls, share, force, held[1])
-
-
-@kernel
 def steps(
     n: int,
     h: float,
@@ -207,6 +199,7 @@ def steps(
     held: Any,
     account: Any,
     zero: Any,
+    known: bool,
 ) -> None:
     """Take n steps of length h [s] of leapfrog with half a kick at both ends, as `motion.Leapfrog` does.
 
@@ -224,17 +217,25 @@ def steps(
             (n_balls, dim).
         held: forces of the body on grasps (n_grasps, dim), and on spheres (n_balls, dim); overwritten.
         account: work of grasps and spheres on the body [J], and energy dissipated by damping [J]; added to.
+        zero: tuple of dim zeros.
+        known: whether `force` is that at the begin; else it is computed.
     """
     on_grips, on_balls = held
-    _pull(x, grips, 0.0, np.empty_like(force), on_grips)  # only for the work: `force` may have that of others before
-    _push(x, balls, 0.0, np.empty_like(force), on_balls)
+    begin = force.copy()  # with the grasps of the frame before, where it is known
+    if not known:
+        begin[:] = external
+        _subtract_forces(x, body, begin, zero)
+    _pull(x, grips, 0.0, begin, on_grips)
+    _push(x, balls, 0.0, begin, on_balls)
+    if not known:
+        force[:] = begin
     ended = 0.0
     for s in range(n):
         _advance(h, ended, alpha, x, v, force, inverse, external)
         ended = 1.0
         if alpha > 0.0:
             account[1] += alpha * h * _dissipated(v, inverse)
-        subtract_forces(x, body, force, zero)
+        _subtract_forces(x, body, force, zero)
         share = (s + 1) / n
         before_grips, before_balls = on_grips.copy(), on_balls.copy()
         _pull(x, grips, share, force, on_grips)

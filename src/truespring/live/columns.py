@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
+from truespring.mesh.rows import distinct_rows
 from truespring.potential import ConstantCells
 
 # The signs of the corners of a hexahedron along its three axes, in VTK's order, shape (8, 3).
@@ -24,31 +25,34 @@ class Arrays(NamedTuple):
     """A body for the loops of `kernels.leapfrog`, where shapes and units are told."""
 
     columns: Any
+    straight: Bools
     constants: Floats
     springs: tuple[Any, Any, Floats]
-    cells: tuple[tuple[Any, ...], ...]
+    cells: tuple[Any, ...]
 
 
 def arrays(several: Sequence[ConstantCells], n_nodes: int) -> Arrays:
     """Return a body of elements of several kinds: bricks in rows, others one by one."""
     bricks = [(one, stiffness) for one in several if (stiffness := _modal(one)) is not None]
     others = [one for one in several if _modal(one) is None]
-    columns, constants = _batches(*bricks[0]) if bricks else _batches(_none(several[0]), np.zeros((0, len(_MODES))))
-    cells = tuple(_volumes(one) for one in others) or (_volumes(_none(several[0])),)
-    return Arrays(columns, constants, _springs(others, n_nodes), cells)
+    found = _batches(*bricks[0]) if bricks else _no_batches()
+    return Arrays(*found, _springs(others, n_nodes), _volumes(others, several[0].simplices.shape[1]))
 
 
-def _none(cells: ConstantCells) -> ConstantCells:
-    """Return none of the elements: loops need arrays of the same types."""
-    several = (cells.of, cells.shear, cells.undeformed, cells.across, cells.offset, cells.slope)
-    of, *law = (one[:0] for one in several)
-    return ConstantCells(cells.elements[:0], cells.matrices, of, *law, cells.simplices, cells.weight)
-
-
-def _volumes(cells: ConstantCells) -> tuple[Any, ...]:
-    """Return the volumes of elements as the kernels take them."""
-    law = (cells.undeformed, cells.across, cells.offset, cells.slope)
-    return (cells.elements, cells.simplices, float(cells.weight), *(np.require(one, requirements="CW") for one in law))
+def _volumes(several: Sequence[ConstantCells], corners: int) -> tuple[Any, ...]:
+    """Return the volumes of elements of several kinds as the kernels take them; `corners` is that of a simplex."""
+    none = np.zeros(0, dtype=np.int64)
+    counts = np.array([len(one.simplices) for one in several], dtype=np.int64)
+    simplices = np.zeros((len(several), counts.max(initial=0), corners), dtype=np.int64)
+    for kind, one in enumerate(several):
+        simplices[kind, : counts[kind]] = one.simplices
+    sizes = np.concatenate([none, *(np.full(*one.elements.shape) for one in several)])
+    numbers = np.concatenate([none, *(one.elements.ravel() for one in several)]).astype(np.int32)
+    kinds = np.concatenate([none, *(np.full(len(one.elements), kind) for kind, one in enumerate(several))])
+    law = [[one.undeformed, one.across, one.offset, one.slope] for one in several]
+    values = [np.concatenate([np.zeros(0), *(one[q] for one in law)]) for q in range(4)]
+    weights = np.array([float(one.weight) for one in several])
+    return numbers, np.concatenate([none, [0], np.cumsum(sizes)]), kinds, counts, simplices, weights, *values
 
 
 def _springs(several: Sequence[ConstantCells], n_nodes: int) -> tuple[Any, Any, Floats]:
@@ -76,9 +80,9 @@ def _modal(cells: ConstantCells) -> Floats | None:
     return np.asarray(cells.shear[:, None] * own[cells.of])
 
 
-def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Floats]:
-    """Return columns and constants of bricks, see `kernels.columns`; `stiffness` has shape (n_elements, 7)."""
-    from truespring.kernels.columns import CONSTANTS, WIDTH
+def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Bools, Floats]:
+    """Return columns of bricks, whether they are straight, and constants, see `kernels.columns`; `stiffness` has shape (n_elements, 7)."""
+    from truespring.kernels.columns import CONSTANTS, GROUP, WIDTH
 
     turn, after = _rows(cells.elements)
     elements, order = cells.elements[:, _turned(turn)], np.arange(len(_MODES))
@@ -99,10 +103,21 @@ def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Floats]:
             columns.append(ends[e])
         chosen.append(-1)
     missing = -len(columns) % WIDTH
-    nodes = np.array([*columns, *([columns[-1]] * missing if columns else [])], np.int32).reshape(-1, WIDTH, 4)
+    nodes = np.array([*columns, *[columns[-1]] * missing], np.int32).reshape(-1, WIDTH, 4)
     of = np.array([*chosen, *[-1] * missing], np.int64)
-    constants = np.where((of < 0)[:, None], 0.0, known[of] if len(known) else 0.0).reshape(-1, WIDTH, CONSTANTS)
-    return np.ascontiguousarray(nodes.transpose(0, 2, 1)), np.ascontiguousarray(constants.transpose(0, 2, 1))
+    constants = np.where((of < 0)[:, None], 0.0, known[of]).reshape(-1, WIDTH, CONSTANTS)
+    around = np.ascontiguousarray(nodes.transpose(0, 2, 1))
+    groups = around.reshape(len(nodes), 4, WIDTH // GROUP, GROUP)
+    straight = (np.diff(groups, axis=3) == 1).all(axis=3)
+    return around, straight, np.ascontiguousarray(constants.transpose(0, 2, 1))
+
+
+def _no_batches() -> tuple[Any, Bools, Floats]:
+    """Return the columns and constants of no bricks."""
+    from truespring.kernels.columns import CONSTANTS, GROUP, WIDTH
+
+    nodes, straight = np.zeros((0, 4, WIDTH), dtype=np.int32), np.zeros((0, 4, WIDTH // GROUP), dtype=bool)
+    return nodes, straight, np.zeros((0, CONSTANTS, WIDTH))
 
 
 def _turned(turn: int) -> Ints:
@@ -131,10 +146,10 @@ def _after(left: Ints, right: Ints) -> Ints:
     n = len(left)
     if not n:
         return np.zeros(0, dtype=np.int64)
-    _, of = np.unique(np.concatenate([left, right]), axis=0, return_inverse=True)
+    of = distinct_rows(tuple(np.concatenate([left, right]).T)).of
     owner = np.full(2 * n, -1)
-    owner[of.ravel()[:n]] = np.arange(n)
-    return owner[of.ravel()[n:]]
+    owner[of[:n]] = np.arange(n)
+    return owner[of[n:]]
 
 
 def _chains(after: Ints) -> list[list[int]]:

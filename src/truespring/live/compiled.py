@@ -71,27 +71,19 @@ class Compiled:
         loads = np.ascontiguousarray(body.loading.dead_force(last.time / body.duration))
         external = _by_direction(loads)
         grips, balls = _grips(acting, dim), _balls(acting, dim)
-        begin = self._last
-        if begin is None or begin.moment is not last:
-            begin = self._begun(last, external, grips, balls)
+        begin, known = self._last, self._last is not None and self._last.moment is last
+        if begin is None or not known:
+            velocity = np.where(body.held, 0.0, last.velocity)
+            begin = _State(last, _by_direction(last.positions), _by_direction(velocity), np.zeros_like(external))
         x, v, force, account = begin.positions.copy(), begin.velocity.copy(), begin.force.copy(), np.zeros(2)
         held = np.zeros_like(grips[-1]), np.zeros_like(balls[-1])
-        known = (self._inverse, external, self._arrays, grips, balls, held, account, self._zero)
-        leapfrog.steps(n, h, body.damping.mass, x, v, force, *known)
+        acts = (external, self._arrays, grips, balls, held, account)
+        leapfrog.steps(n, h, body.damping.mass, x, v, force, self._inverse, *acts, self._zero, known)
         moment = Moment(last.time + n * h, np.ascontiguousarray(x.T), np.ascontiguousarray(v.T))
         self._last = _State(moment, x, v, force)
         done, damped = account
         done += float((loads * (moment.positions - last.positions)).sum())
         return Frame(moment, float(done), float(damped), np.concatenate(held))
-
-    def _begun(self, last: Moment, external: Floats, grips: tuple[Any, ...], balls: tuple[Any, ...]) -> _State:
-        """Return a state with the forces at its begin."""
-        from truespring.kernels import leapfrog
-
-        x, v = _by_direction(last.positions), _by_direction(np.where(self.body.held, 0.0, last.velocity))
-        force, held = np.empty_like(x), (np.zeros_like(grips[-1]), np.zeros_like(balls[-1]))
-        leapfrog.forces(x, self._arrays, external, grips, balls, 0.0, force, held, self._zero)
-        return _State(last, x, v, force)
 
 
 def fitting(body: Body) -> tuple[ConstantCells, ...] | None:

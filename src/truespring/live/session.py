@@ -15,13 +15,12 @@ from truespring.equilibrium import moving_body
 from truespring.errors import LiveError
 from truespring.live.actions import Ball, Grip
 from truespring.live.commands import Command, Log, checked
-from truespring.live.compiled import Compiled, fitting
-from truespring.live.steppers import Acting, Frame, StepByStep, Stepper
+from truespring.live.choosing import Schemes
+from truespring.live.steppers import Acting, Frame, Stepper
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import SAFE, Leapfrog, stable_step
-from truespring.motion.follow import balance_of, begin_of
-from truespring.motion.implicit import Implicit
+from truespring.motion.explicit import stable_step
+from truespring.motion.follow import begin_of
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -82,6 +81,7 @@ class Live:
         model: the model.
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
+        why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
     """
 
@@ -103,7 +103,8 @@ class Live:
             model: the model of the body.
             models: models to which the command "model" changes, by name.
             frame: time between frames [s].
-            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog unless it has no stable step.
+            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog, unless it has no stable
+                step, or takes longer than a frame and bdf2 takes less.
             step: longest time step [s]; "auto" for that of the problem, or half of leapfrog's stable step.
             iterations: Newton iterations of each step of an implicit scheme; 0 solves it.
 
@@ -159,6 +160,7 @@ class Live:
         self.body = self._plain
         self._stable = stable_step(self.body)
         self._halved, self._largest = 0, 0.0
+        self._decided: str | None = None
         self._choose()
 
     def _choose(self) -> None:
@@ -167,20 +169,15 @@ class Live:
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
-        self._stepper: Stepper
-        if wanted == "leapfrog" or (wanted == "auto" and self._stable > 0):
-            if not self._stable:
-                raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
-            safe = SAFE * self._stable
-            self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self.body)
-            plain = StepByStep(Leapfrog(self.body), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self.body, springs)
-            return
-        scheme = "bdf2" if wanted == "auto" else wanted
-        self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
-        balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self.body, balance, scheme, settings.iterations), scheme)
+        step = float(asked) if isinstance(asked, int | float) else None
+        schemes = Schemes(self.body, self._geometry, self._stable, settings.frame, step, settings.iterations)
+        choice = schemes.chosen(self._decided or wanted)
+        self._stepper, self._longest = choice.stepper, choice.longest
+        if self._decided is None:
+            self.why = choice.why
+            if choice.slow:
+                self.notes.append(choice.why)
+        self._decided = choice.scheme
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
