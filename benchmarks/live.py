@@ -257,8 +257,8 @@ def table(results: dict) -> str:
         "",
         "A loop of 1 kHz: each turn waits for the clock, moves the grasp and takes the steps of 1 ms.",
         "",
-        "| body | nodes | steps a turn | ms a turn: least, median, 99 %, most | begun too late by: median, 99 %, most | "
-        "turns that began more than 1 ms late |",
+        "| body | nodes | steps a turn | ms a turn: least, median, 99 %, most | begun late by: median, 99 %, most | "
+        "begun more than 1 ms late |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for one in results["loops"]:

@@ -3,10 +3,10 @@
 One thread, and the same order of all sums in each run. Positions, velocities and forces have shape (dim, n_nodes), so
 that loops over nodes use vector registers.
 
-A `body` is (columns, straight, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other elements as
-starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements of all kinds: node
-numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for each kind the
-number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,), and
+A `body` is (columns, straight, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other
+elements as starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements of all
+kinds: node numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for each
+kind the number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,), and
 undeformed volumes, across, offset and slope of the pressure (n_elements,), see `kernels.pressures`. `zero` is a tuple
 of dim zeros.
 """
@@ -92,7 +92,7 @@ def _subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
 
 
 @kernel
-def energy(x: Any, body: Any, zero: Any) -> float:
+def energy(x: Any, body: Any, zero: Any) -> Any:
     """Return the energy of a body, but for a constant [J]; finite in inverted elements, too, see `pressure`."""
     lattice, straight, constants, springs, cells = body
     total = columns.energy(x, lattice, straight, constants)

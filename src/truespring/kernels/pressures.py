@@ -41,7 +41,7 @@ def _at(y: float, across: float, offset: float, slope: float) -> Any:
 
 
 @kernel
-def pressure(ratio: float, across: float, offset: float, slope: float) -> float:
+def pressure(ratio: float, across: float, offset: float, slope: float) -> Any:
     """Return the derivative of the energy density by J [Pa], continued linearly below J = 0.1."""
     J = max(ratio, _SMALLEST) if ratio == ratio else ratio
     _, first, second = _at(math.log(J), across, offset, slope)
@@ -49,7 +49,7 @@ def pressure(ratio: float, across: float, offset: float, slope: float) -> float:
 
 
 @kernel
-def density(ratio: float, across: float, offset: float, slope: float) -> float:
+def density(ratio: float, across: float, offset: float, slope: float) -> Any:
     """Return the integral of `pressure` over J from 1 [J/m^3]."""
     J = max(ratio, _SMALLEST) if ratio == ratio else ratio
     energy, first, second = _at(math.log(J), across, offset, slope)

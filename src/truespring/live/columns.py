@@ -11,9 +11,13 @@ from truespring.mesh.rows import distinct_rows
 from truespring.potential import ConstantCells
 
 # The signs of the corners of a hexahedron along its three axes, in VTK's order, shape (8, 3).
-_CORNERS = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
+)
 # The modes a_1, a_2, a_3, h_1, h_2, h_3, g, shape (7, 8), and their order if the second axis is taken for the first.
-_MODES = np.stack([*_CORNERS.T, *(np.delete(_CORNERS, i, axis=1).prod(axis=1) for i in range(3)), _CORNERS.prod(axis=1)])
+_MODES = np.stack(
+    [*_CORNERS.T, *(np.delete(_CORNERS, i, axis=1).prod(axis=1) for i in range(3)), _CORNERS.prod(axis=1)]
+)
 _TURNED = np.array([1, 2, 0, 4, 5, 3, 6])
 # The nodes of the left column, around the first axis, and those of the right one.
 _LEFT, _RIGHT = np.array([0, 3, 7, 4]), np.array([1, 2, 6, 5])
@@ -81,7 +85,10 @@ def _modal(cells: ConstantCells) -> Floats | None:
 
 
 def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Bools, Floats]:
-    """Return columns of bricks, whether they are straight, and constants, see `kernels.columns`; `stiffness` has shape (n_elements, 7)."""
+    """Return columns of bricks, whether they are straight, and constants, see `kernels.columns`.
+
+    `stiffness` [N/m] has shape (n_elements, 7).
+    """
     from truespring.kernels.columns import CONSTANTS, GROUP, WIDTH
 
     turn, after = _rows(cells.elements)

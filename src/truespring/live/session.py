@@ -11,15 +11,25 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Amplitude, Loading
 from truespring.dynamics import Damping, Dynamics, Energies
-from truespring.equilibrium import moving_body
-from truespring.errors import LiveError
+from truespring.errors import LiveError, TruespringError
 from truespring.live.actions import Ball, Grip
-from truespring.live.commands import Command, Log, checked
 from truespring.live.choosing import Schemes
-from truespring.live.steppers import Acting, Frame, Stepper
+from truespring.live.commands import Command, Log, checked
+from truespring.live.cut import (
+    Aside,
+    Built,
+    Prepared,
+    Whole,
+    built,
+    cut_words,
+    kept_grips,
+    kept_moment,
+    kept_rows,
+    loose_parts,
+)
+from truespring.live.steppers import Acting, Frame
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import stable_step
 from truespring.motion.follow import begin_of
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
@@ -83,6 +93,22 @@ class Live:
         notes: what was assumed, and what happened, in sentences.
         why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
+
+    Example:
+        >>> import truespring as ts
+        >>> beam = ts.Problem(
+        ...     ts.box((0.04, 0.01, 0.01), (4, 1, 1)),
+        ...     ts.Material(young=3000.0, poisson=0.4, density=1000.0),
+        ...     supports=ts.Fixed(on="left"),
+        ...     loads=ts.Gravity((0.0, 0.0, -9.81)),
+        ... )
+        >>> with ts.Live(beam, ts.Springs(rule="gaussian")) as live:
+        ...     name = live.pull((0.04, 0.01, 0.01), to=(0.04, 0.012, 0.01))  # metres
+        ...     live.step(30)  # half a second
+        ...     name, round(live.time, 6), live.positions.shape
+        ('pull', 0.5, (20, 3))
+        >>> bool(live.forces["pull"][1] < 0)  # the body pulls back, down
+        True
     """
 
     def __init__(
@@ -111,9 +137,12 @@ class Live:
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
+        self._decided: str | None = None  # the scheme, once it is chosen
         self.settings = Settings(frame, scheme, step, iterations)
-        self.model, self._models = as_model(model), dict(models or {})
-        self.problem = self._stated = self._completed(problem)
+        self.model = as_model(model)
+        self.problem = self._completed(problem)
+        self._whole = self._left = Whole.of(self.problem, self.model, dict(models or {}))
+        self._aside = Aside()
         self._changes: dict[str, float] = {}
         self._gravity = 1.0 if self._own_gravity is not None else 0.0
         self.log = Log(frame)
@@ -129,6 +158,7 @@ class Live:
 
     def close(self) -> None:
         """End the session: it cannot be advanced any more."""
+        self._aside.forget()
         self._stepper.forget()
 
     def _completed(self, problem: Problem) -> Problem:
@@ -154,13 +184,14 @@ class Live:
         self._targets: dict[str, Floats] = {}
         self._forces: Floats = np.zeros((0, self.dim))
 
-    def _build(self) -> None:
-        """Build the body of the present problem and model, and choose how it moves."""
-        self._plain, self._geometry = moving_body(self.problem, self.model)
+    def _build(self, ready: Built | None = None) -> None:
+        """Build the body of the present problem and model, unless it is ready, and choose how it moves."""
+        made = built(self.problem, self.model) if ready is None else ready
+        for size in ("surface", "edge", "contact_stiffness"):
+            self.__dict__.pop(size, None)
+        self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
         self.body = self._plain
-        self._stable = stable_step(self.body)
         self._halved, self._largest = 0, 0.0
-        self._decided: str | None = None
         self._choose()
 
     def _choose(self) -> None:
@@ -234,6 +265,11 @@ class Live:
         return self._geometry
 
     @property
+    def models(self) -> Mapping[str, Model]:
+        """The models to which the command "model" changes, by name."""
+        return self._left.models
+
+    @property
     def scheme(self) -> str:
         """How steps are taken, in words."""
         return self._stepper.name
@@ -269,7 +305,13 @@ class Live:
 
     @cached_property
     def surface(self) -> tuple[Ints, Floats]:
-        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each."""
+        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each.
+
+        Of a network of springs, which has no surface, all nodes without area.
+        """
+        mesh = self.problem.mesh
+        if mesh.element == "line":
+            return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
 
     @cached_property
@@ -355,8 +397,56 @@ class Live:
         """Multiply gravity: 1 for that of the problem, or 9.81 m/s^2 against the last direction if it has none."""
         self.do("gravity", value=share)
 
+    def cut(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        depth: Sequence[float] | None = None,
+        *,
+        aside: bool = False,
+    ) -> None:
+        """Remove the elements that a plane blade passes, with their springs, volume term and mass.
+
+        Nodes that belong to no element any more are gone; the others keep their places and velocities. Loads and
+        supports stay on what remains of where they were. A blade that lies in facets between elements passes those on
+        one side, that of the vector product of the way from start to end and the depth, in the plane that to the left.
+
+        Args:
+            start: where the blade begins, on the body as it is now [m].
+            end: where it ends [m].
+            depth: how deep it passes, a vector from there [m]; None in the plane.
+            aside: build the cut body in another thread, while the body moves on; it is cut at the begin of the first
+                frame for which that is ready.
+
+        Raises LiveError for a blade without length or area, and if no element would remain; ModelError if the model
+        cannot be cut.
+        """
+        place = [*start, *end, *(() if depth is None else depth)]
+        if not aside:
+            self.do("cut", place=place)
+            return
+        command = checked(Command(self.log.frames, "cut", place=tuple(float(one) for one in place)), self.dim)
+        removed = self._left.numbers_of(command, self.positions)
+        command = replace(command, elements=tuple(removed.tolist()))
+        self._aside.begin(command, self.problem, self.model, self._prepared)
+
+    @property
+    def is_cutting(self) -> bool:
+        """Whether a cut is built in another thread."""
+        return self._aside.command is not None
+
+    @property
+    def nodes_left(self) -> Ints:
+        """Numbers in the uncut body of the nodes of the mesh, ascending, shape (n_nodes,)."""
+        return self._left.nodes
+
+    @property
+    def elements_left(self) -> Ints:
+        """Numbers in the uncut body of the elements of the mesh, ascending, shape (n_elements,)."""
+        return self._left.elements
+
     def restart(self) -> None:
-        """Bring the body back to its begin, without grasps and spheres."""
+        """Bring the body back to its begin, without cuts, grasps and spheres."""
         self.do("restart")
 
     def do(
@@ -372,22 +462,21 @@ class Live:
         self.repeat(Command(self.log.frames, kind, name, there, radius, value))
 
     def repeat(self, command: Command) -> None:
-        """Carry out a command of another session of the body before the next frame; a grasp begins where it did there.
+        """Carry out a command of another session of the body before the next frame.
 
-        The models of the two sessions may differ. Raises LiveError if the command is wrong.
+        A grasp begins where it did there, a cut removes what it removed there. The models of the two sessions may
+        differ. Raises LiveError if the command is wrong.
         """
         command = checked(replace(command, frame=self.log.frames), self.dim)
-        self._carry_out(command)
-        if command.kind == "grasp":
-            command = replace(command, begin=tuple(self._grips[command.name].begin.tolist()))
+        command = self._carried_out(command)
         if command.kind == "restart":
             self.log = Log(self.settings.frame)
         else:
             self.log.commands.append(command)
 
-    def _carry_out(self, command: Command) -> None:
-        """Carry out a command that is checked."""
-        carried: Mapping[str, Callable[[Command], None]] = {
+    def _carried_out(self, command: Command) -> Command:
+        """Carry out a command that is checked; return it with what another session needs to repeat it."""
+        carried: Mapping[str, Callable[[Command], Command | None]] = {
             "grasp": self._do_grasp,
             "sphere": self._do_sphere,
             "move": self._do_move,
@@ -397,11 +486,12 @@ class Live:
             "poisson": self._do_material,
             "damping": self._do_damping,
             "model": self._do_model,
+            "cut": self._do_cut,
             "restart": self._do_restart,
         }
-        carried[command.kind](command)
+        return carried[command.kind](command) or command
 
-    def _do_grasp(self, command: Command) -> None:
+    def _do_grasp(self, command: Command) -> Command:
         self._require_free(command.name)
         at, radius = np.array(command.place), command.radius
         assert radius is not None and command.value is not None  # see `checked`
@@ -412,6 +502,7 @@ class Live:
         self._grips[command.name] = replace(grip, begin=motion, end=motion)
         self._targets[command.name] = motion
         self._note_place(command.name)
+        return replace(command, begin=tuple(motion.tolist()))
 
     def _do_sphere(self, command: Command) -> None:
         self._require_free(command.name)
@@ -443,13 +534,19 @@ class Live:
     def _do_material(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
         self._changes[command.kind] = command.value
+        self.problem = self._changed(self._left.problem)
+        self._build()
+
+    def _changed(self, problem: Problem) -> Problem:
+        """Return a problem as stated with the present materials and dynamics."""
         stiffer, poisson = self._changes.get("young", 1.0), self._changes.get("poisson")
 
         def changed(one: Material) -> Material:
             return replace(one, young=stiffer * one.young, poisson=one.poisson if poisson is None else poisson)
 
-        self.problem = replace(_with_materials(self._stated, changed), dynamics=self._dynamics)
-        self._build()
+        if not self._changes and problem.dynamics is self._dynamics:
+            return problem
+        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -458,16 +555,50 @@ class Live:
         self._build()
 
     def _do_model(self, command: Command) -> None:
-        if command.name not in self._models:
-            raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self._models) or 'none'}")
-        self.model = self._models[command.name]
+        if command.name not in self.models:
+            raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self.models) or 'none'}")
+        self.model, self._decided = self._left.models[command.name], None
         before = self._moment
         self._build()
         if len(self.body.potential.nodes) != len(before.positions):
             self._moment = self._begin()
 
+    def _do_cut(self, command: Command) -> Command:
+        removed = self._left.numbers_of(command, self.positions)
+        command = replace(command, elements=tuple(removed.tolist()))
+        if len(removed):
+            self._take(self._aside.made(command, self.problem, self.model) or self._prepared(command), command)
+        else:
+            self.notes.append(f"{self.time:.4g} s: the blade of a cut passes no element")
+        return command
+
+    def _prepared(self, command: Command) -> Prepared:
+        """Return the body that a cut leaves, ready to move; the session is not changed."""
+        left, of = self._left.without(command, self.model)
+        problem = self._changed(left.problem)
+        return Prepared(left, of, problem, built(problem, left.model))
+
+    def _take(self, cut: Prepared, command: Command) -> None:
+        """Go on with what a cut leaves, its nodes where they are, with their velocities."""
+        before, rows = self.body.potential, kept_rows(cut.of, self.body.potential, cut.built.body.potential)
+        self._left, self.problem, self.model = cut.left, cut.problem, cut.left.model
+        self._moment = kept_moment(self._moment, rows)
+        grips = kept_grips(self._grips, rows, len(before.nodes))
+        gone = [*cut.left.lost, *(self._grips.keys() - grips.keys())]
+        self._grips = grips
+        self._targets = {name: one for name, one in self._targets.items() if name in grips or name in self._balls}
+        self._build(cut.built)
+        held = [np.flatnonzero(self.body.held[: self.problem.mesh.n_nodes].any(axis=1))]
+        held += [one.nodes for one in self._grips.values()]
+        parts = loose_parts(self.problem.mesh, np.concatenate(held))
+        self.notes.append(f"{self.time:.4g} s: {cut_words(len(command.elements or ()), *parts, gone)}")
+
     def _do_restart(self, command: Command) -> None:
+        self._aside.forget()
         self._clear()
+        if self._left is not self._whole:
+            self._left, self.model = self._whole, self._whole.model
+            self.problem = self._changed(self._whole.problem)
         self._build()
         self._moment = self._begin()
 
@@ -492,6 +623,7 @@ class Live:
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
+        self._cut_what_is_ready()
         self._aim()
         acting = self._acting
         taken = self._stepper.frame(self._moment, acting, self.steps_a_frame, self.step_length)
@@ -513,6 +645,18 @@ class Live:
             self._note_place(name)
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
+
+    def _cut_what_is_ready(self) -> None:
+        """Carry out the cut that another thread has built, if there is one."""
+        command = self._aside.ready()
+        try:
+            if command is not None:
+                self.repeat(command)
+        except TruespringError as error:  # asked in an earlier frame: nothing that asked it waits for an answer
+            self.notes.append(f"{self.time:.4g} s: {error}")
+        finally:
+            if command is not None:
+                self._aside.forget()
 
     def _aim(self) -> None:
         """Let grasps and spheres move towards where they were asked to go, at most as fast as is allowed."""
@@ -559,6 +703,8 @@ class Live:
         nodes, areas = self.surface
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
+        if not stiffest:
+            raise LiveError("a sphere needs the surface of elements, and the body is a network of springs")
         return _CONTACT * (2 / stable) ** 2 / stiffest
 
     def node_at(self, point: int | Sequence[float]) -> int:
@@ -589,7 +735,7 @@ class Live:
     @cached_property
     def _own_gravity(self) -> Floats | None:
         """The acceleration of the problem's loads on the whole body [m/s^2], shape (dim,); None without such a load."""
-        own = [one for load in self._stated.loads if (one := load.acceleration_of_body) is not None]
+        own = [one for load in self._whole.problem.loads if (one := load.acceleration_of_body) is not None]
         return np.asarray(np.sum(own, axis=0)) if own else None
 
     def _weighted(self, loading: Loading) -> Loading:
@@ -610,8 +756,7 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
     left = list(commands)
     for frame in range(frames):
         while left and left[0].frame <= frame:
-            one = left.pop(0)
-            live.do(one.kind, one.name, one.place, one.radius, one.value)
+            live.repeat(left.pop(0))
         live.step()
     return live
 
