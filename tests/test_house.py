@@ -26,6 +26,7 @@ ALLOWED = {
         "exports",
         "fibres",
         "linear",
+        "live",
         "models",
         "outputs",
         "reference",
@@ -38,6 +39,7 @@ ALLOWED = {
     },
     "live": {
         "coarsening",
+        "columns",
         "conditions",
         "dynamics",
         "equilibrium",
@@ -50,7 +52,10 @@ ALLOWED = {
         "problem",
         "richardson",
         "solvers",
+        "study",
         "tools",
+        "report",
+        "vibration",
     },
     "table1": {
         "report",
@@ -280,6 +285,9 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 

@@ -9,6 +9,7 @@ import truespring as ts
 from tests.meshes import plane_of_two, shaken, solid_of_four
 from truespring.equilibrium import moving_body
 from truespring.live import Live
+from truespring.live.actions import Weight
 from truespring.live.compiled import Compiled, fitting
 from truespring.live.steppers import Acting, StepByStep
 from truespring.motion.explicit import Leapfrog
@@ -75,7 +76,8 @@ def compiled_force(body: object, positions: np.ndarray) -> np.ndarray:
     """The internal force by no steps of the loop."""
     still = np.zeros_like(positions)
     stepper = Compiled(replace(body, loading=replace(body.loading, external_force=still, further=())), fitting(body))
-    stepper.frame(Moment(0.0, positions, still), Acting((), (), (np.zeros(0, np.int64), np.zeros(0))), 0, 1.0)
+    nothing = Acting((), (), (np.zeros(0, np.int64), np.zeros(0)), Weight(still, 0.0, 0.0))
+    stepper.frame(Moment(0.0, positions, still), nothing, 1, 0.0)
     return -stepper._last.force.T
 
 
@@ -227,8 +229,6 @@ def test_frames_of_another_state_begin_with_its_own_forces() -> None:
 
 
 def test_what_compiled_steps_take() -> None:
-    still = Acting((), (), (np.zeros(0, np.int64), np.zeros(0)))
-    assert still.stored(np.zeros((1, 3))) == 0.0
     swaying = replace(CUBE, loads=[replace(DOWN, over=[(0.0, 0.0), (1.0, 1.0)])])
     for problem, springs in ((swaying, "gaussian"), (CUBE, "isotropic")):
         assert fitting(moving_body(problem, ts.Springs(springs))[0]) is None

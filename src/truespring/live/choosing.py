@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.errors import LiveError
+from truespring.live.actions import Weight
 from truespring.live.compiled import Compiled, fitting
 from truespring.live.steppers import Acting, StepByStep, Stepper
 from truespring.motion.explicit import SAFE, Leapfrog
@@ -114,7 +115,7 @@ class Schemes:
         nodes, stepper = self.body.potential.nodes, choice.stepper
         n = min(steps, self._count(choice))
         rest = Moment(0.0, self.body.placed(nodes, 0.0), np.zeros(nodes.shape))
-        nothing = Acting((), (), (np.zeros(0, dtype=np.int64), np.zeros(0)))
+        nothing = Acting((), (), (np.zeros(0, dtype=np.int64), np.zeros(0)), Weight(np.zeros(nodes.shape), 0.0, 0.0))
         stepper.frame(rest, nothing, n, self.frame / self._count(choice))  # compiles, and sets up solvers
         shortest = np.inf
         for _ in range(_TIMES):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -45,6 +45,7 @@ class Kind(NamedTuple):
         bounds: smallest and largest value, both allowed; None without a value.
         name: whether it needs a name.
         repeats: whether a study repeats it, with the same model and material.
+        lasts: whether it still acts after a restart.
         blade: whether the place is a blade: start, end and, in space, the vector of its depth, with dim values each.
     """
 
@@ -54,6 +55,7 @@ class Kind(NamedTuple):
     bounds: tuple[float, float] | None = None
     name: bool = False
     repeats: bool = True
+    lasts: bool = False
     blade: bool = False
 
 
@@ -67,11 +69,12 @@ COMMANDS: Mapping[str, Kind] = MappingProxyType(
         "sphere": Kind("add a sphere at a place, of `value` Pa/m", place=True, radius=True, bounds=_SIZE, name=True),
         "move": Kind("move a grasp or sphere to a place", place=True, name=True),
         "release": Kind("remove a grasp, pin or sphere", name=True),
-        "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0)),
-        "young": Kind("multiply Young's moduli of the study by `value`", bounds=(1e-3, 1e3), repeats=False),
-        "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False),
-        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False),
-        "model": Kind("change to another model of the study", name=True, repeats=False),
+        "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0), lasts=True),
+        "young": Kind("multiply Young's moduli of the study by `value`", bounds=(1e-3, 1e3), repeats=False, lasts=True),
+        "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False, lasts=True),
+        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False,
+                        lasts=True),
+        "model": Kind("change to another model of the study", name=True, repeats=False, lasts=True),
         "cut": Kind("remove the elements that a blade passes: its place is start, end and, in space, depth",
                     repeats=False, blade=True),
         "restart": Kind("bring the body back to its begin, without grasps and spheres"),
@@ -129,15 +132,22 @@ class Log:
         frames: number of frames so far.
         commands: in the order of time.
         places: number of frames, name and place [m] of what moved.
+        before: commands before the begin that still act, as a changed modulus does after a restart.
     """
 
     frame: float
     frames: int = 0
     commands: list[Command] = field(default_factory=list)
     places: list[tuple[int, str, tuple[float, ...]]] = field(default_factory=list)
+    before: list[Command] = field(default_factory=list)
 
     @property
     def repeatable(self) -> int:
         """The number of frames that a study can repeat: up to the first change of model or material."""
         others = [one.frame for one in self.commands if not COMMANDS[one.kind].repeats]
         return min([self.frames, *others])
+
+    def begun_again(self) -> "Log":
+        """Return the log of a session that begins again, with the commands that still act."""
+        lasting = [replace(one, frame=-1) for one in self.commands if COMMANDS[one.kind].lasts]
+        return Log(self.frame, before=[*self.before, *lasting])

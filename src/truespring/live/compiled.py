@@ -65,25 +65,42 @@ class Compiled:
 
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
         """Return the frame after n steps of length h [s] from a state."""
-        from truespring.kernels import leapfrog
-
-        body, dim = self.body, len(self._zero)
-        loads = np.ascontiguousarray(body.loading.dead_force(last.time / body.duration))
-        external = _by_direction(loads)
-        grips, balls = _grips(acting, dim), _balls(acting, dim)
-        begin, known = self._last, self._last is not None and self._last.moment is last
-        if begin is None or not known:
-            velocity = np.where(body.held, 0.0, last.velocity)
-            begin = _State(last, _by_direction(last.positions), _by_direction(velocity), np.zeros_like(external))
+        dim, dead = len(self._zero), self.body.loading.dead_force(last.time / self.body.duration)
+        begin = self._last
+        if begin is None or begin.moment is not last:
+            begin = self._begun(last, acting, dead)
         x, v, force, account = begin.positions.copy(), begin.velocity.copy(), begin.force.copy(), np.zeros(2)
-        held = np.zeros_like(grips[-1]), np.zeros_like(balls[-1])
-        acts = (external, self._arrays, grips, balls, held, account)
-        leapfrog.steps(n, h, body.damping.mass, x, v, force, self._inverse, *acts, self._zero, known)
+        held = np.zeros((len(acting.grips), dim)), np.zeros((len(acting.balls), dim))
+        grips, balls = _grips(acting, dim), _balls(acting, dim)
+        loads, done = _by_direction(dead + acting.weight.at(0.0)), 0.0
+        parts = n if acting.weight.moves else 1  # the loop has constant loads
+        for part in range(parts):
+            ends, before, there = (part / parts, (part + 1) / parts), loads, x.copy()
+            loads = _by_direction(dead + acting.weight.at(ends[1]))
+            moving = _between(grips, *ends), _between(balls, *ends)
+            self._loop(n // parts, h, (x, v, force), loads, (*moving, held, account))
+            done += float(((before + loads) * (x - there)).sum()) / 2
         moment = Moment(last.time + n * h, np.ascontiguousarray(x.T), np.ascontiguousarray(v.T))
         self._last = _State(moment, x, v, force)
-        done, damped = account
-        done += float((loads * (moment.positions - last.positions)).sum())
-        return Frame(moment, float(done), float(damped), np.concatenate(held))
+        return Frame(moment, done + float(account[0]), float(account[1]), np.concatenate(held))
+
+    def _begun(self, last: Moment, acting: Acting, dead: Floats) -> _State:
+        """Return a state with the forces on it, those of what acts at its time already."""
+        x, v = _by_direction(last.positions), _by_direction(np.where(self.body.held, 0.0, last.velocity))
+        older, dim, force = acting.older(last.time), len(self._zero), np.zeros_like(x)
+        held = np.zeros((len(older.grips), dim)), np.zeros((len(older.balls), dim))
+        acts = (_grips(older, dim), _balls(older, dim), held, np.zeros(2))
+        self._loop(0, 0.0, (x, v, force), _by_direction(dead + acting.weight.at(0.0)), acts, known=False)
+        return _State(last, x, v, force)
+
+    def _loop(
+        self, n: int, h: float, state: tuple[Floats, ...], loads: Floats, acts: tuple[Any, ...], known: bool = True
+    ) -> None:
+        """Take n steps; arguments as of `kernels.leapfrog.steps`."""
+        from truespring.kernels import leapfrog
+
+        alpha, body = self.body.damping.mass, self._arrays
+        leapfrog.steps(n, h, alpha, *state, self._inverse, loads, body, *acts, self._zero, known)
 
 
 def fitting(body: Body) -> tuple[ConstantCells, ...] | None:
@@ -124,3 +141,9 @@ def _balls(acting: Acting, dim: int) -> tuple[Any, ...]:
         stacked([one.begin for one in balls], dim),
         stacked([one.end for one in balls], dim),
     )
+
+
+def _between(arrays: tuple[Any, ...], begin: float, end: float) -> tuple[Any, ...]:
+    """Return arrays whose last two are the places at the begin and the end of a frame for a part of it."""
+    *others, first, last = arrays
+    return (*others, first + begin * (last - first), first + end * (last - first))

@@ -134,7 +134,7 @@ def _grasp(grasp: Grasp, problem: Problem, of: Remainder) -> Grasp | None:
     there = numbers >= 0
     if not there.any():
         return None
-    known = (grasp.name, grasp.at, grasp.radius, grasp.path, grasp.stiffness)
+    known = (grasp.name, grasp.at, grasp.radius, grasp.path, grasp.stiffness, grasp.during, grasp.origin)
     return HeldPatch(*known, tuple(numbers[there].tolist()), tuple(stiffness[there].tolist()))
 
 

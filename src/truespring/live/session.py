@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Amplitude, Loading
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
-from truespring.live.actions import Ball, Grip
+from truespring.live.actions import Ball, Grip, Weight
 from truespring.live.choosing import Schemes
 from truespring.live.commands import Command, Log, checked
 from truespring.live.cut import (
@@ -31,6 +30,7 @@ from truespring.live.steppers import Acting, Frame
 from truespring.material import Material
 from truespring.models import Model, as_model
 from truespring.motion.follow import begin_of
+from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -79,6 +79,26 @@ class Settings:
     iterations: int = 0
 
 
+class Begun(NamedTuple):
+    """What a session begins with, at first or after a restart.
+
+    Attributes:
+        problem: the completed problem, with changed material and damping.
+        model: the model.
+        gravity: the share of gravity [-].
+        scheme: the scheme, a word of `Dynamics`.
+        longest: the longest time step [s].
+        start: "rest", or "equilibrium" if that was found.
+    """
+
+    problem: Problem
+    model: Model
+    gravity: float
+    scheme: str
+    longest: float
+    start: str
+
+
 class Live:
     """A body that moves while it is pulled, pushed and pinned: call `pull` and the like, then `step`.
 
@@ -93,6 +113,7 @@ class Live:
         notes: what was assumed, and what happened, in sentences.
         why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
+        begun: what the session begins with.
 
     Example:
         >>> import truespring as ts
@@ -149,6 +170,7 @@ class Live:
         self._clear()
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def __enter__(self) -> Self:
         return self
@@ -190,18 +212,18 @@ class Live:
         for size in ("surface", "edge", "contact_stiffness"):
             self.__dict__.pop(size, None)
         self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
-        self.body = self._plain
+        self._weight = self._weight_of(self._gravity)
+        self.body = self._weighted()
         self._halved, self._largest = 0, 0.0
         self._choose()
 
     def _choose(self) -> None:
-        """Choose how steps are taken, under the present gravity."""
-        self.body = replace(self._plain, loading=self._weighted(self._plain.loading))
+        """Choose how steps are taken."""
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
         step = float(asked) if isinstance(asked, int | float) else None
-        schemes = Schemes(self.body, self._geometry, self._stable, settings.frame, step, settings.iterations)
+        schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
         choice = schemes.chosen(self._decided or wanted)
         self._stepper, self._longest = choice.stepper, choice.longest
         if self._decided is None:
@@ -213,7 +235,7 @@ class Live:
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
         begin = begin_of(self.body, self._dynamics, Newton(), None, self._geometry)
-        positions = begin.positions
+        positions, self._start = begin.positions, self._dynamics.start if begin.converged else "rest"
         if not begin.converged:
             self.notes.append(f"{begin.reason}; it begins undeformed")
             positions = self.body.placed(self.body.potential.nodes, 0.0)
@@ -221,6 +243,10 @@ class Live:
         if self._dynamics.velocity is not None:
             velocity = np.where(self.body.held, 0.0, self._dynamics.velocity)
         return Moment(0.0, positions, velocity)
+
+    def _begun(self) -> Begun:
+        """Return what the session begins with, for its record."""
+        return Begun(self.problem, self.model, self._gravity, self.scheme.split(",")[0], self._longest, self._start)
 
     # --- what it is ---------------------------------------------------------------------------------------------
 
@@ -270,6 +296,11 @@ class Live:
         return self._left.models
 
     @property
+    def gravity_share(self) -> float:
+        """What gravity is multiplied by, see `gravity`."""
+        return self._gravity
+
+    @property
     def scheme(self) -> str:
         """How steps are taken, in words."""
         return self._stepper.name
@@ -277,8 +308,12 @@ class Live:
     @property
     def steps_a_frame(self) -> int:
         """The number of steps of a frame."""
-        longest = self._longest / 2**self._halved
-        return max(1, int(np.ceil(self.settings.frame / longest - _SAME)))
+        return steps_in(self.settings.frame, self._longest / 2**self._halved)
+
+    @property
+    def halved(self) -> bool:
+        """Whether the step was halved because energy rose without work."""
+        return self._halved > 0
 
     @property
     def step_length(self) -> float:
@@ -470,7 +505,7 @@ class Live:
         command = checked(replace(command, frame=self.log.frames), self.dim)
         command = self._carried_out(command)
         if command.kind == "restart":
-            self.log = Log(self.settings.frame)
+            self.log = self.log.begun_again()
         else:
             self.log.commands.append(command)
 
@@ -497,7 +532,7 @@ class Live:
         assert radius is not None and command.value is not None  # see `checked`
         body, still = self.problem.body, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
-        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still)
+        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still, self.time)
         motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
         self._grips[command.name] = replace(grip, begin=motion, end=motion)
         self._targets[command.name] = motion
@@ -508,7 +543,7 @@ class Live:
         self._require_free(command.name)
         centre = np.array(command.place)
         assert command.radius is not None and command.value is not None  # see `checked`
-        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre)
+        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre, self.time)
         self._targets[command.name] = centre
         self._note_place(command.name)
 
@@ -529,7 +564,7 @@ class Live:
     def _do_gravity(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
         self._gravity = command.value
-        self._choose()
+        self._weight = replace(self._weight, end=self._weight_of(command.value).end)
 
     def _do_material(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -601,6 +636,7 @@ class Live:
             self.problem = self._changed(self._whole.problem)
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def _require_free(self, name: str) -> None:
         """Raise LiveError if a grasp or sphere has a name."""
@@ -619,7 +655,7 @@ class Live:
 
     @property
     def _acting(self) -> Acting:
-        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface)
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface, self._weight)
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
@@ -645,6 +681,9 @@ class Live:
             self._note_place(name)
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
+        if self._weight.moves:
+            self._weight = self._weight.settled
+            self.body = self._weighted()
 
     def _cut_what_is_ready(self) -> None:
         """Carry out the cut that another thread has built, if there is one."""
@@ -738,17 +777,28 @@ class Live:
         own = [one for load in self._whole.problem.loads if (one := load.acceleration_of_body) is not None]
         return np.asarray(np.sum(own, axis=0)) if own else None
 
-    def _weighted(self, loading: Loading) -> Loading:
-        """Return a loading with the present share of gravity."""
-        own = self._own_gravity
+    @property
+    def full_gravity(self) -> Floats:
+        """The acceleration of gravity at share 1 [m/s^2], shape (dim,)."""
         down = np.zeros(self.dim)
         down[-1] = -GRAVITY
-        more = self._gravity * down if own is None else (self._gravity - 1) * own
-        if not more.any():
-            return loading
-        force, still = self._plain.mass[:, None] * more, np.zeros(loading.displacement.shape)
-        added = Loading(force, loading.held, still, amplitude=Amplitude((0.0,), (1.0,), self._plain.duration))
-        return replace(loading, further=(*loading.further, added))
+        return down if self._own_gravity is None else self._own_gravity
+
+    def _weight_of(self, share: float) -> Weight:
+        """Return the weight beyond the loads of the problem at a share of gravity."""
+        more = share if self._own_gravity is None else share - 1
+        return Weight(self._plain.mass[:, None] * self.full_gravity, more, more)
+
+    def _weighted(self) -> Body:
+        """Return the body with the present weight."""
+        plain = self._plain
+        loading = self._weight.settled.added_to(plain.loading, (0.0, plain.duration), plain.duration)
+        return replace(plain, loading=loading)
+
+
+def steps_in(frame: float, longest: float) -> int:
+    """Return the number of steps of a frame [s] of at most a length [s]."""
+    return max(1, int(np.ceil(frame / longest - _SAME)))
 
 
 def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:

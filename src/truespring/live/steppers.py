@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-import numpy as np
-
 from truespring.arrays import Floats, Ints
-from truespring.live.actions import Ball, Grip, stacked
+from truespring.conditions import Loading
+from truespring.live.actions import Ball, Grip, Weight, stacked
 from truespring.motion.advance import Advance, Scheme
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
@@ -22,11 +21,18 @@ class Acting:
         grips: grasps.
         balls: spheres.
         surface: nodes of the surface that spheres touch, and their areas [m^2], shape (n,) each.
+        weight: gravity beyond that of the loads.
     """
 
     grips: tuple[Grip, ...]
     balls: tuple[Ball, ...]
     surface: tuple[Ints, Floats]
+    weight: Weight
+
+    def older(self, time: float) -> "Acting":
+        """Return what acts at a time [s] already: what is added then acts after it."""
+        grips = tuple(one for one in self.grips if one.since < time)
+        return replace(self, grips=grips, balls=tuple(one for one in self.balls if one.since < time))
 
     def stored(self, positions: Floats) -> float:
         """Return the energy of grasps and contacts at the end of the frame [J]."""
@@ -96,10 +102,10 @@ class StepByStep:
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
         """Return the frame after n steps of length h [s] from a state."""
         body, span = self._body, self._body.duration
-        nodes, times = body.potential.nodes, (last.time, last.time + n * h)
-        own: list[Any] = [one.interaction(nodes, times, span) for one in acting.grips]
-        own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
-        loading = replace(body.loading, interactions=(*body.loading.interactions, *own))
+        times = last.time, last.time + n * h
+        self._scheme.body = replace(body, loading=self._loading(acting.older(last.time), times))
+        self._scheme.ready(last)
+        loading = self._loading(acting, times)
         self._scheme.body = replace(body, loading=loading)
         account = Account()
         account.open(loading, last.positions, last.time / span)
@@ -107,13 +113,22 @@ class StepByStep:
         for _ in range(n):
             taken = self._scheme.advance(history, h, account)
             if not isinstance(taken, Advance):
-                return Frame(last, 0.0, 0.0, np.zeros((len(own), nodes.shape[1])), solved=False)
+                return Frame(last, 0.0, 0.0, stacked([], last.positions.shape[1]), solved=False)
             account, history = taken.account, History(taken.moment, history.last)
         self._before = history.before
         level = history.last.time / span
         touches = loading.touches(history.last.positions, level)[len(body.loading.interactions) :]
-        forces = stacked([one.force for one in touches], nodes.shape[1])
+        forces = stacked([one.force for one in touches], last.positions.shape[1])
         return Frame(history.last, account.done, account.damped, forces)
+
+    def _loading(self, acting: Acting, times: tuple[float, float]) -> Loading:
+        """Return the loads of the body with what acts in a frame from a time to another [s]."""
+        body, span = self._body, self._body.duration
+        nodes = body.potential.nodes
+        own: list[Any] = [one.interaction(nodes, times, span) for one in acting.grips]
+        own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
+        loading = acting.weight.added_to(body.loading, times, span)
+        return replace(loading, interactions=(*loading.interactions, *own))
 
 
 def names(one: Sequence[Grip | Ball]) -> tuple[str, ...]:
