@@ -38,6 +38,7 @@ class Compiled:
     """Steps of leapfrog in one compiled loop."""
 
     name = "leapfrog, compiled"
+    before: Moment | None = None
 
     def __init__(self, body: Body, springs: Sequence[ConstantCells]) -> None:
         """Store what the loop reads."""
