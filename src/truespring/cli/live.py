@@ -1,6 +1,7 @@
 """The verb `live`: a session of a study in a browser."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from truespring.cli.printing import say, show, writing
@@ -71,6 +72,7 @@ def _run(options: argparse.Namespace) -> int:
 
     def known(address: str) -> None:
         show(address)
+        sys.stdout.flush()  # a script waits for it
         if not options.no_browser:
             import webbrowser
 
