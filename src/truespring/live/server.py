@@ -207,6 +207,7 @@ def listening(port: int) -> socket.socket:
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         own.bind((ADDRESS, port))
+        own.listen()  # what connects before the server runs waits for it
     except OSError as error:
         own.close()
         raise LiveError(f"port {port}: {error.strerror}: choose another port, or none for a free one") from None
