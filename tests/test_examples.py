@@ -20,6 +20,8 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 NAMES = ("stretching", "bending", "soft_block", "tissue", "muscle")
 # Studies of motions.
 MOVING = ("gripped_block", "liver_probe")
+# Programs around live sessions: tests/test_live_python.py and tests/test_live_haptic.py run them.
+LIVE = ("gym_loop", "haptic_client")
 
 
 @cache
@@ -41,7 +43,7 @@ def script(name: str) -> ModuleType:
 
 def test_every_example_is_run_here() -> None:
     names = {file.stem for file in EXAMPLES.iterdir() if file.is_file() and file.suffix != ".csv"}
-    assert names == {*NAMES, *MOVING, "truss", "organ", "six_methods", "cantilever_modes"}
+    assert names == {*NAMES, *MOVING, *LIVE, "truss", "organ", "six_methods", "cantilever_modes"}
 
 
 @pytest.mark.verification

@@ -26,6 +26,7 @@ ALLOWED = {
         "exports",
         "fibres",
         "linear",
+        "live",
         "models",
         "outputs",
         "reference",
@@ -38,17 +39,23 @@ ALLOWED = {
     },
     "live": {
         "coarsening",
+        "columns",
         "conditions",
         "dynamics",
         "equilibrium",
+        "loading",
         "material",
+        "mesh",
         "models",
         "motion",
         "potential",
         "problem",
         "richardson",
         "solvers",
+        "study",
         "tools",
+        "report",
+        "vibration",
     },
     "table1": {
         "report",
@@ -289,6 +296,9 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 
