@@ -6,8 +6,10 @@ Every file is read by another reader than its writer: MuJoCo itself, ElementTree
 import ast
 import io
 import json
+import os
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,8 +27,9 @@ from scipy.sparse.linalg import spsolve
 
 import truespring as ts
 from tests.calculix import displacements
-from tests.exports import CASES, difference, expected, exported
+from tests.exports import CASES, difference, expected, exported, write
 from tests.studies import changed, written
+from tests.test_export_surfaces import Glb, from_obj
 from tests.wording import in_order
 from truespring.arrays import Floats
 from truespring.cli import main
@@ -657,12 +660,12 @@ def test_what_no_target_has_is_an_error_before_anything_is_solved(
         with pytest.raises(ExportError) as raised:
             ts.export(problem, springs, target, tmp_path)
         assert in_order(str(raised.value), TARGETS[target].program, *words)
-    for write in (
+    for make in (
         lambda: fem_deck(problem, [1.0], "saint-venant-kirchhoff"),
         lambda: spring_deck(problem, springs.potential(problem), [1.0]),
     ):
         with pytest.raises(ExportError) as raised:
-            write()
+            make()
         assert in_order(str(raised.value), *words)
     assert not list(tmp_path.iterdir())
 
@@ -722,10 +725,51 @@ def _by_arrays(values: Mapping[str, Any]) -> Floats:
     return here - nodes
 
 
+def _by_warp(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    """In float64, in a process of its own."""
+    pytest.importorskip("warp", reason="Warp is not installed: pip install 'truespring[warp]'")
+    write(files, folder)
+    ask = "import numpy, springs_warp as s; b = s.Springs(device='cpu'); b.settle(4.0); numpy.save('x', b.positions())"
+    subprocess.run(
+        [sys.executable, "-c", ask],
+        cwd=folder,
+        env=os.environ | {"SPRINGS_FLOAT64": "1", "PYTHONPATH": str(folder)},
+        check=True,
+        capture_output=True,
+    )
+    return np.asarray(np.load(folder / "x.npy") - in_space(exported("bending").problem.mesh.nodes))
+
+
+def _by_gltf(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    """The last morph target; of a plane body all nodes are shown."""
+    file = Glb(bytes(files["surface.glb"]))  # type: ignore[arg-type]
+    (primitive,) = file.json["meshes"][0]["primitives"]
+    return np.asarray(file.array(primitive["targets"][-1]["POSITION"]))
+
+
+def _by_obj(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    return from_obj(str(files["deformed.obj"]))[0] - from_obj(str(files["rest.obj"]))[0]
+
+
+def _by_usd(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    pxr = pytest.importorskip("pxr", reason="usd-core is not installed")
+    from pxr import Usd, UsdGeom
+
+    assert pxr
+    write(files, folder)
+    stage = Usd.Stage.Open(str(folder / "surface.usda"))
+    points = UsdGeom.Mesh(stage.GetDefaultPrim()).GetPointsAttr()
+    return np.array(points.Get()) - np.array(points.Get(0))
+
+
 #: How a file is run, by target.
 RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "calculix": _by_calculix,
     "mujoco": _by_mujoco,
+    "warp": _by_warp,
+    "gltf": _by_gltf,
+    "obj": _by_obj,
+    "usd": _by_usd,
     "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
     "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
 }
@@ -743,7 +787,10 @@ def test_every_target_is_run_or_says_why_not() -> None:
     assert RUNS.keys() == {name for name, target in TARGETS.items() if not target.unrun}
 
 
-@pytest.mark.parametrize("target", RUNS)
+_SLOW = {"warp": pytest.mark.verification}  # its kernels are compiled
+
+
+@pytest.mark.parametrize("target", [pytest.param(one, marks=[_SLOW[one]] if one in _SLOW else []) for one in RUNS])
 def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
     if target == "calculix" and shutil.which("ccx") is None:
         pytest.skip("CalculiX is not installed")

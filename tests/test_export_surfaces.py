@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from tests.exports import exported
+from tests.exports import exported, write
 from truespring.arrays import Floats
 from truespring.exports import Exported, solve_springs, target_files
 from truespring.mesh import Mesh
@@ -163,9 +163,7 @@ def test_usd_has_a_time_sample_of_each_level(name: str, tmp_path: Path) -> None:
     assert pxr
     one = bodies()[name]
     levels, chosen = levels_of(one), surface_nodes(one.problem.mesh)
-    file = tmp_path / "surface.usda"
-    file.write_text(str(target_files(one, ["usd"])["usd"]["surface.usda"]), encoding="utf-8")
-    stage = Usd.Stage.Open(str(file))
+    stage = Usd.Stage.Open(str(write(target_files(one, ["usd"])["usd"], tmp_path) / "surface.usda"))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1 and one.path.label in stage.GetMetadata("documentation")
     prim = stage.GetDefaultPrim()
     shape = UsdGeom.BasisCurves(prim) if name == "lines" else UsdGeom.Mesh(prim)
