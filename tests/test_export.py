@@ -26,6 +26,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import truespring as ts
+from tests.c_runtime import opened
 from tests.calculix import displacements
 from tests.exports import CASES, difference, expected, exported, write
 from tests.studies import changed, written
@@ -762,6 +763,13 @@ def _by_usd(files: Mapping[str, str | bytes], folder: Path) -> Floats:
     return np.array(points.Get()) - np.array(points.Get(0))
 
 
+def _by_c(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    with opened(bytes(files["body.bin"])) as body:  # type: ignore[arg-type]
+        body.call("reset", 0.0)
+        assert body.call("settle", 1e-10, 100_000) > 0
+        return np.asarray(body.x - in_space(exported("bending").problem.mesh.nodes))
+
+
 #: How a file is run, by target.
 RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "calculix": _by_calculix,
@@ -770,6 +778,7 @@ RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "gltf": _by_gltf,
     "obj": _by_obj,
     "usd": _by_usd,
+    "c": _by_c,
     "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
     "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
 }
@@ -792,8 +801,9 @@ _SLOW = {"warp": pytest.mark.verification}  # its kernels are compiled
 
 @pytest.mark.parametrize("target", [pytest.param(one, marks=[_SLOW[one]] if one in _SLOW else []) for one in RUNS])
 def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
-    if target == "calculix" and shutil.which("ccx") is None:
-        pytest.skip("CalculiX is not installed")
+    program = {"calculix": "ccx", "c": "cc"}.get(target)
+    if program is not None and shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
     found = RUNS[target](target_files(exported("bending"), [target])[target], tmp_path)
     assert difference(found, "bending") < 1e-6
 

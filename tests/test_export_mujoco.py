@@ -145,7 +145,10 @@ def test_the_surface_is_drawn_from_the_bodies(drive: Any) -> None:
     assert "<flex" not in str(springs)
 
 
-_BALL = '<body name="ball" pos="0.02 {y} 0.02"><joint type="slide" axis="0 1 0"/><geom type="sphere" size="0.012" mass="0.01"/></body>'
+_BALL = (
+    '<body name="ball" pos="0.02 {y} 0.02"><joint type="slide" axis="0 1 0"/>'
+    '<geom type="sphere" size="0.012" mass="0.01"/></body>'
+)
 
 
 @pytest.mark.verification

@@ -214,7 +214,11 @@ ALLOWED = {
         "problem",
         "loading",
         "mesh",
+        "material",
         "conditions",
+        "dynamics",
+        "motion",
+        "tools",
     },
     "equilibrium": {
         "coarsening",

@@ -23,12 +23,22 @@ SPEEDS = (0.01, 10.0)
 _STILL, _LOOK = 0.01, 6
 # Time between looks at the orders while the session is paused [s].
 _IDLE = 0.05
+# Kinds of ghosts that are shown.
+_SHOWN = ("rest", "moving")
+# A body of more nodes is cut aside.
+_LARGE = 3000
 # Number of messages of the loop that are kept.
 _MESSAGES = 50
 
 
 class Companion(Protocol):
-    """A reference that follows a session in another process."""
+    """A reference that follows a session in another process.
+
+    Attributes:
+        notes: what happened since they were cleared, in sentences.
+    """
+
+    notes: list[str]
 
     def tell(self, command: Command) -> None:
         """Take a command of the session."""
@@ -198,11 +208,14 @@ class Loop:
 
     def _compare(self) -> None:
         """Compare the news of the twin with the session at equal times."""
+        if self._twin is not None and self._twin.notes:
+            self.messages.extend(self._twin.notes)
+            self._twin.notes.clear()
         for ghost in () if self._twin is None else self._twin.news():
             if self._gauge is not None:
                 self._gauge.take(ghost, self.ring)
             own = self.ring.at(ghost.time)
-            if ghost.kind == "finer" or own is None or own.shape != ghost.positions.shape:
+            if ghost.kind not in _SHOWN or own is None or own.shape != ghost.positions.shape:
                 continue
             apart = np.linalg.norm(ghost.positions - own, axis=1)
             self._numbers += 1
@@ -218,6 +231,7 @@ class Loop:
             "pull": lambda one: self.live.pull(self._node(one), name=one.name),
             "push": lambda one: self.live.push(one.place, name=one.name, radius=one.radius),
             "pin": self._pin,
+            "cut": self._cut,
             "let-go": self._let_go,
             "release-all": self._release_all,
             "pause": lambda _: self._set_running(False),
@@ -251,6 +265,12 @@ class Loop:
         self.live.pin(self._node(order), name=order.name)
         self.pins.add(order.name)
 
+    def _cut(self, order: Order) -> None:
+        """Cut; a large body is built aside, while it moves on."""
+        start, end, *depth = np.reshape(order.place, (-1, self.live.dim)).tolist()
+        self.live.cut(start, end, *depth, aside=self.live.problem.mesh.n_nodes > _LARGE)
+        self.messages.append("the body was cut: a recording ends before the first cut")
+
     def _let_go(self, order: Order) -> None:
         """Release what may have been released already."""
         if order.name in self._held():
@@ -283,6 +303,10 @@ class Loop:
         self.messages.append(self._save(self.live))
 
     # --- making known -------------------------------------------------------------------------------------------
+
+    def show(self) -> None:
+        """Make known the present state of a session that was advanced from outside, in the thread of the session."""
+        self._publish(fresh=True)
 
     def _publish(self, fresh: bool) -> None:
         """Make known the present state; `fresh` with readouts of this moment."""
