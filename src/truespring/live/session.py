@@ -12,6 +12,7 @@ from truespring.arrays import Floats, Ints
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
 from truespring.live.actions import Ball, Grip, HasBody, Weight
+from truespring.live.choosing import Schemes
 from truespring.live.commands import Command, Log, checked
 from truespring.live.completed import completed, with_materials
 from truespring.live.cut import (
@@ -27,13 +28,11 @@ from truespring.live.cut import (
     loose_parts,
 )
 from truespring.live.state import State
-from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.live.steppers import Acting, Frame
 from truespring.loading import Body as LoadedBody
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import SAFE, Leapfrog
-from truespring.motion.follow import balance_of, begin_of
-from truespring.motion.implicit import Implicit
+from truespring.motion.follow import begin_of
 from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
@@ -113,6 +112,7 @@ class Live:
         model: the model.
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
+        why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
         begun: what the session begins with.
 
@@ -151,13 +151,15 @@ class Live:
             model: the model of the body.
             models: models to which the command "model" changes, by name.
             frame: time between frames [s].
-            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog unless it has no stable step.
+            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog, unless it has no stable
+                step, or takes longer than a frame and bdf2 takes less.
             step: longest time step [s]; "auto" for that of the problem, or half of leapfrog's stable step.
             iterations: Newton iterations of each step of an implicit scheme; 0 solves it.
 
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
+        self._decided: str | None = None  # the scheme, once it is chosen
         self.settings = Settings(frame, scheme, step, iterations)
         self.model = as_model(model)
         self.problem, notes = completed(problem)
@@ -212,20 +214,15 @@ class Live:
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
-        self._stepper: Stepper
-        if wanted == "leapfrog" or (wanted == "auto" and self._stable > 0):
-            if not self._stable:
-                raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
-            safe = SAFE * self._stable
-            self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self._plain)
-            plain = StepByStep(Leapfrog(self._plain), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self._plain, springs)
-            return
-        scheme = "bdf2" if wanted == "auto" else wanted
-        self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
-        balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self._plain, balance, scheme, settings.iterations), scheme)
+        step = float(asked) if isinstance(asked, int | float) else None
+        schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
+        choice = schemes.chosen(self._decided or wanted)
+        self._stepper, self._longest = choice.stepper, choice.longest
+        if self._decided is None:
+            self.why = choice.why
+            if choice.slow:
+                self.notes.append(choice.why)
+        self._decided = choice.scheme
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
@@ -618,7 +615,7 @@ class Live:
     def _do_model(self, command: Command) -> None:
         if command.name not in self.models:
             raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self.models) or 'none'}")
-        self.model = self._left.models[command.name]
+        self.model, self._decided = self._left.models[command.name], None
         before = self._moment
         self._build()
         if len(self.body.potential.nodes) != len(before.positions):
@@ -744,7 +741,7 @@ class Live:
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
-        return self._kinetic(moment) + self.body.potential.energy(moment.positions) + acting.stored(moment.positions)
+        return self._kinetic(moment) + self._stepper.elastic(moment.positions) + acting.stored(moment.positions)
 
     def _kinetic(self, moment: Moment) -> float:
         return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2
