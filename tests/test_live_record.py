@@ -9,7 +9,6 @@ import pytest
 import truespring as ts
 from truespring.errors import LiveError, StudyError
 from truespring.live import Live
-from truespring.live.opening import opened as open_session
 from truespring.live.record import read_session, replay, write_session
 from truespring.study import Study, read_study, run
 
@@ -222,16 +221,6 @@ def test_files_beside_the_study_are_found_from_another_folder(tmp_path: Path) ->
     )
     assert away(solved(tmp_path / "a" / "b", live), live) < 1e-12
     assert np.array_equal(replay(tmp_path / "a" / "b").positions, live.positions)
-
-
-def test_what_is_opened_with_a_folder_is_recorded(tmp_path: Path) -> None:
-    study = study_of(tmp_path)
-    loop, _ = open_session(study.file, coarsen=1, twin=False, folder=tmp_path / "out")
-    loop.live.step(2)
-    assert loop.record().endswith("session.toml, pull.csv, study.toml")
-    assert read_study(tmp_path / "out" / "session.toml").problem.duration == pytest.approx(2 / 60)
-    loop, _ = open_session(study.file, coarsen=1, twin=False)
-    assert loop.record() == ""
 
 
 @LONG

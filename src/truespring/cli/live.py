@@ -80,8 +80,6 @@ def _run(options: argparse.Namespace) -> int:
         for line in (*loop.messages, *loop.live.notes):
             say(f"note: {line}")
     serve(loop, title, port=options.port, seconds=options.seconds, opened=known)
-    if written := loop.record():
-        say(written)
     return CONVERGED
 
 

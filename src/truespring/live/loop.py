@@ -145,10 +145,6 @@ class Loop:
         if self._twin is not None:
             self._twin.close()
 
-    def record(self) -> str:
-        """Write the session to its folder after it has stopped; return what was written, empty without a folder."""
-        return "" if self._save is None else self._save(self.live)
-
     # --- the thread ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:

@@ -1,13 +1,11 @@
 """Open a study as a session with its loop."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from truespring.errors import LiveError
 from truespring.live.coarsened import coarsened
 from truespring.live.loop import Loop
 from truespring.live.measured import Measures
-from truespring.live.record import write_session
 from truespring.live.session import Live
 from truespring.live.twin import Twin
 from truespring.models import Fem
@@ -42,23 +40,10 @@ def opened(
     live = Live(study.problem, study.entries[name], models=models)
     right = _reference(study, reference) if twin else None
     if right is None:
-        return Loop(live, model=name, about=found.notes, save=_saving(study, folder)), study.title
+        return Loop(live, model=name, about=found.notes), study.title
     beside = Twin(live, study.entries[right])
     about = (*found.notes, f"the reference is '{right}'")
-    gauge, save = Measures(live, beside), _saving(study, folder)
-    return Loop(live, model=name, twin=beside, gauge=gauge, about=about, save=save), study.title
-
-
-def _saving(study: Study, folder: Path | None) -> Callable[[Live], str] | None:
-    """Return the function that writes a session of a study to a folder; None without one."""
-    if folder is None:
-        return None
-
-    def save(live: Live) -> str:
-        files = write_session(live, study, folder)
-        return f"written to {folder}: {', '.join(file.name for file in files)}"
-
-    return save
+    return Loop(live, model=name, twin=beside, gauge=Measures(live, beside), about=about), study.title
 
 
 def _reference(study: Study, name: str | None) -> str | None:
