@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from truespring.errors import LiveError, TruespringError
+from truespring.live.completed import completed
+from truespring.live.resting import resting
 from truespring.live.session import Live
-from truespring.live.standing import resting
 from truespring.models import Model
 from truespring.problem import Problem
 from truespring.report.quantity import quantity
@@ -68,7 +69,7 @@ def coarsened(text: StudyText, factor: float | str, model: str | None = None) ->
 
 def cost(problem: Problem, model: Model) -> float:
     """Return the time that a frame takes on this machine over the time between frames [-], without loads."""
-    live = Live(resting(problem), model)
+    live = Live(resting(completed(problem)[0]), model)
     live.step()  # compiles
     taken = []
     for _ in range(_FRAMES):

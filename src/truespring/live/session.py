@@ -14,6 +14,7 @@ from truespring.errors import LiveError, TruespringError
 from truespring.live.actions import Ball, Grip, HasBody, Weight
 from truespring.live.choosing import Schemes
 from truespring.live.commands import Command, Log, checked
+from truespring.live.completed import completed, with_materials
 from truespring.live.cut import (
     Aside,
     Built,
@@ -26,7 +27,6 @@ from truespring.live.cut import (
     kept_rows,
     loose_parts,
 )
-from truespring.live.standing import standing
 from truespring.live.state import State
 from truespring.live.steppers import Acting, Frame
 from truespring.loading import Body as LoadedBody
@@ -43,8 +43,6 @@ from truespring.tools.surface import surface
 
 #: Time between frames by default [s].
 FRAME = 1 / 60
-#: Density of a body without one: that of water [kg/m^3].
-WATER = 1000.0
 #: Gravity of a body without such a load [m/s^2], against the last direction.
 GRAVITY = 9.81
 # Radius of a grasp by default: the larger of these shares of a typical edge and of the size of the body.
@@ -163,10 +161,12 @@ class Live:
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
-        self._decided: str | None = None  # the scheme, once it is chosen
+        self._decided: str | None = None  # the scheme of "auto", once it is chosen
+        self.why = ""
         self.settings = Settings(frame, scheme, step, iterations)
         self.model = as_model(model)
-        self.problem = self._completed(problem)
+        self.problem, notes = completed(problem)
+        self.notes.extend(notes)
         self._whole = self._left = Whole.of(self.problem, self.model, dict(models or {}))
         self._aside = Aside()
         self._changes: dict[str, float] = {}
@@ -188,20 +188,10 @@ class Live:
         self._aside.forget()
         self._stepper.forget()
 
-    def _completed(self, problem: Problem) -> Problem:
-        """Return a problem with density and dynamics."""
-        if problem.material is not None and any(one.density is None for one in problem.materials):
-            self.notes.append(f"no density is given: that of water, {WATER:g} kg/m^3, is taken")
-            problem = _with_materials(problem, lambda one: replace(one, density=one.density or WATER))
-        if problem.dynamics is None:
-            self.notes.append("no dynamics are given: the body begins at its equilibrium, without damping")
-            problem = standing(problem)
-        return problem
-
     @property
     def _dynamics(self) -> Dynamics:
         dynamics = self.problem.dynamics
-        assert dynamics is not None  # see `_completed`
+        assert dynamics is not None  # see `completed`
         return dynamics
 
     def _clear(self) -> None:
@@ -229,13 +219,12 @@ class Live:
         asked = dynamics.step if settings.step == "auto" else settings.step
         step = float(asked) if isinstance(asked, int | float) else None
         schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
-        choice = schemes.chosen(self._decided or wanted)
+        choice = schemes.chosen(self._decided or wanted if wanted == "auto" else wanted)
         self._stepper, self._longest = choice.stepper, choice.longest
-        if self._decided is None:
-            self.why = choice.why
+        if wanted == "auto" and self._decided is None:
+            self._decided, self.why = choice.scheme, choice.why
             if choice.slow:
                 self.notes.append(choice.why)
-        self._decided = choice.scheme
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
@@ -617,7 +606,7 @@ class Live:
 
         if not self._changes and problem.dynamics is self._dynamics:
             return problem
-        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
+        return replace(with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -850,15 +839,6 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
             live.repeat(left.pop(0))
         live.step()
     return live
-
-
-def _with_materials(problem: Problem, change: Callable[[Material], Material]) -> Problem:
-    """Return a problem with each material changed, that of the body first, then those of its regions."""
-    if problem.material is None:
-        return problem
-    material = change(problem.material)
-    regions = [replace(one, material=change(one.material)) for one in problem.regions]
-    return replace(problem, material=material, regions=regions)
 
 
 def _begins(several: Sequence[Part]) -> tuple[Part, ...]:
