@@ -26,8 +26,8 @@ from truespring.problem import Problem
 
 # Time behind the session beyond which a follower waits for a state to go on from [s].
 _FAR = 3.0
-# Frames between two of shorter steps that are shown.
-_EVERY = 6
+# Frames between two of shorter steps that are shown; fewer if these take longer [s].
+_EVERY, _LONG = 6, 0.5
 # Seconds of computing that a follower may be ahead of another one.
 _FAIR = 1.0
 
@@ -89,6 +89,7 @@ class Beside:
         self._hold, self._work = Hold(), _nothing()
         self._rest: Floats | None = None
         self._unsolved: tuple[State, float] | None = None
+        self._shown = 0.0
         self._hear: Callable[[], None] = lambda: None
 
     # --- what it is told ----------------------------------------------------------------------------------------
@@ -194,7 +195,8 @@ class Beside:
 
     def _refined(self) -> Iterator[Ghost]:
         one = self._finer
-        if one.frame % _EVERY == 0:
+        if one.frame % _EVERY == 0 or one.spent - self._shown > _LONG:
+            self._shown = one.spent
             order = next((order for name, order in ORDERS.items() if one.live.scheme.startswith(name)), 2)
             says = f"{one.live.step_length:.3g} s a step"
             moved = one.live.positions
