@@ -11,7 +11,7 @@ import pytest
 
 import truespring as ts
 from truespring.errors import LiveError
-from truespring.live import Live, hold, quicker
+from truespring.live import Live, hold
 from truespring.live.beside import Beside, Job
 from truespring.live.commands import Command
 from truespring.live.ghost import Ghost
@@ -343,26 +343,6 @@ def test_second_order_elements_are_interpolated() -> None:
     state = ts.solve(held(live, live.problem), FEM, NEWTON).states[-1]
     assert len(state.all_positions) > len(state.positions) == len(ghost.positions)
     assert np.abs(ghost.positions - state.positions).max() < 1e-8 * np.abs(state.displacement).max()
-
-
-@pytest.mark.parametrize("implicit", [0.5, 2.0])
-def test_the_reference_moves_by_the_quicker_scheme(implicit: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(quicker, "_seconds", lambda live: implicit if live.scheme == "bdf2" else 1.0)
-    live = session(model=FEM)
-    notes = quicker.choose_scheme(live)
-    if implicit < 1:
-        assert live.scheme == "bdf2" and "BDF2" in notes[0] and "0.5 s a frame, leapfrog 1 s" in notes[0]
-    else:
-        assert live.scheme == "leapfrog" and not notes
-
-
-def test_a_frame_that_is_timed_leaves_a_session_where_it_was() -> None:
-    live = session(model=FEM)
-    live.pull(TIP, UP)
-    live.step(2)
-    before = live.state
-    assert quicker._seconds(live) > 0
-    assert live.moment is before.moment and live.grasps == before.grips
 
 
 def test_a_model_that_cannot_be_sent_says_so() -> None:
