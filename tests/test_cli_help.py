@@ -110,6 +110,7 @@ def test_help_lists_common_options_that_have_an_effect() -> None:
     assert {name: common - words for name, words in shown.items()} == {
         **{name: {"--verbose"} for name in VERBS},
         **{name: set() for name in ("verify", "solve", "check")},
+        "live": {"--json", "--verbose"},
         "new": {"--threads", "--verbose"},
         "rules": {"--quiet", "--threads", "--verbose"},
         "schema": {"--json", "--quiet", "--threads", "--verbose"},

@@ -24,6 +24,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import truespring as ts
+from tests.c_runtime import opened
 from tests.calculix import displacements
 from tests.exports import CASES, difference, expected, exported
 from tests.studies import changed, written
@@ -670,11 +671,12 @@ def test_what_no_target_has_is_an_error_before_anything_is_solved(
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_target_writes_the_files_that_it_names(target: str) -> None:
     names, seen = TARGETS[target].names, set()
-    for case in CASES:
-        one = exported(case)
+    coupled, gaussian = (_with_feature()[one] for one in (Feature.COUPLING, Feature.PRESSURE))
+    others = [solve_springs(*one, ts.Newton(load_steps=1)) for one in (coupled, gaussian)]
+    for one in (*map(exported, CASES), *others):
         if {feature for feature, _ in features(one.problem, one.springs)} <= TARGETS[target].takes:
             files = target_files(one, [target])[target]
-            assert next(iter(files)) == names[0] and all(files.values())
+            assert next(iter(files)) in names and all(files.values())
             seen |= files.keys()
     assert seen == set(names)
 
@@ -720,10 +722,18 @@ def _by_arrays(values: Mapping[str, Any]) -> Floats:
     return here - nodes
 
 
+def _by_c(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    with opened(bytes(files["body.bin"])) as body:  # type: ignore[arg-type]
+        body.call("reset", 0.0)
+        assert body.call("settle", 1e-10, 100_000) > 0
+        return np.asarray(body.x - in_space(exported("bending").problem.mesh.nodes))
+
+
 #: How a file is run, by target.
 RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "calculix": _by_calculix,
     "mujoco": _by_mujoco,
+    "c": _by_c,
     "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
     "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
 }
@@ -743,8 +753,9 @@ def test_every_target_is_run_or_says_why_not() -> None:
 
 @pytest.mark.parametrize("target", RUNS)
 def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
-    if target == "calculix" and shutil.which("ccx") is None:
-        pytest.skip("CalculiX is not installed")
+    program = {"calculix": "ccx", "c": "cc"}.get(target)
+    if program is not None and shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
     found = RUNS[target](target_files(exported("bending"), [target])[target], tmp_path)
     assert difference(found, "bending") < 1e-6
 

@@ -172,7 +172,7 @@ import sys
 from truespring.cli import main
 for verb in ("export", "map", "compare"):
     assert main([verb, "--help"]) == 0
-print("searched:", "importlib.metadata" in sys.modules)
+print("searched:", "truespring.plugins" in sys.modules)
 """
     shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
     assert shown.splitlines()[-1] == "searched: False"

@@ -279,6 +279,7 @@ def test_rows_are_sorted_and_columns_complete() -> None:
 # --- the pool -------------------------------------------------------------------------------------
 
 
+@pytest.mark.verification
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="signals of POSIX")
 def test_whatever_dies_no_point_is_lost() -> None:
     """A point that kills its workers, or fails, does so alone; workers and schedulers that are killed cost none."""
@@ -578,6 +579,7 @@ def test_any_cluster_will_do(cluster: str, study: Path) -> None:
 # --- killed ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.verification
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="signals of POSIX")
 def test_a_sweep_that_is_killed_goes_on_where_it_stopped(study: Path) -> None:
     out, undisturbed = study.parent / "out", study.parent / "undisturbed"

@@ -17,6 +17,7 @@ from .equilibrium import solve as solve
 from .errors import TruespringError as TruespringError
 from .exports import export as export
 from .fibres import Fibres as Fibres
+from .live import Live as Live
 from .loading import ActiveTension as ActiveTension
 from .loading import Fixed as Fixed
 from .loading import Force as Force

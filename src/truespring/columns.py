@@ -197,16 +197,15 @@ class Columns:
         """Return the texts of a column without surrounding blanks."""
         return [row[self.columns[name]].strip() for row in self._rows]
 
-    def numbers(self, name: str) -> Floats:
-        """Return a column as numbers in SI units, shape (n_rows,)."""
+    def numbers(self, name: str, rows: Sequence[int] | None = None) -> Floats:
+        """Return a column as numbers in SI units, shape (n_rows,), or those of some rows, counted from 0."""
 
         def convert(text: str) -> float:
             text = text.replace(",", ".") if self._comma else text
             return float(_FORTRAN.sub(r"\1e\2", text))
 
-        return self._scales[name] * np.array(
-            [self._value(name, row, convert, "is not a number") for row in range(self.n_rows)]
-        )
+        asked = range(self.n_rows) if rows is None else rows
+        return self._scales[name] * np.array([self._value(name, row, convert, "is not a number") for row in asked])
 
     def line(self, row: int) -> int:
         """Return the line number of a row in the file."""

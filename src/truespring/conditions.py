@@ -73,11 +73,13 @@ class Touch(NamedTuple):
         place: position of the tool [m], shape (dim,).
         force: force of the body on it [N], shape (dim,).
         depth: largest depth to which it enters the body, or largest extension of a grasp [m].
+        acts: whether it is there: False outside of the interval in which it acts.
     """
 
     place: Floats
     force: Floats
     depth: float
+    acts: bool = True
 
 
 class Slide(NamedTuple):
@@ -110,12 +112,29 @@ class Interaction(Protocol):
 
     @property
     def corners(self) -> tuple[float, ...]:
-        """The levels between 0 and 1 at which the path has a corner [-]."""
+        """The levels between 0 and 1 at which the path has a corner, or at which it begins or ceases to act [-]."""
+        ...
+
+    @property
+    def switches(self) -> tuple[float, ...]:
+        """The levels between 0 and 1 at which it begins or ceases to act [-]."""
         ...
 
     @property
     def dissipates(self) -> bool:
         """Whether it has friction: states then depend on those before them."""
+        ...
+
+    def acts(self, level: float) -> bool:
+        """Return whether it acts at a level."""
+        ...
+
+    def brought(self, positions: Floats, before: float, level: float) -> float:
+        """Return the energy that it brings if it begins to act in a step between two levels [J], from outside.
+
+        Minus the energy that it takes along if it ceases to act. `positions` are those at the begin of the step [m],
+        shape (n_nodes, dim).
+        """
         ...
 
     def energy(self, positions: Floats, level: float) -> float:
@@ -161,6 +180,23 @@ class Interaction(Protocol):
     def largest_stiffness(self) -> Floats:
         """Return an upper bound of the stiffness of each node [N/m], shape (n_nodes,)."""
         ...
+
+
+class Always:
+    """The part of an Interaction that acts on the whole way."""
+
+    @property
+    def switches(self) -> tuple[float, ...]:
+        """None."""
+        return ()
+
+    def acts(self, level: float) -> bool:
+        """Return True."""
+        return True
+
+    def brought(self, positions: Floats, before: float, level: float) -> float:
+        """Return 0: what it stores is work of the body and of its own motion [J]."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -218,8 +254,21 @@ class Loading:
 
     @property
     def history_corners(self) -> tuple[float, ...]:
-        """The levels between 0 and 1 at which an amplitude has a corner [-], ascending."""
-        return tuple(sorted({corner for part in self.parts for corner in part.amplitude.corners}))
+        """The levels between 0 and 1 at which an amplitude has a corner, or a tool begins or ceases to act [-]."""
+        found = {corner for part in self.parts for corner in part.amplitude.corners}
+        return tuple(sorted(found.union(*(one.switches for one in self.interactions))))
+
+    def largest_stiffness(self) -> Floats:
+        """Return an upper bound of the stiffness of each node by tools and grasps that act together [N/m].
+
+        Shape (n_nodes,).
+        """
+        still, several = np.zeros(len(self.held)), self.interactions
+        ends = sorted({1.0, *(switch for one in several for switch in one.switches)})  # the last to act together end
+        together = {tuple(one.acts(level) for one in several) for level in ends}
+        sizes = [one.largest_stiffness() for one in several]
+        sums = [sum((size for size, acts in zip(sizes, flags, strict=True) if acts), still) for flags in together]
+        return np.asarray(np.max(sums, axis=0))
 
     def vanishes(self, level: float, positions: Floats | None = None) -> bool:
         """Return whether no load acts at a level, and no prescribed motion.

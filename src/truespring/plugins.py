@@ -114,7 +114,7 @@ class Names(Sequence[str]):
     def __init__(self, table: Table[Entry], condition: Callable[[Entry], bool]) -> None:
         self._table, self._condition = table, condition
 
-    @cached_property
+    @property
     def _names(self) -> tuple[str, ...]:
         return tuple(name for name, entry in self._table.items() if self._condition(entry))
 

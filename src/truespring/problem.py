@@ -300,10 +300,12 @@ class Problem:
     def returns(self) -> bool:
         """Whether displacements or forces may vanish on the way: in a motion, with histories, with moving tools.
 
-        A tool or grasp counts if its place changes: before it touches, and after it retracts, it moves nothing.
+        A tool or grasp counts if its place changes: before it touches, and after it retracts, it moves nothing. So it
+        does if it acts in a part of the way only.
         """
         histories = any(history is not None for history in self._histories)
-        return self.dynamics is not None or histories or any(varies(one.path) for one in self.touching)
+        acting = any(varies(one.path) or one.during is not None for one in self.touching)
+        return self.dynamics is not None or histories or acting
 
     @property
     def _young(self) -> float | None:
@@ -381,6 +383,8 @@ class Problem:
         """
         parts, held = self.mesh.parts, self.loading.held.copy()
         for grasp in self.loading.interactions[len(self.tools) :]:
+            if grasp.switches:  # it does not hold the body on the whole way
+                continue
             held[grasp.largest_stiffness()[: len(held)] > 0] = True
         by_part = np.argsort(parts, kind="stable")
         several = np.split(by_part, np.flatnonzero(np.diff(parts[by_part])) + 1)

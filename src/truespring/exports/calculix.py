@@ -123,12 +123,12 @@ def _output(continuum: bool) -> list[str]:
 
 def _twin_unit(modulus: float) -> float:
     """Return a unit of force [N], a power of ten, in which D1 = 2 / modulus is above 1e-10."""
-    return max(FORCE_UNIT, 10.0 ** math.ceil(math.log10(1e-10 * modulus)))
+    return max(FORCE_UNIT, 10.0 ** math.ceil(math.log10(1e-10 * modulus))) if modulus else FORCE_UNIT
 
 
 _HOURGLASS = (
-    "C3D8R and CPE4R in CalculiX 2.20 have the mean strain of the element, and a control of hourglass modes, which SPRING2 "
-    "elements take away again."
+    "C3D8R and CPE4R in CalculiX 2.20 have the mean strain of the element, and a control of hourglass modes, which "
+    "SPRING2 elements take away again."
 )
 
 _SOLIDS = Solids(

@@ -2,6 +2,7 @@
 
 from truespring.exports.abaqus import abaqus, abaqus_values
 from truespring.exports.arrays import as_json, npz
+from truespring.exports.c import c
 from truespring.exports.calculix import calculix, calculix_values
 from truespring.exports.features import ALL, Feature
 from truespring.exports.keyword_files import DECKS, NAMES
@@ -60,6 +61,15 @@ TARGETS: Table[Target] = Table(
             "a node of their own, loads constant forces.",
             left_out="Contact is not set up.",
             unrun="SOFA was not run; the scene is checked against the source code of SOFA",
+        ),
+        "c": Target(
+            c,
+            "a runtime in C99: truespring.h moves the body of body.bin, main.c settles it",
+            "the C runtime",
+            ("truespring.h", "body.bin", "main.c"),
+            ALL,
+            expressed="body.bin has springs, elements, masses, supports and dead loads; truespring.h moves them.",
+            left_out="Contact is with spheres only, without friction; the body does not touch itself.",
         ),
         "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL, _ARRAYS, _NOTHING),
         "json": Target(

@@ -38,7 +38,7 @@ class Target:
         files: returns the files of solved springs, whose features are all in `takes`.
         about: one-line description of the files.
         program: name in error messages.
-        names: names of the files; all but the first are optional.
+        names: names of the files; which of them are written depends on the springs.
         takes: supported features of springs and loads; any other makes `check_targets` raise ExportError.
         expressed: how springs and loads are expressed, as a sentence, for exported.json.
         left_out: what of the study is not in the files, as a sentence.

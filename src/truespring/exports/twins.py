@@ -147,7 +147,7 @@ def volume_twin(dialect: Dialect, exported: Exported) -> Twin:
 
 
 def one_volume(problem: Problem) -> bool:
-    """Return whether elements of mean strain have the volume of the springs' elements: not where the thickness is free."""
+    """Return whether elements of mean strain have the volume of the springs' elements: not in plane stress."""
     assert problem.section is not None
     return not problem.section.free_thickness
 

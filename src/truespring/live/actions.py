@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Interaction
+from truespring.conditions import Amplitude, Interaction, Loading
 from truespring.tools import Sphere
 from truespring.tools.contact import Contact
 from truespring.tools.grasp import Springs
@@ -27,6 +27,7 @@ class Grip:
         stiffness: of the spring of each [N/m], shape (n,).
         rest: undeformed positions of the held nodes [m], shape (n, dim).
         begin, end: motion at the begin and the end of the frame [m], shape (dim,).
+        since: when it was added [s]; it acts after that time.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Grip:
     rest: Floats
     begin: Floats
     end: Floats
+    since: float = 0.0
 
     def to(self, motion: Floats) -> Self:
         """Return the grasp with another motion at the end of the frame [m], shape (dim,)."""
@@ -85,6 +87,7 @@ class Ball:
         radius: [m].
         stiffness: pressure per depth [Pa/m].
         begin, end: centre at the begin and the end of the frame [m], shape (dim,).
+        since: when it was added [s]; it acts after that time.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Ball:
     stiffness: float
     begin: Floats
     end: Floats
+    since: float = 0.0
 
     def to(self, centre: Floats) -> Self:
         """Return the sphere with another centre at the end of the frame [m], shape (dim,)."""
@@ -125,6 +129,44 @@ class Ball:
         track = Track(np.array(times), np.stack([self.begin, self.end]), span)
         shape = Sphere(self.name, self.radius, self.begin.tolist())
         return Contact(self.name, shape, track, Penalty(self.stiffness), *surface, n_nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Weight:
+    """Gravity beyond that of the loads; it changes linearly over a frame.
+
+    Attributes:
+        force: weight of the nodes [N], shape (n_nodes, dim).
+        begin, end: the share of it that acts at the begin and the end of the frame [-].
+    """
+
+    force: Floats
+    begin: float
+    end: float
+
+    @property
+    def settled(self) -> Self:
+        """The weight in the frame after this one, at its end."""
+        return replace(self, begin=self.end)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it changes within the frame."""
+        return self.begin != self.end
+
+    def at(self, share: float) -> Floats:
+        """Return the force at a share of the frame [N], shape (n_nodes, dim)."""
+        return np.asarray((self.begin + share * (self.end - self.begin)) * self.force)
+
+    def added_to(self, loading: Loading, times: tuple[float, float], span: float) -> Loading:
+        """Return a loading with the weight from the begin to the end of the frame [s]; `span` as of a grasp."""
+        if not (self.begin or self.end):
+            return loading
+        amplitude = Amplitude((0.0,), (self.end,), span)
+        if self.moves:
+            amplitude = Amplitude(times, (self.begin, self.end), span)
+        added = Loading(self.force, loading.held, np.zeros_like(self.force), amplitude=amplitude)
+        return replace(loading, further=(*loading.further, added))
 
 
 def stacked(rows: Sequence[Floats], dim: int) -> Floats:

@@ -4,23 +4,34 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Amplitude, Loading
 from truespring.dynamics import Damping, Dynamics, Energies
-from truespring.equilibrium import moving_body
-from truespring.errors import LiveError
-from truespring.live.actions import Ball, Grip
+from truespring.errors import LiveError, TruespringError
+from truespring.live.actions import Ball, Grip, Weight
 from truespring.live.commands import Command, Log, checked
+from truespring.live.cut import (
+    Aside,
+    Built,
+    Prepared,
+    Whole,
+    built,
+    cut_words,
+    kept_grips,
+    kept_moment,
+    kept_rows,
+    loose_parts,
+)
 from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import SAFE, Leapfrog, stable_step
+from truespring.motion.explicit import SAFE, Leapfrog
 from truespring.motion.follow import balance_of, begin_of
 from truespring.motion.implicit import Implicit
+from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -69,6 +80,26 @@ class Settings:
     iterations: int = 0
 
 
+class Begun(NamedTuple):
+    """What a session begins with, at first or after a restart.
+
+    Attributes:
+        problem: the completed problem, with changed material and damping.
+        model: the model.
+        gravity: the share of gravity [-].
+        scheme: the scheme, a word of `Dynamics`.
+        longest: the longest time step [s].
+        start: "rest", or "equilibrium" if that was found.
+    """
+
+    problem: Problem
+    model: Model
+    gravity: float
+    scheme: str
+    longest: float
+    start: str
+
+
 class Live:
     """A body that moves while it is pulled, pushed and pinned: call `pull` and the like, then `step`.
 
@@ -82,6 +113,23 @@ class Live:
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
         log: the commands since the begin.
+        begun: what the session begins with.
+
+    Example:
+        >>> import truespring as ts
+        >>> beam = ts.Problem(
+        ...     ts.box((0.04, 0.01, 0.01), (4, 1, 1)),
+        ...     ts.Material(young=3000.0, poisson=0.4, density=1000.0),
+        ...     supports=ts.Fixed(on="left"),
+        ...     loads=ts.Gravity((0.0, 0.0, -9.81)),
+        ... )
+        >>> with ts.Live(beam, ts.Springs(rule="gaussian")) as live:
+        ...     name = live.pull((0.04, 0.01, 0.01), to=(0.04, 0.012, 0.01))  # metres
+        ...     live.step(30)  # half a second
+        ...     name, round(live.time, 6), live.positions.shape
+        ('pull', 0.5, (20, 3))
+        >>> bool(live.forces["pull"][1] < 0)  # the body pulls back, down
+        True
     """
 
     def __init__(
@@ -110,14 +158,17 @@ class Live:
         """
         self.notes: list[str] = []
         self.settings = Settings(frame, scheme, step, iterations)
-        self.model, self._models = as_model(model), dict(models or {})
-        self.problem = self._stated = self._completed(problem)
+        self.model = as_model(model)
+        self.problem = self._completed(problem)
+        self._whole = self._left = Whole.of(self.problem, self.model, dict(models or {}))
+        self._aside = Aside()
         self._changes: dict[str, float] = {}
         self._gravity = 1.0 if self._own_gravity is not None else 0.0
         self.log = Log(frame)
         self._clear()
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def __enter__(self) -> Self:
         return self
@@ -127,6 +178,7 @@ class Live:
 
     def close(self) -> None:
         """End the session: it cannot be advanced any more."""
+        self._aside.forget()
         self._stepper.forget()
 
     def _completed(self, problem: Problem) -> Problem:
@@ -152,17 +204,19 @@ class Live:
         self._targets: dict[str, Floats] = {}
         self._forces: Floats = np.zeros((0, self.dim))
 
-    def _build(self) -> None:
-        """Build the body of the present problem and model, and choose how it moves."""
-        self._plain, self._geometry = moving_body(self.problem, self.model)
-        self.body = self._plain
-        self._stable = stable_step(self.body)
+    def _build(self, ready: Built | None = None) -> None:
+        """Build the body of the present problem and model, unless it is ready, and choose how it moves."""
+        made = built(self.problem, self.model) if ready is None else ready
+        for size in ("surface", "edge", "contact_stiffness"):
+            self.__dict__.pop(size, None)
+        self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
+        self._weight = self._weight_of(self._gravity)
+        self.body = self._weighted()
         self._halved, self._largest = 0, 0.0
         self._choose()
 
     def _choose(self) -> None:
-        """Choose how steps are taken, under the present gravity."""
-        self.body = replace(self._plain, loading=self._weighted(self._plain.loading))
+        """Choose how steps are taken."""
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
@@ -172,19 +226,19 @@ class Live:
                 raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
             safe = SAFE * self._stable
             self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self.body)
-            plain = StepByStep(Leapfrog(self.body), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self.body, springs)
+            springs = fitting(self._plain)
+            plain = StepByStep(Leapfrog(self._plain), "leapfrog")
+            self._stepper = plain if springs is None else Compiled(self._plain, springs)
             return
         scheme = "bdf2" if wanted == "auto" else wanted
         self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
         balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self.body, balance, scheme, settings.iterations), scheme)
+        self._stepper = StepByStep(Implicit(self._plain, balance, scheme, settings.iterations), scheme)
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
         begin = begin_of(self.body, self._dynamics, Newton(), None, self._geometry)
-        positions = begin.positions
+        positions, self._start = begin.positions, self._dynamics.start if begin.converged else "rest"
         if not begin.converged:
             self.notes.append(f"{begin.reason}; it begins undeformed")
             positions = self.body.placed(self.body.potential.nodes, 0.0)
@@ -192,6 +246,10 @@ class Live:
         if self._dynamics.velocity is not None:
             velocity = np.where(self.body.held, 0.0, self._dynamics.velocity)
         return Moment(0.0, positions, velocity)
+
+    def _begun(self) -> Begun:
+        """Return what the session begins with, for its record."""
+        return Begun(self.problem, self.model, self._gravity, self.scheme.split(",")[0], self._longest, self._start)
 
     # --- what it is ---------------------------------------------------------------------------------------------
 
@@ -236,6 +294,16 @@ class Live:
         return self._geometry
 
     @property
+    def models(self) -> Mapping[str, Model]:
+        """The models to which the command "model" changes, by name."""
+        return self._left.models
+
+    @property
+    def gravity_share(self) -> float:
+        """What gravity is multiplied by, see `gravity`."""
+        return self._gravity
+
+    @property
     def scheme(self) -> str:
         """How steps are taken, in words."""
         return self._stepper.name
@@ -243,8 +311,12 @@ class Live:
     @property
     def steps_a_frame(self) -> int:
         """The number of steps of a frame."""
-        longest = self._longest / 2**self._halved
-        return max(1, int(np.ceil(self.settings.frame / longest - _SAME)))
+        return steps_in(self.settings.frame, self._longest / 2**self._halved)
+
+    @property
+    def halved(self) -> bool:
+        """Whether the step was halved because energy rose without work."""
+        return self._halved > 0
 
     @property
     def step_length(self) -> float:
@@ -271,7 +343,13 @@ class Live:
 
     @cached_property
     def surface(self) -> tuple[Ints, Floats]:
-        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each."""
+        """Nodes of the surface, and their shares of its undeformed area [m^2], shape (n,) each.
+
+        Of a network of springs, which has no surface, all nodes without area.
+        """
+        mesh = self.problem.mesh
+        if mesh.element == "line":
+            return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
 
     @cached_property
@@ -357,8 +435,56 @@ class Live:
         """Multiply gravity: 1 for that of the problem, or 9.81 m/s^2 against the last direction if it has none."""
         self.do("gravity", value=share)
 
+    def cut(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        depth: Sequence[float] | None = None,
+        *,
+        aside: bool = False,
+    ) -> None:
+        """Remove the elements that a plane blade passes, with their springs, volume term and mass.
+
+        Nodes that belong to no element any more are gone; the others keep their places and velocities. Loads and
+        supports stay on what remains of where they were. A blade that lies in facets between elements passes those on
+        one side, that of the vector product of the way from start to end and the depth, in the plane that to the left.
+
+        Args:
+            start: where the blade begins, on the body as it is now [m].
+            end: where it ends [m].
+            depth: how deep it passes, a vector from there [m]; None in the plane.
+            aside: build the cut body in another thread, while the body moves on; it is cut at the begin of the first
+                frame for which that is ready.
+
+        Raises LiveError for a blade without length or area, and if no element would remain; ModelError if the model
+        cannot be cut.
+        """
+        place = [*start, *end, *(() if depth is None else depth)]
+        if not aside:
+            self.do("cut", place=place)
+            return
+        command = checked(Command(self.log.frames, "cut", place=tuple(float(one) for one in place)), self.dim)
+        removed = self._left.numbers_of(command, self.positions)
+        command = replace(command, elements=tuple(removed.tolist()))
+        self._aside.begin(command, self.problem, self.model, self._prepared)
+
+    @property
+    def is_cutting(self) -> bool:
+        """Whether a cut is built in another thread."""
+        return self._aside.command is not None
+
+    @property
+    def nodes_left(self) -> Ints:
+        """Numbers in the uncut body of the nodes of the mesh, ascending, shape (n_nodes,)."""
+        return self._left.nodes
+
+    @property
+    def elements_left(self) -> Ints:
+        """Numbers in the uncut body of the elements of the mesh, ascending, shape (n_elements,)."""
+        return self._left.elements
+
     def restart(self) -> None:
-        """Bring the body back to its begin, without grasps and spheres."""
+        """Bring the body back to its begin, without cuts, grasps and spheres."""
         self.do("restart")
 
     def do(
@@ -374,22 +500,21 @@ class Live:
         self.repeat(Command(self.log.frames, kind, name, there, radius, value))
 
     def repeat(self, command: Command) -> None:
-        """Carry out a command of another session of the body before the next frame; a grasp begins where it did there.
+        """Carry out a command of another session of the body before the next frame.
 
-        The models of the two sessions may differ. Raises LiveError if the command is wrong.
+        A grasp begins where it did there, a cut removes what it removed there. The models of the two sessions may
+        differ. Raises LiveError if the command is wrong.
         """
         command = checked(replace(command, frame=self.log.frames), self.dim)
-        self._carry_out(command)
-        if command.kind == "grasp":
-            command = replace(command, begin=tuple(self._grips[command.name].begin.tolist()))
+        command = self._carried_out(command)
         if command.kind == "restart":
-            self.log = Log(self.settings.frame)
+            self.log = self.log.begun_again()
         else:
             self.log.commands.append(command)
 
-    def _carry_out(self, command: Command) -> None:
-        """Carry out a command that is checked."""
-        carried: Mapping[str, Callable[[Command], None]] = {
+    def _carried_out(self, command: Command) -> Command:
+        """Carry out a command that is checked; return it with what another session needs to repeat it."""
+        carried: Mapping[str, Callable[[Command], Command | None]] = {
             "grasp": self._do_grasp,
             "sphere": self._do_sphere,
             "move": self._do_move,
@@ -399,27 +524,29 @@ class Live:
             "poisson": self._do_material,
             "damping": self._do_damping,
             "model": self._do_model,
+            "cut": self._do_cut,
             "restart": self._do_restart,
         }
-        carried[command.kind](command)
+        return carried[command.kind](command) or command
 
-    def _do_grasp(self, command: Command) -> None:
+    def _do_grasp(self, command: Command) -> Command:
         self._require_free(command.name)
         at, radius = np.array(command.place), command.radius
         assert radius is not None and command.value is not None  # see `checked`
         body, still = self.problem.body, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
-        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still)
+        grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still, self.time)
         motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
         self._grips[command.name] = replace(grip, begin=motion, end=motion)
         self._targets[command.name] = motion
         self._note_place(command.name)
+        return replace(command, begin=tuple(motion.tolist()))
 
     def _do_sphere(self, command: Command) -> None:
         self._require_free(command.name)
         centre = np.array(command.place)
         assert command.radius is not None and command.value is not None  # see `checked`
-        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre)
+        self._balls[command.name] = Ball(command.name, command.radius, command.value, centre, centre, self.time)
         self._targets[command.name] = centre
         self._note_place(command.name)
 
@@ -440,18 +567,24 @@ class Live:
     def _do_gravity(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
         self._gravity = command.value
-        self._choose()
+        self._weight = replace(self._weight, end=self._weight_of(command.value).end)
 
     def _do_material(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
         self._changes[command.kind] = command.value
+        self.problem = self._changed(self._left.problem)
+        self._build()
+
+    def _changed(self, problem: Problem) -> Problem:
+        """Return a problem as stated with the present materials and dynamics."""
         stiffer, poisson = self._changes.get("young", 1.0), self._changes.get("poisson")
 
         def changed(one: Material) -> Material:
             return replace(one, young=stiffer * one.young, poisson=one.poisson if poisson is None else poisson)
 
-        self.problem = replace(_with_materials(self._stated, changed), dynamics=self._dynamics)
-        self._build()
+        if not self._changes and problem.dynamics is self._dynamics:
+            return problem
+        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -460,18 +593,53 @@ class Live:
         self._build()
 
     def _do_model(self, command: Command) -> None:
-        if command.name not in self._models:
-            raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self._models) or 'none'}")
-        self.model = self._models[command.name]
+        if command.name not in self.models:
+            raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self.models) or 'none'}")
+        self.model = self._left.models[command.name]
         before = self._moment
         self._build()
         if len(self.body.potential.nodes) != len(before.positions):
             self._moment = self._begin()
 
+    def _do_cut(self, command: Command) -> Command:
+        removed = self._left.numbers_of(command, self.positions)
+        command = replace(command, elements=tuple(removed.tolist()))
+        if len(removed):
+            self._take(self._aside.made(command, self.problem, self.model) or self._prepared(command), command)
+        else:
+            self.notes.append(f"{self.time:.4g} s: the blade of a cut passes no element")
+        return command
+
+    def _prepared(self, command: Command) -> Prepared:
+        """Return the body that a cut leaves, ready to move; the session is not changed."""
+        left, of = self._left.without(command, self.model)
+        problem = self._changed(left.problem)
+        return Prepared(left, of, problem, built(problem, left.model))
+
+    def _take(self, cut: Prepared, command: Command) -> None:
+        """Go on with what a cut leaves, its nodes where they are, with their velocities."""
+        before, rows = self.body.potential, kept_rows(cut.of, self.body.potential, cut.built.body.potential)
+        self._left, self.problem, self.model = cut.left, cut.problem, cut.left.model
+        self._moment = kept_moment(self._moment, rows)
+        grips = kept_grips(self._grips, rows, len(before.nodes))
+        gone = [*cut.left.lost, *(self._grips.keys() - grips.keys())]
+        self._grips = grips
+        self._targets = {name: one for name, one in self._targets.items() if name in grips or name in self._balls}
+        self._build(cut.built)
+        held = [np.flatnonzero(self.body.held[: self.problem.mesh.n_nodes].any(axis=1))]
+        held += [one.nodes for one in self._grips.values()]
+        parts = loose_parts(self.problem.mesh, np.concatenate(held))
+        self.notes.append(f"{self.time:.4g} s: {cut_words(len(command.elements or ()), *parts, gone)}")
+
     def _do_restart(self, command: Command) -> None:
+        self._aside.forget()
         self._clear()
+        if self._left is not self._whole:
+            self._left, self.model = self._whole, self._whole.model
+            self.problem = self._changed(self._whole.problem)
         self._build()
         self._moment = self._begin()
+        self.begun = self._begun()
 
     def _require_free(self, name: str) -> None:
         """Raise LiveError if a grasp or sphere has a name."""
@@ -490,10 +658,11 @@ class Live:
 
     @property
     def _acting(self) -> Acting:
-        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface)
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface, self._weight)
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
+        self._cut_what_is_ready()
         self._aim()
         acting = self._acting
         taken = self._stepper.frame(self._moment, acting, self.steps_a_frame, self.step_length)
@@ -515,6 +684,21 @@ class Live:
             self._note_place(name)
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
+        if self._weight.moves:
+            self._weight = self._weight.settled
+            self.body = self._weighted()
+
+    def _cut_what_is_ready(self) -> None:
+        """Carry out the cut that another thread has built, if there is one."""
+        command = self._aside.ready()
+        try:
+            if command is not None:
+                self.repeat(command)
+        except TruespringError as error:  # asked in an earlier frame: nothing that asked it waits for an answer
+            self.notes.append(f"{self.time:.4g} s: {error}")
+        finally:
+            if command is not None:
+                self._aside.forget()
 
     def _aim(self) -> None:
         """Let grasps and spheres move towards where they were asked to go, at most as fast as is allowed."""
@@ -561,6 +745,8 @@ class Live:
         nodes, areas = self.surface
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
+        if not stiffest:
+            raise LiveError("a sphere needs the surface of elements, and the body is a network of springs")
         return _CONTACT * (2 / stable) ** 2 / stiffest
 
     def node_at(self, point: int | Sequence[float]) -> int:
@@ -591,20 +777,31 @@ class Live:
     @cached_property
     def _own_gravity(self) -> Floats | None:
         """The acceleration of the problem's loads on the whole body [m/s^2], shape (dim,); None without such a load."""
-        own = [one for load in self._stated.loads if (one := load.acceleration_of_body) is not None]
+        own = [one for load in self._whole.problem.loads if (one := load.acceleration_of_body) is not None]
         return np.asarray(np.sum(own, axis=0)) if own else None
 
-    def _weighted(self, loading: Loading) -> Loading:
-        """Return a loading with the present share of gravity."""
-        own = self._own_gravity
+    @property
+    def full_gravity(self) -> Floats:
+        """The acceleration of gravity at share 1 [m/s^2], shape (dim,)."""
         down = np.zeros(self.dim)
         down[-1] = -GRAVITY
-        more = self._gravity * down if own is None else (self._gravity - 1) * own
-        if not more.any():
-            return loading
-        force, still = self._plain.mass[:, None] * more, np.zeros(loading.displacement.shape)
-        added = Loading(force, loading.held, still, amplitude=Amplitude((0.0,), (1.0,), self._plain.duration))
-        return replace(loading, further=(*loading.further, added))
+        return down if self._own_gravity is None else self._own_gravity
+
+    def _weight_of(self, share: float) -> Weight:
+        """Return the weight beyond the loads of the problem at a share of gravity."""
+        more = share if self._own_gravity is None else share - 1
+        return Weight(self._plain.mass[:, None] * self.full_gravity, more, more)
+
+    def _weighted(self) -> Body:
+        """Return the body with the present weight."""
+        plain = self._plain
+        loading = self._weight.settled.added_to(plain.loading, (0.0, plain.duration), plain.duration)
+        return replace(plain, loading=loading)
+
+
+def steps_in(frame: float, longest: float) -> int:
+    """Return the number of steps of a frame [s] of at most a length [s]."""
+    return max(1, int(np.ceil(frame / longest - _SAME)))
 
 
 def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
@@ -612,8 +809,7 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
     left = list(commands)
     for frame in range(frames):
         while left and left[0].frame <= frame:
-            one = left.pop(0)
-            live.do(one.kind, one.name, one.place, one.radius, one.value)
+            live.repeat(left.pop(0))
         live.step()
     return live
 

@@ -7,7 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.live.actions import Ball, Grip, stacked
+from truespring.conditions import Loading
+from truespring.live.actions import Ball, Grip, Weight, stacked
 from truespring.motion.advance import Advance, Scheme
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
@@ -23,11 +24,18 @@ class Acting:
         grips: grasps.
         balls: spheres.
         surface: nodes of the surface that spheres touch, and their areas [m^2], shape (n,) each.
+        weight: gravity beyond that of the loads.
     """
 
     grips: tuple[Grip, ...]
     balls: tuple[Ball, ...]
     surface: tuple[Ints, Floats]
+    weight: Weight
+
+    def older(self, time: float) -> "Acting":
+        """Return what acts at a time [s] already: what is added then acts after it."""
+        grips = tuple(one for one in self.grips if one.since < time)
+        return replace(self, grips=grips, balls=tuple(one for one in self.balls if one.since < time))
 
     def stored(self, positions: Floats) -> float:
         """Return the energy of grasps and contacts at the end of the frame [J]."""
@@ -95,7 +103,8 @@ class Compiled:
         from truespring.kernels import leapfrog
 
         body, springs = self.body, self._springs
-        external = np.ascontiguousarray(body.loading.dead_force(last.time / body.duration))
+        dead = body.loading.dead_force(last.time / body.duration)
+        external = np.ascontiguousarray(dead + acting.weight.at(0.0))
         x, v, dim = last.positions.copy(), last.velocity.copy(), len(self._zero)
         grips, balls = self._arrays(acting, dim)
         held = np.zeros((len(acting.grips), dim)), np.zeros((len(acting.balls), dim))
@@ -103,14 +112,22 @@ class Compiled:
         if self._force is None:
             self._force = np.empty_like(x)
             leapfrog.forces(x, *loop, external, self._force, self._zero)
-            leapfrog.pull(x, grips, 0.0, self._force, held[0])
-            leapfrog.push(x, balls, 0.0, self._force, held[1])
+            older = acting.older(last.time)
+            pulling, pushing = self._arrays(older, dim)
+            leapfrog.pull(x, pulling, 0.0, self._force, np.zeros((len(older.grips), dim)))
+            leapfrog.push(x, pushing, 0.0, self._force, np.zeros((len(older.balls), dim)))
         account, force = np.zeros(2), self._force.copy()
-        known = (body.mass, self._free, external, *loop, grips, balls, held, account, self._zero)
-        leapfrog.steps(n, h, body.damping.mass, x, v, force, *known)
+        parts, done = n if acting.weight.moves else 1, 0.0  # the loop has constant loads
+        for part in range(parts):
+            ends = part / parts, (part + 1) / parts
+            before, begin = external, x.copy()
+            external = np.ascontiguousarray(dead + acting.weight.at(ends[1]))
+            moving = (grips, balls) if parts == 1 else (_between(grips, *ends), _between(balls, *ends))
+            known = (body.mass, self._free, external, *loop, *moving, held, account, self._zero)
+            leapfrog.steps(n // parts, h, body.damping.mass, x, v, force, *known)
+            done += float(((before + external) * (x - begin)).sum()) / 2
         self._force = force
-        done, damped = account
-        done += float((external * (x - last.positions)).sum())
+        done, damped = done + account[0], account[1]
         return Frame(Moment(last.time + n * h, x, v), float(done), float(damped), np.concatenate(held))
 
     @staticmethod
@@ -132,6 +149,12 @@ class Compiled:
         return held, (nodes, areas, *sizes, *(stacked(one, dim) for one in centres))
 
 
+def _between(arrays: tuple[Any, ...], begin: float, end: float) -> tuple[Any, ...]:
+    """Return arrays whose last two are the places at the begin and the end of a frame for a part of it."""
+    *others, first, last = arrays
+    return (*others, first + begin * (last - first), first + end * (last - first))
+
+
 class StepByStep:
     """Steps of any scheme of motions, for any body."""
 
@@ -150,10 +173,10 @@ class StepByStep:
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
         """Return the frame after n steps of length h [s] from a state."""
         body, span = self._body, self._body.duration
-        nodes, times = body.potential.nodes, (last.time, last.time + n * h)
-        own: list[Any] = [one.interaction(nodes, times, span) for one in acting.grips]
-        own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
-        loading = replace(body.loading, interactions=(*body.loading.interactions, *own))
+        times = last.time, last.time + n * h
+        self._scheme.body = replace(body, loading=self._loading(acting.older(last.time), times))
+        self._scheme.ready(last)
+        loading = self._loading(acting, times)
         self._scheme.body = replace(body, loading=loading)
         account = Account()
         account.open(loading, last.positions, last.time / span)
@@ -161,13 +184,22 @@ class StepByStep:
         for _ in range(n):
             taken = self._scheme.advance(history, h, account)
             if not isinstance(taken, Advance):
-                return Frame(last, 0.0, 0.0, np.zeros((len(own), nodes.shape[1])), solved=False)
+                return Frame(last, 0.0, 0.0, stacked([], last.positions.shape[1]), solved=False)
             account, history = taken.account, History(taken.moment, history.last)
         self._before = history.before
         level = history.last.time / span
         touches = loading.touches(history.last.positions, level)[len(body.loading.interactions) :]
-        forces = stacked([one.force for one in touches], nodes.shape[1])
+        forces = stacked([one.force for one in touches], last.positions.shape[1])
         return Frame(history.last, account.done, account.damped, forces)
+
+    def _loading(self, acting: Acting, times: tuple[float, float]) -> Loading:
+        """Return the loads of the body with what acts in a frame from a time to another [s]."""
+        body, span = self._body, self._body.duration
+        nodes = body.potential.nodes
+        own: list[Any] = [one.interaction(nodes, times, span) for one in acting.grips]
+        own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
+        loading = acting.weight.added_to(body.loading, times, span)
+        return replace(loading, interactions=(*loading.interactions, *own))
 
 
 def fitting(body: Body) -> ConstantSprings | None:

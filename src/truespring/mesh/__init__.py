@@ -23,6 +23,8 @@ from truespring.mesh.mesh import Mesh as Mesh
 from truespring.mesh.middles import SecondOrder as SecondOrder
 from truespring.mesh.middles import edge_numbers as edge_numbers
 from truespring.mesh.refine import refined as refined
+from truespring.mesh.remainder import Remainder as Remainder
+from truespring.mesh.remainder import remainder as remainder
 from truespring.mesh.selections import Box as Box
 from truespring.mesh.selections import Near as Near
 from truespring.mesh.selections import Plane as Plane

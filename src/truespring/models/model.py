@@ -4,6 +4,7 @@ from typing import Any
 
 from truespring.completing import completed
 from truespring.errors import ModelError
+from truespring.mesh import Remainder
 from truespring.models.fem_potential import FiniteElements
 from truespring.models.fibres import stiff_fibres
 from truespring.models.laws import LAWS
@@ -94,6 +95,13 @@ class Model:
         """
         return None
 
+    def on_remainder(self, left: Remainder) -> "Model":
+        """Return the model on the elements that a cut leaves, which keep the springs that they have.
+
+        Raises ModelError if the model cannot be cut.
+        """
+        return self
+
     def second_order(self, problem: Problem) -> "Model | None":
         """Return a model with elements of second order and the same limit on fine meshes; None if there is none."""
         return None
@@ -123,6 +131,13 @@ class BarePotential(Model):
     def potential(self, problem: Problem) -> Potential:
         """Return the potential."""
         return self._potential
+
+    def on_remainder(self, left: Remainder) -> Model:
+        """Raise ModelError: of a given potential it is not known what a cut leaves."""
+        raise ModelError(
+            f"{self.label}: a given potential cannot be cut: give a model with the method potential(problem), which "
+            "is called again for the elements that remain"
+        )
 
     def chosen_element(self, problem: Problem) -> str | None:
         """Return the interpolation of finite elements, None for other potentials."""

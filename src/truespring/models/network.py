@@ -10,7 +10,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints, ShortInts, frozen_floats, frozen_ints
 from truespring.assembly import Pattern
 from truespring.errors import ModelError, nearest
-from truespring.mesh import Mesh
+from truespring.mesh import Mesh, Remainder
 from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
 from truespring.models.pair_law import PairLaw
@@ -102,6 +102,18 @@ class SpringNetwork(Model):
         if problem.dynamics is None:
             check_mechanism(self, problem.loading.held)
         return self
+
+    def on_remainder(self, left: Remainder) -> "SpringNetwork":
+        """Return the springs between nodes of one remaining element, which in a network are springs."""
+        there = left.holds(self.springs)
+        return replace(
+            self,
+            nodes=self.nodes[left.nodes],
+            springs=left.numbers[self.springs[there]],
+            stiffness=self.stiffness[there],
+            rest_length=self.rest_length[there],
+            mass=self.mass[left.nodes] if self.mass.size else self.mass,
+        )
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -1,11 +1,12 @@
 """Springs of prescribed stiffness, spring by spring: measured, or fitted to references."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints, frozen_floats, frozen_ints
 from truespring.errors import ModelError
+from truespring.mesh import Remainder
 from truespring.models.mechanism import check_mechanism
 from truespring.models.model import Model
 from truespring.models.network import SpringNetwork
@@ -51,6 +52,12 @@ class PrescribedSprings(Model):
     def __repr__(self) -> str:
         volume = ", with a volume term" if self.kappa.size else ""
         return f"PrescribedSprings({self.label}, {len(self.springs)} springs{volume})"
+
+    def on_remainder(self, left: Remainder) -> "PrescribedSprings":
+        """Return the springs between nodes of one remaining element, and the modulus of each of these elements."""
+        there = left.holds(self.springs)
+        springs, kappa = left.numbers[self.springs[there]], self.kappa[left.elements] if self.kappa.size else self.kappa
+        return replace(self, springs=springs, stiffness=self.stiffness[there], kappa=kappa)
 
     def potential(self, problem: Problem) -> SpringNetwork | VolumeSprings:
         """Return the potential on the mesh of a problem; raise ModelError if the network is a mechanism."""

@@ -9,7 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import ModelError, nearest
 from truespring.material import Material
-from truespring.mesh import Mesh
+from truespring.mesh import Mesh, Remainder
 from truespring.models.by_rule import SpringCounts
 from truespring.models.elasticity import hooke, lattice_classes, lattice_elasticity
 from truespring.models.findings import springs_warnings
@@ -166,7 +166,7 @@ class Springs(Model):
     @property
     def parameters(self) -> dict[str, Any]:
         """Parameters of the rule that are set, by name."""
-        names = dict.fromkeys(name for rule in RULES.values() for name in rule.parameters)
+        names = dict.fromkeys(name for rule in RULES.own.values() for name in rule.parameters)
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     def kappa(self, problem: Problem) -> Floats:
@@ -235,6 +235,10 @@ class Springs(Model):
             return None
         if self.rule is None or RULES[self.rule].potential is None:
             self.network(problem, self.element_stiffness(problem))
+        return self.allowing_negative()
+
+    def on_remainder(self, left: Remainder) -> "Springs":
+        """Return the springs, of which some on the faces of a cut may be negative: they were not in the sum."""
         return self.allowing_negative()
 
     def allowing_negative(self) -> "Springs":

@@ -54,6 +54,10 @@ class Scheme(Protocol):
         """Forget what is kept of the last step: the next one begins at another state."""
         ...
 
+    def ready(self, moment: Moment) -> None:
+        """Compute what a step from a state begins with, under the present loading, unless the last step left it."""
+        ...
+
     def advance(self, history: History, h: float, account: Account) -> Advance | Equilibrium:
         """Return a step of length h [s] with the work in it; the state of least residual if it was not found."""
         ...

@@ -27,8 +27,7 @@ def stable_step(body: Body) -> float:
     """
     from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-    nodes, interactions = body.potential.nodes, body.loading.interactions
-    touched = sum((one.largest_stiffness() for one in interactions), np.zeros(len(nodes)))
+    nodes, touched = body.potential.nodes, body.loading.largest_stiffness()
     if not np.isfinite(touched).all():
         return 0.0
     matrix = sparse.csr_array(body.potential.hessian(nodes))
@@ -97,13 +96,18 @@ class Leapfrog:
         """Forget the force at the end of the last step: the next one begins at another state."""
         self._force = None
 
+    def ready(self, moment: Moment) -> None:
+        """Compute the force at the begin of a step, under the present loading, unless the last step left it."""
+        if self._force is None:
+            self._force = self._forces(moment.positions, moment.time / self.body.duration)
+
     def advance(self, history: History, h: float, account: Account) -> Advance:
         """Return the step of length h [s] with the work in it."""
         body, last, alpha, account = self.body, history.last, self.body.damping.mass, copy(account)
         levels = last.time / body.duration, (last.time + h) / body.duration
         mass, held = body.mass[:, None], body.held
-        if self._force is None:
-            self._force = self._forces(last.positions, levels[0])
+        self.ready(last)
+        assert self._force is not None
         half = last.velocity + h / 2 * (self._force / mass - alpha * last.velocity)
         half, rubbed = self._rubbed(half, last.positions, levels[0], h / 2)
         account.damped += rubbed.dissipated(half)

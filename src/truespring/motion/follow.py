@@ -78,7 +78,7 @@ def begin_of(
     rest = Equilibrium(0.0, body.placed(nodes, 0.0), still, still, 0.0, 0, 0.0, converged=True)
     if dynamics.start == "rest":
         return rest
-    still_tools = tuple(Still(one) for one in body.loading.interactions)
+    still_tools = tuple(Still(one) for one in body.loading.interactions if one.acts(0.0))
     steady = replace(body.loading.mapped(_at_begin), interactions=still_tools)
     if steady.vanishes(1.0):
         return rest

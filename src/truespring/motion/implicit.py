@@ -34,6 +34,9 @@ class Implicit:
         """Forget the strains of the last states: the next step begins at another one."""
         self._measures = {}
 
+    def ready(self, moment: Moment) -> None:
+        """Do nothing: a step has the forces of its end, or of its middle."""
+
     def advance(self, history: History, h: float, account: Account) -> Advance | Equilibrium:
         """Return the step of length h [s] with the work in it; the state of least residual if it was not found."""
         body, last, account = self.body, history.last, copy(account)

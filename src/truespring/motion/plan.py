@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truespring.arrays import Floats
 from truespring.dynamics import Dynamics
 from truespring.errors import ProblemError
 from truespring.motion.explicit import SAFE, stable_step
@@ -77,8 +78,7 @@ def _typical(body: Body, crossing: float) -> float:
     """
     xi = body.damping.stiffness / crossing if crossing else 0.0
     typical = crossing * (np.sqrt(1 + xi**2) - xi)
-    touched = sum((one.largest_stiffness() for one in body.loading.interactions), np.zeros(len(body.mass)))
-    stiffest = float((touched / body.mass).max())
+    stiffest = float((body.loading.largest_stiffness() / body.mass).max())
     return float(min(typical, 2 / np.sqrt(stiffest))) if stiffest else float(typical)
 
 
@@ -105,10 +105,16 @@ def _times(body: Body, dynamics: Dynamics, step: float | None) -> tuple[Sequence
     regular = [dynamics.duration * (k + 1) / n for k in range(n)]
     recorded = set(regular[each - 1 :: each])
     corners = [dynamics.duration * one for one in _corners(body, dynamics)]
-    near = np.round(np.array(regular) / dynamics.duration, 12)
-    others = [one for one in corners if not np.isin(round(one / dynamics.duration, 12), near)]
+    near = np.array([0.0, *regular, np.inf])
+    others = [one for one in corners if _distance(near, one) > SAME * dynamics.duration]
     goals = sorted([*regular, *others])
     return goals, frozenset(number for number, goal in enumerate(goals) if goal in recorded)
+
+
+def _distance(times: Floats, time: float) -> float:
+    """Return the distance of a time from the nearest of others [s], ascending, shape (n,), from 0 to infinity."""
+    after = int(np.searchsorted(times, time))
+    return float(min(times[after] - time, time - times[max(after - 1, 0)]))
 
 
 def _corners(body: Body, dynamics: Dynamics) -> tuple[float, ...]:

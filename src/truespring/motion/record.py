@@ -13,6 +13,9 @@ from truespring.dynamics import Energies
 class Account:
     """The work of loads, supports and tools since the begin of a motion, and what was dissipated [J].
 
+    A tool or grasp that begins to act brings the energy that it stores there, and takes along what it stores as it
+    ceases: both count as its work.
+
     Attributes:
         done: work of loads, supports and tools.
         damped: energy dissipated by damping and friction.
@@ -24,10 +27,12 @@ class Account:
     begin: float | None = None
     _force: Floats | None = field(default=None, repr=False)
     _touches: tuple[Touch, ...] = field(default=(), repr=False)
+    _level: float = field(default=0.0, repr=False)
 
     def open(self, loading: Loading, positions: Floats, level: float) -> None:
         """Begin at a state: `positions` [m], shape (n_nodes, dim)."""
         self._force, self._touches = loading.loads(positions, level), loading.touches(positions, level)
+        self._level = level
 
     def step(self, loading: Loading, before: Floats, positions: Floats, level: float) -> None:
         """Add the work of loads and tools in a step to `positions` from those before [m], shape (n_nodes, dim).
@@ -39,7 +44,8 @@ class Account:
         self.done += float(((force + self._force) * (positions - before)).sum()) / 2
         for last, now in zip(self._touches, touches, strict=True):
             self.done -= float((last.force + now.force) @ (now.place - last.place)) / 2
-        self._force, self._touches = force, touches
+        self.done += sum(one.brought(before, self._level, level) for one in loading.interactions)
+        self._force, self._touches, self._level = force, touches, level
 
     def support(self, reaction: Floats, moved: Floats) -> None:
         """Add the work of supports: a reaction [N] on nodes that moved [m], both of shape (n_nodes, dim)."""

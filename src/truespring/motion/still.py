@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Interaction, Slide, Touch
+from truespring.conditions import Always, Interaction, Slide, Touch
 
 
 @dataclass(frozen=True, eq=False)
-class Still:
+class Still(Always):
     """A tool or a grasp that stays where it is at level 0, without friction; an Interaction.
 
     Attributes:

@@ -237,7 +237,7 @@ def undeformed_figure(body: Undeformed) -> Sheet:
     problem, springs = body.problem, body.springs
     mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
-    arrows, tools = find_arrows(problem, size), drawn_tools(problem, 0.0)
+    arrows, tools = find_arrows(problem, size), drawn_tools(problem, None)
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     ends = np.concatenate([ends, near(tools, mesh.lower, mesh.upper)])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size

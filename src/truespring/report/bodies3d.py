@@ -55,7 +55,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
         layers.append(_wires(points, facets, springs, 0.6))
     elif not len(facets):
         layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
-    tools = drawn_tools(problem, 0.0)
+    tools = drawn_tools(problem, None)
     corners = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     taken = np.concatenate(
         [

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truespring.arrays import Floats, Ints
+from truespring.conditions import Touch
 from truespring.problem import Problem
 from truespring.report.legend import Entry
 from truespring.report.lines import draw_lines
@@ -36,22 +37,24 @@ class Drawn:
     facets: Ints
 
 
-def skins_at(problem: Problem, level: float) -> Iterator[tuple[Floats, Skin]]:
-    """Yield place [m], shape (dim,), and surface of the tools and grasps at a level that have one to draw."""
+def skins_at(problem: Problem, level: float) -> Iterator[tuple[Touch, Skin]]:
+    """Yield place and surface of the tools and grasps at a level that have one to draw, also where they do not act."""
     mesh = problem.mesh
     centre, size = (mesh.lower + mesh.upper) / 2, float(np.linalg.norm(mesh.upper - mesh.lower))
     touches = problem.loading.touches(mesh.nodes, level) if problem.stated and problem.touching else ()
     for one, touch in zip(problem.touching, touches, strict=False):  # none of results that were read
         skin = one.skin(centre - touch.place, size)
         if skin is not None:
-            yield touch.place, skin
+            yield touch, skin
 
 
-def drawn_tools(problem: Problem, level: float) -> list[Drawn]:
-    """Return the tools and grasps of a problem at a level that have a surface to draw."""
+def drawn_tools(problem: Problem, level: float | None) -> list[Drawn]:
+    """Return the tools and grasps that act at a level and have a surface to draw; all at their begin for None."""
     found = []
-    for place, skin in skins_at(problem, level):
-        points = view(place + skin.points)
+    for touch, skin in skins_at(problem, level or 0.0):
+        if not (touch.acts or level is None):
+            continue
+        points = view(touch.place + skin.points)
         edges = outline(points, skin.facets, silhouette=True) if len(skin.facets) else skin.lines
         found.append(Drawn(points, edges, skin.facets))
     return found

@@ -91,8 +91,9 @@
       return share ? Float64Array.from(p, (value, i) => value + share * (q[i] - value)) : p;
     }
 
-    // How far a tool has moved, interpolated like positions.
+    // How far a tool has moved, interpolated like positions; out of the picture where it is not there.
     function shift(tool, place) {
+      if (!tool.there[Math.round(place)]) return tool.shifts[0].map(() => 1e8);
       const a = tool.shifts[Math.floor(place)], b = tool.shifts[Math.ceil(place)], share = place - Math.floor(place);
       return a.map((value, i) => value + share * (b[i] - value));
     }

@@ -89,18 +89,20 @@ def _around(result: Result, levels: Sequence[float], inside: Floats) -> list[Flo
 
 
 def _tools(result: Result, levels: Sequence[float], pack: Packing) -> list[dict[str, Any]]:
-    """Return the surface of each tool at the first level, and its shift since then at each level, in packed steps."""
-    places = [[place for place, _ in skins_at(result.problem, level)] for level in levels]
+    """Return the surface of each tool at the first level, its shift since then in packed steps, and where it acts."""
+    touches = [[touch for touch, _ in skins_at(result.problem, level)] for level in levels]
     found = []
-    for number, (place, skin) in enumerate(skins_at(result.problem, levels[0])):
+    for number, (first, skin) in enumerate(skins_at(result.problem, levels[0])):
         edges = outline(skin.points, skin.facets) if len(skin.facets) else skin.lines
-        shifts = [[round(pack.steps(float(value)), 1) for value in at[number] - place] for at in places]
+        each = [at[number] for at in touches]
+        shifts = [[round(pack.steps(float(value)), 1) for value in one.place - first.place] for one in each]
         found.append(
             {
-                "points": pack.points(place + skin.points, beyond=True),
+                "points": pack.points(first.place + skin.points, beyond=True),
                 "lines": pack.numbers(edges),
                 "triangles": pack.numbers(triangles_of(skin.facets)),
                 "shifts": shifts,
+                "there": [one.acts for one in each],
             }
         )
     return found

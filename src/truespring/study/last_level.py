@@ -49,7 +49,11 @@ def _obstacles(study: Study, verb: str, in_proportion: bool) -> Iterator[tuple[K
                     f"ends at {shares[-1]:g}, below {largest:g}, but {by_end}: end at {largest:g}",
                 )
     for table, ones in (("tool", problem.tools), ("grasp", problem.grasps)):
-        for number, path in enumerate(one.path for one in ones):
+        for number, (path, during) in enumerate((one.path, one.during) for one in ones):
+            if during is not None and in_proportion:
+                yield (table, number, "during"), f"{verb} varies loads in proportion: leave during out"
+            elif during is not None and during[1] < 1 - _EQUAL:
+                yield (table, number, "during"), f"ends at {during[1]:g}, but {by_end}: end at 1"
             if not varies(path):
                 continue
             places = np.asarray(path, dtype=float)[:, 1:]

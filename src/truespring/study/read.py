@@ -180,8 +180,9 @@ def _problem(keys: StudyKeys, places: Places, halvings: int, balanced: bool) -> 
             regions.append(region.region(mesh))
     supports = [support.build(places, number, mesh) for number, support in enumerate(keys.support)]
     loads = [load.build(places, number, mesh) for number, load in enumerate(keys.load)]
-    tools = [tool.build(places, number, mesh) for number, tool in enumerate(keys.tool)]
-    grasps = [grasp.build(places, number, mesh) for number, grasp in enumerate(keys.grasp)]
+    moves = keys.dynamics is not None
+    tools = [tool.build(places, number, mesh, moves) for number, tool in enumerate(keys.tool)]
+    grasps = [grasp.build(places, number, mesh, moves) for number, grasp in enumerate(keys.grasp)]
     dynamics = None if keys.dynamics is None else keys.dynamics.build(places)
     if dynamics is not None and network is not None and not network.mass.size:
         with places.at("mesh", "nodes"):

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Slide, Touch
+from truespring.conditions import Always, Slide, Touch
 from truespring.tools.friction import Friction, Given, Rubbing
 from truespring.tools.laws import Law
 from truespring.tools.path import Track
@@ -54,7 +54,7 @@ class Near(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(Always):
     """Contact of a tool with nodes of a surface, an Interaction.
 
     Attributes:

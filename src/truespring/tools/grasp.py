@@ -7,9 +7,10 @@ from typing import Self
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Interaction, Slide, Touch
+from truespring.conditions import Always, Interaction, Slide, Touch
 from truespring.errors import ToolError
 from truespring.loading import Body, vector_words
+from truespring.tools.during import during_words, interval, limited
 from truespring.tools.path import Path, Track, path_words, track_of
 from truespring.tools.skins import Skin, circles
 from truespring.tools.surface import surface
@@ -20,8 +21,8 @@ from truespring.tools.values import positive, vector
 class Grasp:
     """A patch of a body that is held by springs to a place that moves, as by forceps.
 
-    The springs pull each node of the patch to its undeformed position plus the motion along the path since its begin:
-    a body at rest is unloaded there.
+    The springs pull each node of the patch to its undeformed position plus the motion along the path since its begin,
+    or from its `origin`: a body at rest is unloaded there.
 
     Attributes:
         name: name in tables.
@@ -30,6 +31,10 @@ class Grasp:
         path: rows of place on the way and coordinates [m], see Path.
         stiffness: stiffness of all springs together [N/m], shared by the areas of the nodes; None for E times the
             radius, in the plane E times the thickness, with E the largest Young's modulus of the body.
+        during: begin and end of the part of the way in which it holds the patch, shares at rest, times in motion [s];
+            None for the whole way.
+        origin: place on the path at which the undeformed patch is unloaded [m], one value per direction; None for the
+            begin of the path.
     """
 
     name: str
@@ -37,11 +42,13 @@ class Grasp:
     radius: float
     path: Path
     stiffness: float | None = None
+    during: Sequence[float] | None = None
+    origin: Sequence[float] | None = None
 
     def words(self) -> str:
         """Return name, patch and path, for tables."""
         where = f"grasp within {self.radius:g} m of {vector_words(self.at)} m"
-        return f"'{self.name}': {where}, {path_words(self.path)}"
+        return f"'{self.name}': {where}, {path_words(self.path)}{during_words(self.during)}"
 
     def skin(self, centre: Floats, size: float) -> Skin:
         """Return the circle, in space three circles, of the places within the radius; see `Tool.skin`."""
@@ -49,9 +56,11 @@ class Grasp:
 
     def acting_on(self, body: Body, young: float | None, span: float) -> Interaction:
         """Return the springs of the grasp on a body; arguments and errors as `Tool.acting_on`."""
-        track = track_of(self.name, self.path, body.mesh.dim, span)
+        dim, during = body.mesh.dim, interval(self.name, self.during, span)
+        track = track_of(self.name, self.path, dim, span, during)
+        origin = None if self.origin is None else vector(self.name, "origin", self.origin, dim, "m")
         nodes, stiffness = self.patch(body, young)
-        return Springs(self.name, track, nodes, stiffness, body.nodes)
+        return limited(Springs(self.name, track, nodes, stiffness, body.nodes, origin), during, span)
 
     def patch(self, body: Body, young: float | None) -> tuple[Ints, Floats]:
         """Return the held nodes and the stiffness of the spring of each [N/m], shape (n,); as `acting_on`."""
@@ -85,7 +94,7 @@ def _surface(body: Body) -> tuple[Ints, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class Springs:
+class Springs(Always):
     """Springs from nodes to places that move together, an Interaction.
 
     Attributes:
@@ -94,6 +103,7 @@ class Springs:
         nodes: the held nodes, shape (n,).
         stiffness: of the spring of each [N/m], shape (n,).
         rest: undeformed positions of all nodes [m], shape (n_nodes, dim).
+        origin: place on the path at which they are unloaded there [m], shape (dim,); None for that at level 0.
     """
 
     name: str
@@ -101,6 +111,7 @@ class Springs:
     nodes: Ints
     stiffness: Floats
     rest: Floats
+    origin: Floats | None = None
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -114,7 +125,7 @@ class Springs:
 
     def _stretch(self, positions: Floats, level: float) -> Floats:
         """Return the vectors from the ends of the springs to the nodes [m], shape (n, dim)."""
-        motion = self.track.at(level) - self.track.at(0.0)
+        motion = self.track.at(level) - (self.track.at(0.0) if self.origin is None else self.origin)
         return np.asarray(positions[self.nodes] - self.rest[self.nodes] - motion)
 
     def energy(self, positions: Floats, level: float) -> float:

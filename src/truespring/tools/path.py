@@ -54,7 +54,7 @@ class Track:
         return tuple(float(way) / self.span for way in self.ways if 0 < way < self.span)
 
 
-def track_of(name: str, path: Path, dim: int, span: float) -> Track:
+def track_of(name: str, path: Path, dim: int, span: float, during: tuple[float, float] | None = None) -> Track:
     """Return the track of a path.
 
     Args:
@@ -62,8 +62,9 @@ def track_of(name: str, path: Path, dim: int, span: float) -> Track:
         path: the path.
         dim: number of directions of the body.
         span: place on the way at level 1: 1 at rest, the duration in motion [s].
+        during: the part of the way that it must cover; None for the whole.
 
-    Raises ToolError unless rows are numbers, ascend, and reach from 0 to `span`.
+    Raises ToolError unless rows are numbers, ascend, and reach from 0 to `span`, or from begin to end of `during`.
     """
     rows = _rows(name, path)
     if rows.ndim == 1:
@@ -73,12 +74,13 @@ def track_of(name: str, path: Path, dim: int, span: float) -> Track:
     ways = rows[:, 0]
     if np.any(np.diff(ways) <= 0):
         raise ToolError(name, f"the first column, the place on the way, must ascend, not {ways.tolist()}", "path")
-    missing = [("begins", ways[0], 0.0)] if ways[0] > _ROUNDING * span else []
-    missing += [("ends", ways[-1], span)] if ways[-1] < (1 - _ROUNDING) * span else []
+    (begin, end), part = during or (0.0, span), "way" if during is None else "interval in which it acts"
+    missing = [("begins", ways[0], begin)] if ways[0] > begin + _ROUNDING * span else []
+    missing += [("ends", ways[-1], end)] if ways[-1] < end - _ROUNDING * span else []
     for says, way, needed in missing:
         raise ToolError(
             name,
-            f"the path {says} at {way:g}, the way {says} at {needed:g} (a share at rest, seconds in motion): "
+            f"the path {says} at {way:g}, the {part} {says} at {needed:g} (a share at rest, seconds in motion): "
             f"add a row [{needed:g}, ...]",
             "path",
         )

@@ -1,6 +1,7 @@
 """Base class of tools: rigid bodies that move along a path and touch the surface of a body."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -12,6 +13,7 @@ from truespring.errors import ToolError, TruespringError, nearest
 from truespring.loading import Body, vector_words
 from truespring.mesh import Selection
 from truespring.tools.contact import Contact
+from truespring.tools.during import during_words, interval, limited
 from truespring.tools.laws import CONTACTS, Law
 from truespring.tools.path import Path, path_words, track_of
 from truespring.tools.skins import Skin
@@ -37,6 +39,8 @@ class Touching:
         width: width of a barrier [m]; None for L / 1000.
         friction: coefficient of Coulomb friction [-].
         on: selection of the facets that the tool may touch; None for the whole boundary.
+        during: begin and end of the part of the way in which the tool is there, shares at rest, times in motion [s];
+            None for the whole way. It may begin inside of the body.
     """
 
     contact: str = field(default="penalty", kw_only=True)
@@ -44,6 +48,7 @@ class Touching:
     width: float | None = field(default=None, kw_only=True)
     friction: float = field(default=0.0, kw_only=True)
     on: Selection | None = field(default=None, kw_only=True)
+    during: Sequence[float] | None = field(default=None, kw_only=True)
 
 
 class Tool(Touching, ABC):
@@ -100,7 +105,7 @@ class Tool(Touching, ABC):
     def words(self) -> str:
         """Return name, form and path, for tables."""
         rubbing = f", friction {self.friction:g}" if self.friction else ""
-        return f"'{self.name}': {self.form()}{rubbing}, {path_words(self.path)}"
+        return f"'{self.name}': {self.form()}{rubbing}, {path_words(self.path)}{during_words(self.during)}"
 
     def moved_to(self, on: Selection) -> Self:
         """Return the tool on another selection of facets, such as a group of another mesh."""
@@ -118,7 +123,8 @@ class Tool(Touching, ABC):
         Raises ToolError if the tool does not fit the body, or starts inside it.
         """
         self.check(body.mesh.dim)
-        track = track_of(self.name, self.path, body.mesh.dim, span)
+        during = interval(self.name, self.during, span)
+        track = track_of(self.name, self.path, body.mesh.dim, span, during)
         size = float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
         law = self._law(young, size)
         friction = positive(self.name, "friction", self.friction, "-", zero=True)
@@ -127,6 +133,8 @@ class Tool(Touching, ABC):
         except TruespringError as error:
             raise ToolError(self.name, str(error), "on" if self.on is not None else "") from None
         found = Contact(self.name, self, track, law, nodes, areas, len(body.nodes), friction)
+        if during is not None:
+            return limited(found, during, span)
         self._check_start(found, body.nodes, size)
         if within(body.mesh, track.at(0.0) + self.points(body.mesh.dim)).any():
             raise ToolError(self.name, "starts inside the body, between its nodes: begin the path outside", "path")

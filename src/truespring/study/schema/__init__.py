@@ -18,6 +18,7 @@ from truespring.study.schema.models import SpringsKeys as SpringsKeys
 from truespring.study.schema.models import TerzopoulosKeys as TerzopoulosKeys
 from truespring.study.schema.tools import ToolKeys as ToolKeys
 from truespring.study.schema.tools import key_of_tool as key_of_tool
+from truespring.study.schema.values import FILE as FILE
 from truespring.study.schema.values import Keys as Keys
 from truespring.study.schema.whole import CompareKeys as CompareKeys
 from truespring.study.schema.whole import SolverKeys as SolverKeys

@@ -2,17 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
-import numpy as np
 from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
 
-from truespring.columns import Columns
 from truespring.errors import StudyError, TruespringError, shown
 from truespring.mesh import Mesh, facets_within
+from truespring.study.paths import read_path
 from truespring.study.places import Places
 from truespring.study.schema.values import (
+    FILE,
     FileName,
     Keys,
     Length,
@@ -25,15 +24,34 @@ from truespring.study.schema.values import (
     two_or_three,
 )
 from truespring.tools import CONTACTS, TOOLS, Grasp, Tool
-from truespring.units import Dimension, to_si
+from truespring.units import to_si
 
-_COLUMNS: dict[str, Dimension | None] = {"t": "time", "x": "length", "y": "length", "z": "length"}
 _FORM = '[["0 s", "40 mm", "70 mm"], ["0.5 s", "40 mm", "50 mm"]]'
 _PATH_WORDS = (
     "places along the way: rows of the share of the way, 0 to 1, or in motion of the time, and of the coordinates, "
     f"such as {_FORM}; one list of coordinates for a place that does not move; or the name of a CSV file with columns "
-    "t, x, y[, z]"
+    "t, x, y[, z], and with a column name of rows for several"
 )
+
+
+class Within(NamedTuple):
+    """An interval.
+
+    Attributes:
+        ends: its begin and its end, shares of the way or times [s].
+        timed: whether one was given as a time with its unit.
+    """
+
+    ends: tuple[float, float]
+    timed: bool
+
+
+def _during(value: Any) -> Within:
+    """Return an interval; raise TruespringError for anything else."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise TruespringError(f'{shown(value)} is not an interval: give begin and end, such as ["0.2 s", "1.4 s"]')
+    begin, end = (to_si(one, "time") for one in value)
+    return Within((begin, end), any(isinstance(one, str) for one in value))
 
 
 def _path(value: Any) -> str | list[float] | list[list[float]]:
@@ -53,8 +71,12 @@ def _path(value: Any) -> str | list[float] | list[list[float]]:
 _NUMBERS = {"type": "array", "items": {"type": ["number", "string"]}}
 Way = Annotated[
     Any,
+    FILE,
     PlainValidator(as_value_error(_path)),
     WithJsonSchema({"anyOf": [{"type": "string"}, _NUMBERS, {"type": "array", "items": _NUMBERS}]}),
+]
+Interval = Annotated[
+    Any, PlainValidator(as_value_error(_during)), WithJsonSchema({**_NUMBERS, "minItems": 2, "maxItems": 2})
 ]
 Point = Annotated[list[Length], two_or_three]
 Shape = Annotated[str, key_of(TOOLS), WithJsonSchema({"enum": list(TOOLS)})]
@@ -68,22 +90,31 @@ class MovingKeys(Keys):
         default=None, description='name in tables; default: its number, such as "tool 1"'
     )
     path: Way = Field(description=_PATH_WORDS)
+    during: Interval | None = Field(
+        default=None,
+        description="begin and end of the interval in which it acts: times in a motion, shares of the way at rest; "
+        "default: the whole way",
+    )
 
-    def read_path(self, file: Path) -> list[float] | list[list[float]]:
-        """Return the path in SI units; read it from a file if it is one. Raises StudyError."""
-        if not isinstance(self.path, str):
-            return self.path  # type: ignore[no-any-return]  # see _path
-        table = Columns(file, _COLUMNS, ("t", "x", "y"), StudyError, form="t,x,y,z")
-        columns = [table.numbers(name) for name in _COLUMNS if name in table.columns]
-        rows: list[list[float]] = np.stack(columns, axis=1).tolist()
-        return rows
+    def arguments(self, places: Places, table: str, number: int, moves: bool) -> dict[str, Any]:
+        """Return the values that are set, by argument.
 
-    def arguments(self, places: Places, table: str, number: int) -> dict[str, Any]:
-        """Return the values that are set, by argument; `number` counts the tables called `table` from 0."""
+        Args:
+            places: the study file.
+            table: name of the table, "tool" or "grasp".
+            number: number of the table among those of its name, from 0.
+            moves: whether the study is of a motion, so that places on the way are times.
+        """
         values = {key: getattr(self, key) for key in sorted(self.model_fields_set - {"shape"})}
+        name = self.name or f"{table} {number + 1}"
         with places.at(table, number, "path"):
-            values["path"] = self.read_path(places.beside(str(self.path)))
-        return {"name": f"{table} {number + 1}"} | {key: value for key, value in values.items() if value is not None}
+            values["path"] = read_path(places.beside(self.path), name) if isinstance(self.path, str) else self.path
+        if self.during is not None:
+            values["during"] = self.during.ends
+            with places.at(table, number, "during"):
+                if self.during.timed and not moves:
+                    raise StudyError("times need [dynamics]: at rest an interval is of shares of the way, 0 to 1")
+        return {"name": name} | {key: value for key, value in values.items() if value is not None}
 
 
 class ToolKeys(MovingKeys):
@@ -125,12 +156,12 @@ class ToolKeys(MovingKeys):
                 raise ValueError(f"{key} is required and missing for a {self.shape}")
         return self
 
-    def build(self, places: Places, number: int, mesh: Mesh) -> Tool:
+    def build(self, places: Places, number: int, mesh: Mesh, moves: bool) -> Tool:
         """Return the tool, the `number`-th of the study from 0; raise StudyError if it does not fit the mesh."""
         if self.on is not None:
             with places.at("tool", number, "on"):
                 facets_within(mesh, self.on)
-        values = self.arguments(places, "tool", number)
+        values = self.arguments(places, "tool", number, moves)
         values |= {"file": places.beside(values["file"])} if "file" in values else {}
         with places.at("tool", number, *(["file"] if "file" in values else [])):
             return TOOLS[self.shape](**values)
@@ -146,9 +177,14 @@ class GraspKeys(MovingKeys):
         description="stiffness of all springs together; default: young times radius, in the plane times thickness",
     )
 
-    def build(self, places: Places, number: int, mesh: Mesh) -> Grasp:
+    origin: Point | None = Field(
+        default=None,
+        description="place on the path at which the undeformed patch is unloaded; default: the begin of the path",
+    )
+
+    def build(self, places: Places, number: int, mesh: Mesh, moves: bool) -> Grasp:
         """Return the grasp, the `number`-th of the study from 0."""
-        return Grasp(**self.arguments(places, "grasp", number))
+        return Grasp(**self.arguments(places, "grasp", number, moves))
 
 
 def key_of_tool(name: str, key: str, several: Mapping[str, list[Any]]) -> tuple[str | int, ...]:

@@ -92,8 +92,10 @@ SolidElement = Annotated[str, key_of(SOLID_ELEMENTS), WithJsonSchema({"enum": li
 Diagonal = Annotated[str, key_of(DIAGONALS), WithJsonSchema({"enum": list(DIAGONALS)})]
 SectionKind = Annotated[str, key_of(SECTIONS), WithJsonSchema({"enum": list(SECTIONS)})]
 Number = Annotated[float, BeforeValidator(_strict_number), Field(allow_inf_nan=False)]
+#: Mark of keys whose strings are names of files.
+FILE = object()
 #: Path of a file, relative to the folder of the study unless absolute.
-FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1)]
+FileName = Annotated[str, BeforeValidator(_file_name), Field(min_length=1), FILE]
 Direction = Literal["x", "y", "z"]
 
 SELECTION_FORMS = (

@@ -1,0 +1,37 @@
+"""Open a study as a session with its loop."""
+
+from pathlib import Path
+
+from truespring.live.coarsened import coarsened
+from truespring.live.loop import Loop
+from truespring.live.session import Live
+from truespring.study import read_text
+from truespring.vibration.solving import can_vibrate
+
+
+def opened(
+    file: Path,
+    *,
+    model: str | None = None,
+    reference: str | None = None,
+    coarsen: float | str = "auto",
+    twin: bool = True,
+    folder: Path | None = None,
+) -> tuple[Loop, str]:
+    """Return the loop of a session of a study, which is not started yet, and the title of the study.
+
+    Args:
+        file: study file.
+        model: name of the model that moves; None for that of the study.
+        reference: name of the model of the twin; None for the last reference of the study by finite elements.
+        coarsen: element size over that of the study, or "auto", see `coarsened`.
+        twin: whether a reference is computed beside the model.
+        folder: where the session is written to as a study; None for nowhere.
+
+    Raises StudyError, LiveError and, as `Live`, ProblemError and ModelError.
+    """
+    found = coarsened(read_text(file), coarsen, model)
+    study, name = found.study, found.study.model if model is None else model
+    models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
+    live = Live(study.problem, study.entries[name], models=models)
+    return Loop(live, model=name, about=found.notes), study.title
