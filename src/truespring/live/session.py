@@ -11,8 +11,10 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
-from truespring.live.actions import Ball, Grip, Weight
+from truespring.live.actions import Ball, Grip, HasBody, Weight
+from truespring.live.choosing import Schemes
 from truespring.live.commands import Command, Log, checked
+from truespring.live.completed import completed, with_materials
 from truespring.live.cut import (
     Aside,
     Built,
@@ -25,12 +27,12 @@ from truespring.live.cut import (
     kept_rows,
     loose_parts,
 )
-from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.live.state import State
+from truespring.live.steppers import Acting, Frame
+from truespring.loading import Body as LoadedBody
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import SAFE, Leapfrog
-from truespring.motion.follow import balance_of, begin_of
-from truespring.motion.implicit import Implicit
+from truespring.motion.follow import begin_of
 from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
@@ -41,8 +43,6 @@ from truespring.tools.surface import surface
 
 #: Time between frames by default [s].
 FRAME = 1 / 60
-#: Density of a body without one: that of water [kg/m^3].
-WATER = 1000.0
 #: Gravity of a body without such a load [m/s^2], against the last direction.
 GRAVITY = 9.81
 # Radius of a grasp by default: the larger of these shares of a typical edge and of the size of the body.
@@ -51,6 +51,8 @@ _PATCH, _SHARE = 1.6, 0.05
 _PINNED = 10.0
 # Energy that a frame may gain without work, over the largest energy so far: more is an instability.
 _GAIN = 0.05
+# An oscillation over the size of the body that is no instability but a rounding error.
+_SMALL = 1e-7
 # The step is halved up to so many times.
 _HALVINGS = 6
 # Largest motion in a frame: of a sphere over its radius, of a grasp over the size of the body.
@@ -112,6 +114,7 @@ class Live:
         model: the model.
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
+        why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
         begun: what the session begins with.
 
@@ -150,16 +153,20 @@ class Live:
             model: the model of the body.
             models: models to which the command "model" changes, by name.
             frame: time between frames [s].
-            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog unless it has no stable step.
+            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog, unless it has no stable
+                step, or takes longer than a frame and bdf2 takes less.
             step: longest time step [s]; "auto" for that of the problem, or half of leapfrog's stable step.
             iterations: Newton iterations of each step of an implicit scheme; 0 solves it.
 
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
+        self._decided: str | None = None  # the scheme of "auto", once it is chosen
+        self.why = ""
         self.settings = Settings(frame, scheme, step, iterations)
         self.model = as_model(model)
-        self.problem = self._completed(problem)
+        self.problem, notes = completed(problem)
+        self.notes.extend(notes)
         self._whole = self._left = Whole.of(self.problem, self.model, dict(models or {}))
         self._aside = Aside()
         self._changes: dict[str, float] = {}
@@ -181,20 +188,10 @@ class Live:
         self._aside.forget()
         self._stepper.forget()
 
-    def _completed(self, problem: Problem) -> Problem:
-        """Return a problem with density and dynamics."""
-        if problem.material is not None and any(one.density is None for one in problem.materials):
-            self.notes.append(f"no density is given: that of water, {WATER:g} kg/m^3, is taken")
-            problem = _with_materials(problem, lambda one: replace(one, density=one.density or WATER))
-        if problem.dynamics is None:
-            self.notes.append("no dynamics are given: the body begins at its equilibrium, without damping")
-            problem = replace(problem, dynamics=Dynamics(1.0, start="equilibrium"))
-        return problem
-
     @property
     def _dynamics(self) -> Dynamics:
         dynamics = self.problem.dynamics
-        assert dynamics is not None  # see `_completed`
+        assert dynamics is not None  # see `completed`
         return dynamics
 
     def _clear(self) -> None:
@@ -207,7 +204,7 @@ class Live:
     def _build(self, ready: Built | None = None) -> None:
         """Build the body of the present problem and model, unless it is ready, and choose how it moves."""
         made = built(self.problem, self.model) if ready is None else ready
-        for size in ("surface", "edge", "contact_stiffness"):
+        for size in ("surface", "touched", "edge", "contact_stiffness"):
             self.__dict__.pop(size, None)
         self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
         self._weight = self._weight_of(self._gravity)
@@ -220,20 +217,14 @@ class Live:
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
-        self._stepper: Stepper
-        if wanted == "leapfrog" or (wanted == "auto" and self._stable > 0):
-            if not self._stable:
-                raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
-            safe = SAFE * self._stable
-            self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self._plain)
-            plain = StepByStep(Leapfrog(self._plain), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self._plain, springs)
-            return
-        scheme = "bdf2" if wanted == "auto" else wanted
-        self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
-        balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self._plain, balance, scheme, settings.iterations), scheme)
+        step = float(asked) if isinstance(asked, int | float) else None
+        schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
+        choice = schemes.chosen(self._decided or wanted if wanted == "auto" else wanted)
+        self._stepper, self._longest = choice.stepper, choice.longest
+        if wanted == "auto" and self._decided is None:
+            self._decided, self.why = choice.scheme, choice.why
+            if choice.slow:
+                self.notes.append(choice.why)
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
@@ -263,15 +254,34 @@ class Live:
         """The state, with the further nodes of second-order elements."""
         return self._moment
 
-    def put(self, moment: Moment) -> None:
-        """Go on from another state, with the further nodes of second-order elements."""
-        self._moment = moment
-        self._stepper.forget()
+    @property
+    def state(self) -> State:
+        """The state with all that holds the body, for another session."""
+        held = dict(self._grips), dict(self._balls), dict(self._targets)
+        gravity = self._weight.begin, self._weight.end
+        return State(self.log.frames, self._moment, *held, gravity, self._stepper.before)
 
-    def take_steps_of(self, step: float) -> None:
-        """Take steps of at most another length [s] from now on."""
-        self.settings = replace(self.settings, step=step)
+    def go_on(self, state: State, moment: Moment | None = None) -> None:
+        """Go on from the state of another session of the body, or with its grasps and spheres from `moment`."""
+        self._moment = state.moment if moment is None else moment
+        self._grips = {name: one.on(self.acted_on) for name, one in state.grips.items()}
+        self._balls = dict(state.balls)
+        self._targets = dict(state.targets)
+        self._weight = replace(self._weight, begin=state.gravity[0], end=state.gravity[1])
+        self._stepper.forget()
+        self._stepper.before = state.before if moment is None else None
+
+    def settle(self) -> None:
+        """Take gravity as it was asked for, without a frame in which it changes."""
+        self._weight = self._weight.settled
+        self.body = self._weighted()
+
+    def choose(self, scheme: str, step: float | str, iterations: int) -> None:
+        """Take other steps from now on, see `Settings`."""
+        self.settings = replace(self.settings, scheme=scheme, step=step, iterations=iterations)
+        before = self._stepper.before
         self._choose()
+        self._stepper.before = before
 
     @property
     def time(self) -> float:
@@ -351,6 +361,18 @@ class Live:
         if mesh.element == "line":
             return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
+
+    @property
+    def acted_on(self) -> LoadedBody:
+        """The body that grasps and spheres act on, with the further nodes of second-order elements."""
+        potential = self.body.potential
+        return potential.body if isinstance(potential, HasBody) else self.problem.body
+
+    @cached_property
+    def touched(self) -> tuple[Ints, Floats]:
+        """As `surface`, with the further nodes of second-order elements: what spheres push."""
+        body = self.acted_on
+        return self.surface if body.second_order is None else surface(body, None)
 
     @cached_property
     def edge(self) -> float:
@@ -533,7 +555,7 @@ class Live:
         self._require_free(command.name)
         at, radius = np.array(command.place), command.radius
         assert radius is not None and command.value is not None  # see `checked`
-        body, still = self.problem.body, np.zeros(self.dim)
+        body, still = self.acted_on, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
         grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still, self.time)
         motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
@@ -584,7 +606,7 @@ class Live:
 
         if not self._changes and problem.dynamics is self._dynamics:
             return problem
-        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
+        return replace(with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -595,7 +617,7 @@ class Live:
     def _do_model(self, command: Command) -> None:
         if command.name not in self.models:
             raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self.models) or 'none'}")
-        self.model = self._left.models[command.name]
+        self.model, self._decided = self._left.models[command.name], None
         before = self._moment
         self._build()
         if len(self.body.potential.nodes) != len(before.positions):
@@ -658,7 +680,7 @@ class Live:
 
     @property
     def _acting(self) -> Acting:
-        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface, self._weight)
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.touched, self._weight)
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
@@ -685,8 +707,7 @@ class Live:
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
         if self._weight.moves:
-            self._weight = self._weight.settled
-            self.body = self._weighted()
+            self.settle()
 
     def _cut_what_is_ready(self) -> None:
         """Carry out the cut that another thread has built, if there is one."""
@@ -717,12 +738,18 @@ class Live:
         if not np.isfinite(after):  # an inverted element: its energy is not known
             after = self._kinetic(taken.moment)
         before = before if np.isfinite(before) else after
-        self._largest = max(self._largest, abs(taken.done), before)
+        self._largest = max(self._largest, abs(taken.done), before, self._rounding)
         return after - before - taken.done + taken.damped <= _GAIN * self._largest
+
+    @property
+    def _rounding(self) -> float:
+        """An energy far above rounding errors [J]: of an oscillation by _SMALL of the size that limits the step."""
+        step = self._stable if 0 < self._stable < np.inf else self.settings.frame
+        return float(self.body.mass.sum()) * (_SMALL * self.size / step) ** 2
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
-        return self._kinetic(moment) + self.body.potential.energy(moment.positions) + acting.stored(moment.positions)
+        return self._kinetic(moment) + self._stepper.elastic(moment.positions) + acting.stored(moment.positions)
 
     def _kinetic(self, moment: Moment) -> float:
         return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2
@@ -742,7 +769,7 @@ class Live:
     @cached_property
     def contact_stiffness(self) -> float:
         """The pressure per depth of a sphere [Pa/m]: that which does not shorten the step much."""
-        nodes, areas = self.surface
+        nodes, areas = self.touched
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
         if not stiffest:
@@ -812,15 +839,6 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
             live.repeat(left.pop(0))
         live.step()
     return live
-
-
-def _with_materials(problem: Problem, change: Callable[[Material], Material]) -> Problem:
-    """Return a problem with each material changed, that of the body first, then those of its regions."""
-    if problem.material is None:
-        return problem
-    material = change(problem.material)
-    regions = [replace(one, material=change(one.material)) for one in problem.regions]
-    return replace(problem, material=material, regions=regions)
 
 
 def _begins(several: Sequence[Part]) -> tuple[Part, ...]:

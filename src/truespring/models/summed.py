@@ -197,7 +197,7 @@ class SummedLinks(SummedSprings[Any]):
     """Elements of several kinds whose energy is a function of the squared lengths of links."""
 
     def spring_data(self) -> SpringData:
-        """Return the springs and, for each kind of element, numbers, nodes, links and coupling [J/m^4]."""
+        """Return the springs and, for each kind of element, numbers, nodes, links and coupling [J/m^4], as arrays."""
         arrays: dict[str, Any] = {"springs": self.springs}
         for (numbers, block), part in zip(self.problem.mesh.blocks, self.parts, strict=True):
             own = part.spring_data().arrays

@@ -81,14 +81,11 @@ class VolumeSprings:
         return self.network.stretch(positions)
 
     def spring_data(self) -> SpringData:
-        """Return the springs as arrays, `kappa`, the modulus of the volume term [Pa], and simplices of an element."""
-        kind = self.term.problem.mesh.kind
-        of_volume = {
-            "kappa": self.term.kappa,
-            "simplices": np.array(kind.simplices),
-            "simplex_weight": np.array(kind.simplex_weight),
-        }
-        return SpringData(self.network, {**self.network.spring_data().arrays, **of_volume}, VOLUME_TERM)
+        """Return springs and volume term as arrays: modulus and undeformed volume of elements, simplices of an element.
+
+        See docs/export/arrays.md."""
+        plain = self.network.spring_data()
+        return SpringData(self.network, {**plain.arrays, **self.term.arrays}, VOLUME_TERM)
 
     @property
     def cells(self) -> dict[str, Ints]:
