@@ -18,8 +18,10 @@ from truespring.study import Study, StudyText
 
 #: Largest share of the time that steps may take, so that server, page and twin have the rest.
 SHARE = 0.6
-# Factors of the element size that "auto" tries, and frames that are timed.
-_FACTORS, _FRAMES = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0), 3
+# Factors of the element size that "auto" tries.
+_FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+# At most so many frames are timed, for at most about so long [s].
+_FRAMES, _PATIENCE = 10, 0.5
 # Costs of leapfrog fall with this power of the size of elements: fewer nodes and steps, and better use of caches.
 _POWER = {2: 4, 3: 5}
 
@@ -71,8 +73,8 @@ def cost(problem: Problem, model: Model) -> float:
     """Return the time that a frame takes on this machine over the time between frames [-], without loads."""
     live = Live(resting(completed(problem)[0]), model)
     live.step()  # compiles
-    taken = []
-    for _ in range(_FRAMES):
+    taken: list[float] = []
+    while len(taken) < _FRAMES and sum(taken) < _PATIENCE:  # the smallest: other programs may have the machine
         begin = time.perf_counter()
         live.step()
         taken.append(time.perf_counter() - begin)

@@ -52,7 +52,7 @@ _PINNED = 10.0
 # Energy that a frame may gain without work, over the largest energy so far: more is an instability.
 _GAIN = 0.05
 # An oscillation over the size of the body that is no instability but a rounding error.
-_SMALL = 1e-9
+_SMALL = 1e-7
 # The step is halved up to so many times.
 _HALVINGS = 6
 # Largest motion in a frame: of a sphere over its radius, of a grasp over the size of the body.
