@@ -1,11 +1,14 @@
 """Open a study as a session with its loop."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from truespring.errors import LiveError
 from truespring.live.coarsened import coarsened
 from truespring.live.loop import Loop
 from truespring.live.measured import Measures
+from truespring.live.record import write_session
 from truespring.live.session import Live
 from truespring.live.twin import Twin
 from truespring.models import Fem
@@ -39,11 +42,21 @@ def opened(
     models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
     live = Live(study.problem, study.entries[name], models=models)
     right = _reference(study, reference) if twin else None
-    if right is None:
-        return Loop(live, model=name, about=found.notes), study.title
-    beside = Twin(live, study.entries[right])
-    about = (*found.notes, f"the reference is '{right}'")
-    return Loop(live, model=name, twin=beside, gauge=Measures(live, beside), about=about), study.title
+    more: dict[str, Any] = {
+        "model": name,
+        "about": found.notes,
+        "save": None if folder is None else _saving(study, folder),
+    }
+    if right is not None:
+        beside = Twin(live, study.entries[right])
+        about = (*found.notes, f"the reference is '{right}'")
+        more |= {"twin": beside, "gauge": Measures(live, beside), "about": about}
+    return Loop(live, **more), study.title
+
+
+def _saving(study: Study, folder: Path) -> Callable[[Live], str]:
+    """Return what writes a session of a study to a folder, and says which files it wrote."""
+    return lambda live: f"written: {', '.join(str(file) for file in write_session(live, study, folder))}"
 
 
 def _reference(study: Study, name: str | None) -> str | None:
