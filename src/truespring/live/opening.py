@@ -1,10 +1,13 @@
 """Open a study as a session with its loop."""
 
 from pathlib import Path
+from typing import Any
 
 from truespring.live.coarsened import coarsened
+from truespring.live.haptic import PERIOD, Haptic
+from truespring.live.haptic_loop import HapticLoop
 from truespring.live.loop import Loop
-from truespring.live.session import Live
+from truespring.live.session import FRAME, Live
 from truespring.study import read_text
 from truespring.vibration.solving import can_vibrate
 
@@ -17,6 +20,7 @@ def opened(
     coarsen: float | str = "auto",
     twin: bool = True,
     folder: Path | None = None,
+    haptic: int | None = None,
 ) -> tuple[Loop, str]:
     """Return the loop of a session of a study, which is not started yet, and the title of the study.
 
@@ -27,11 +31,14 @@ def opened(
         coarsen: element size over that of the study, or "auto", see `coarsened`.
         twin: whether a reference is computed beside the model.
         folder: where the session is written to as a study; None for nowhere.
+        haptic: UDP port of a haptic device, with which the body moves in step, 0 for a free one; None for none.
 
     Raises StudyError, LiveError and, as `Live`, ProblemError and ModelError.
     """
     found = coarsened(read_text(file), coarsen, model)
     study, name = found.study, found.study.model if model is None else model
     models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
-    live = Live(study.problem, study.entries[name], models=models)
-    return Loop(live, model=name, about=found.notes), study.title
+    live = Live(study.problem, study.entries[name], models=models, frame=FRAME if haptic is None else PERIOD)
+    known: dict[str, Any] = {"model": name, "about": found.notes}
+    loop = Loop(live, **known) if haptic is None else HapticLoop(Haptic(live, haptic), **known)
+    return loop, study.title
