@@ -24,6 +24,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import truespring as ts
+from tests.c_runtime import opened
 from tests.calculix import displacements
 from tests.exports import CASES, difference, expected, exported
 from tests.studies import changed, written
@@ -720,10 +721,18 @@ def _by_arrays(values: Mapping[str, Any]) -> Floats:
     return here - nodes
 
 
+def _by_c(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    with opened(bytes(files["body.bin"])) as body:  # type: ignore[arg-type]
+        body.call("reset", 0.0)
+        assert body.call("settle", 1e-10, 100_000) > 0
+        return np.asarray(body.x - in_space(exported("bending").problem.mesh.nodes))
+
+
 #: How a file is run, by target.
 RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "calculix": _by_calculix,
     "mujoco": _by_mujoco,
+    "c": _by_c,
     "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
     "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
 }
@@ -743,8 +752,9 @@ def test_every_target_is_run_or_says_why_not() -> None:
 
 @pytest.mark.parametrize("target", RUNS)
 def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
-    if target == "calculix" and shutil.which("ccx") is None:
-        pytest.skip("CalculiX is not installed")
+    program = {"calculix": "ccx", "c": "cc"}.get(target)
+    if program is not None and shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
     found = RUNS[target](target_files(exported("bending"), [target])[target], tmp_path)
     assert difference(found, "bending") < 1e-6
 

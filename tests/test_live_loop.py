@@ -42,6 +42,7 @@ class Twin:
     told: list[Command] = field(default_factory=list)
     counts: list[tuple[int, bool]] = field(default_factory=list)
     ghosts: list[Ghost] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def tell(self, command: Command) -> None:
         self.told.append(command)

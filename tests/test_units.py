@@ -19,6 +19,8 @@ from truespring.units import Dimension, to_si
         ("1 inch", "length", 0.0254),
         ("1 g/cm^3", "density", 1000.0),
         ("1 kg m^-3", "density", 1.0),
+        ("2 1/s", "rate", 2.0),
+        ("0.5 1/ms", "rate", 500.0),
         (7, "length", 7.0),
         ("0 mm", "length", 0.0),
     ],

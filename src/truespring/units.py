@@ -117,10 +117,11 @@ def unit_of(unit: str | float, dimension: Dimension, key: str, error: type[Trues
 
 
 # A decimal number, then a product or quotient of unit names with small powers. pint alone would evaluate any
-# expression, and would read "1,5 N" as 15 N.
+# expression, and would read "1,5 N" as 15 N. "2 1/s" is a rate.
 _NAME = r"[^\W\d_]+(?:\s*(?:\^|\*\*)\s*-?\d|[²³])?"
 _QUANTITY = re.compile(
-    rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*({_NAME}(?:\s*[*/·]\s*{_NAME}|\s+{_NAME})*)?\s*"
+    rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+    rf"((?:(?<=\s)1\s*/\s*)?{_NAME}(?:\s*[*/·]\s*{_NAME}|\s+{_NAME})*)?\s*"
 )
 
 

@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 from truespring.exports.abaqus import abaqus
 from truespring.exports.arrays import as_json, npz
+from truespring.exports.c import c
 from truespring.exports.calculix import calculix
 from truespring.exports.decks import SPRINGA
 from truespring.exports.features import ALL, Feature
@@ -59,6 +60,15 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             expressed="Springs are a MeshSpringForceField, finite elements a node of their own, loads constant forces.",
             left_out="Contact is not set up.",
             unrun="SOFA was not run; the scene is checked against the source code of SOFA",
+        ),
+        "c": Target(
+            c,
+            "a runtime in C99: truespring.h moves the body of body.bin, main.c settles it",
+            "the C runtime",
+            ("truespring.h", "body.bin", "main.c"),
+            ALL,
+            expressed="body.bin has springs, elements, masses, supports and dead loads; truespring.h moves them.",
+            left_out="Contact is with spheres only, without friction; the body does not touch itself.",
         ),
         "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL, _ARRAYS, _NOTHING),
         "json": Target(

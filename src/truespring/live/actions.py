@@ -2,17 +2,32 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Amplitude, Interaction, Loading
-from truespring.tools import Sphere
+from truespring.loading import Body
+from truespring.tools import Grasp, Sphere
 from truespring.tools.contact import Contact
 from truespring.tools.grasp import Springs
 from truespring.tools.laws import Penalty
 from truespring.tools.path import Track
+
+
+@runtime_checkable
+class HasBody(Protocol):
+    """A potential with nodes of its own that loads and grasps act on.
+
+    Attributes:
+        body: the body with these nodes.
+    """
+
+    @property
+    def body(self) -> Body:
+        """The body with these nodes."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +58,14 @@ class Grip:
     def to(self, motion: Floats) -> Self:
         """Return the grasp with another motion at the end of the frame [m], shape (dim,)."""
         return replace(self, end=motion)
+
+    def on(self, body: Body) -> Self:
+        """Return the grasp on the nodes of a body: another one if that has second-order elements, or lacks nodes."""
+        if body.second_order is None and self.nodes.max(initial=0) < len(body.nodes):
+            return self
+        at = self.at.tolist()
+        nodes, stiffness = Grasp(self.name, at, self.radius, at, float(self.stiffness.sum())).patch(body, None)
+        return replace(self, nodes=nodes, stiffness=stiffness, rest=body.nodes[nodes])
 
     @property
     def settled(self) -> Self:

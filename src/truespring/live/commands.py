@@ -45,6 +45,7 @@ class Kind(NamedTuple):
         bounds: smallest and largest value, both allowed; None without a value.
         name: whether it needs a name.
         repeats: whether a study repeats it, with the same model and material.
+        holds: whether it changes grasps and spheres only, not the body.
         lasts: whether it still acts after a restart.
         blade: whether the place is a blade: start, end and, in space, the vector of its depth, with dim values each.
     """
@@ -55,6 +56,7 @@ class Kind(NamedTuple):
     bounds: tuple[float, float] | None = None
     name: bool = False
     repeats: bool = True
+    holds: bool = False
     lasts: bool = False
     blade: bool = False
 
@@ -65,19 +67,20 @@ _SIZE = (0.0, math.inf)
 COMMANDS: Mapping[str, Kind] = MappingProxyType(
     {
         "grasp": Kind("hold the patch within `radius` of a place of the undeformed body by springs of `value` N/m",
-                      place=True, radius=True, bounds=_SIZE, name=True),
-        "sphere": Kind("add a sphere at a place, of `value` Pa/m", place=True, radius=True, bounds=_SIZE, name=True),
-        "move": Kind("move a grasp or sphere to a place", place=True, name=True),
-        "release": Kind("remove a grasp, pin or sphere", name=True),
+                      place=True, radius=True, bounds=_SIZE, name=True, holds=True),
+        "sphere": Kind("add a sphere at a place, of `value` Pa/m",
+                       place=True, radius=True, bounds=_SIZE, name=True, holds=True),
+        "move": Kind("move a grasp or sphere to a place", place=True, name=True, holds=True),
+        "release": Kind("remove a grasp, pin or sphere", name=True, holds=True),
         "gravity": Kind("multiply gravity by `value`", bounds=(-10.0, 10.0), lasts=True),
-        "young": Kind("multiply Young's moduli of the study by `value`", bounds=(1e-3, 1e3), repeats=False, lasts=True),
+        "young": Kind("multiply Young's moduli of the study by `value`",
+                      bounds=(1e-3, 1e3), repeats=False, lasts=True),
         "poisson": Kind("set Poisson's ratio", bounds=(-0.9, 0.4999), repeats=False, lasts=True),
-        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False,
-                        lasts=True),
+        "damping": Kind("set the damping by mass to `value` 1/s", bounds=(0.0, 1e3), repeats=False, lasts=True),
         "model": Kind("change to another model of the study", name=True, repeats=False, lasts=True),
         "cut": Kind("remove the elements that a blade passes: its place is start, end and, in space, depth",
                     repeats=False, blade=True),
-        "restart": Kind("bring the body back to its begin, without grasps and spheres"),
+        "restart": Kind("bring the body back to its begin, without cuts, grasps and spheres"),
     }
 )  # fmt: skip
 

@@ -23,6 +23,8 @@ SPEEDS = (0.01, 10.0)
 _STILL, _LOOK = 0.01, 6
 # Time between looks at the orders while the session is paused [s].
 _IDLE = 0.05
+# Kinds of ghosts that are shown.
+_SHOWN = ("rest", "moving")
 # A body of more nodes is cut aside.
 _LARGE = 3000
 # Number of messages of the loop that are kept.
@@ -30,7 +32,13 @@ _MESSAGES = 50
 
 
 class Companion(Protocol):
-    """A reference that follows a session in another process."""
+    """A reference that follows a session in another process.
+
+    Attributes:
+        notes: what happened since they were cleared, in sentences.
+    """
+
+    notes: list[str]
 
     def tell(self, command: Command) -> None:
         """Take a command of the session."""
@@ -213,11 +221,14 @@ class Loop:
 
     def _compare(self) -> None:
         """Compare the news of the twin with the session at equal times."""
+        if self._twin is not None and self._twin.notes:
+            self.messages.extend(self._twin.notes)
+            self._twin.notes.clear()
         for ghost in () if self._twin is None else self._twin.news():
             if self._gauge is not None:
                 self._gauge.take(ghost, self.ring)
             own = self.ring.at(ghost.time)
-            if ghost.kind == "finer" or own is None or own.shape != ghost.positions.shape:
+            if ghost.kind not in _SHOWN or own is None or own.shape != ghost.positions.shape:
                 continue
             apart = np.linalg.norm(ghost.positions - own, axis=1)
             self._numbers += 1

@@ -3,12 +3,16 @@
 from pathlib import Path
 from typing import Any
 
+from truespring.errors import LiveError
 from truespring.live.coarsened import coarsened
 from truespring.live.haptic import PERIOD, Haptic
 from truespring.live.haptic_loop import HapticLoop
 from truespring.live.loop import Loop
+from truespring.live.measured import Measures
 from truespring.live.session import FRAME, Live
-from truespring.study import read_text
+from truespring.live.twin import Twin
+from truespring.models import Fem
+from truespring.study import Study, read_text
 from truespring.vibration.solving import can_vibrate
 
 
@@ -40,5 +44,21 @@ def opened(
     models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
     live = Live(study.problem, study.entries[name], models=models, frame=FRAME if haptic is None else PERIOD)
     known: dict[str, Any] = {"model": name, "about": found.notes}
+    right = _reference(study, reference) if twin else None
+    if right is not None:
+        beside = Twin(live, study.entries[right])
+        about = (*found.notes, f"the reference is '{right}'")
+        known |= {"twin": beside, "gauge": Measures(live, beside), "about": about}
     loop = Loop(live, **known) if haptic is None else HapticLoop(Haptic(live, haptic), **known)
     return loop, study.title
+
+
+def _reference(study: Study, name: str | None) -> str | None:
+    """Return the name of the model of the twin; None if the study has no finite elements to compare with."""
+    if name is not None:
+        if name not in study.entries or not can_vibrate(study.entries[name]):
+            allowed = ", ".join(key for key, one in study.entries.items() if can_vibrate(one))
+            raise LiveError(f"{study.file}: reference '{name}' is unknown, or cannot move; allowed: {allowed}")
+        return name
+    known = (*reversed(study.references), *study.entries)
+    return next((key for key in known if study.entries[key].kind == Fem.kind), None)

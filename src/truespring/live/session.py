@@ -11,7 +11,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
-from truespring.live.actions import Ball, Grip, Weight
+from truespring.live.actions import Ball, Grip, HasBody, Weight
 from truespring.live.commands import Command, Log, checked
 from truespring.live.cut import (
     Aside,
@@ -25,7 +25,9 @@ from truespring.live.cut import (
     kept_rows,
     loose_parts,
 )
+from truespring.live.state import State
 from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.loading import Body as LoadedBody
 from truespring.material import Material
 from truespring.models import Model, as_model
 from truespring.motion.explicit import SAFE, Leapfrog
@@ -207,9 +209,9 @@ class Live:
     def _build(self, ready: Built | None = None) -> None:
         """Build the body of the present problem and model, unless it is ready, and choose how it moves."""
         made = built(self.problem, self.model) if ready is None else ready
-        for size in ("surface", "edge", "contact_stiffness"):
+        for size in ("surface", "touched", "edge", "contact_stiffness"):
             self.__dict__.pop(size, None)
-        self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
+        self._plain, self._geometry, self._stable, self._known = made.body, made.geometry, made.stable, None
         self._weight = self._weight_of(self._gravity)
         self.body = self._weighted()
         self._halved, self._largest = 0, 0.0
@@ -263,15 +265,34 @@ class Live:
         """The state, with the further nodes of second-order elements."""
         return self._moment
 
-    def put(self, moment: Moment) -> None:
-        """Go on from another state, with the further nodes of second-order elements."""
-        self._moment = moment
-        self._stepper.forget()
+    @property
+    def state(self) -> State:
+        """The state with all that holds the body, for another session."""
+        held = dict(self._grips), dict(self._balls), dict(self._targets)
+        gravity = self._weight.begin, self._weight.end
+        return State(self.log.frames, self._moment, *held, gravity, self._stepper.before)
 
-    def take_steps_of(self, step: float) -> None:
-        """Take steps of at most another length [s] from now on."""
-        self.settings = replace(self.settings, step=step)
+    def go_on(self, state: State, moment: Moment | None = None) -> None:
+        """Go on from the state of another session of the body, or with its grasps and spheres from `moment`."""
+        self._moment = state.moment if moment is None else moment
+        self._grips = {name: one.on(self.acted_on) for name, one in state.grips.items()}
+        self._balls = dict(state.balls)
+        self._targets = dict(state.targets)
+        self._weight = replace(self._weight, begin=state.gravity[0], end=state.gravity[1])
+        self._stepper.forget()
+        self._stepper.before = state.before if moment is None else None
+
+    def settle(self) -> None:
+        """Take gravity as it was asked for, without a frame in which it changes."""
+        self._weight = self._weight.settled
+        self.body = self._weighted()
+
+    def choose(self, scheme: str, step: float | str, iterations: int) -> None:
+        """Take other steps from now on, see `Settings`."""
+        self.settings = replace(self.settings, scheme=scheme, step=step, iterations=iterations)
+        before = self._stepper.before
         self._choose()
+        self._stepper.before = before
 
     @property
     def time(self) -> float:
@@ -351,6 +372,18 @@ class Live:
         if mesh.element == "line":
             return np.arange(mesh.n_nodes), np.zeros(mesh.n_nodes)
         return surface(self.problem.body, None)
+
+    @property
+    def acted_on(self) -> LoadedBody:
+        """The body that grasps and spheres act on, with the further nodes of second-order elements."""
+        potential = self.body.potential
+        return potential.body if isinstance(potential, HasBody) else self.problem.body
+
+    @cached_property
+    def touched(self) -> tuple[Ints, Floats]:
+        """As `surface`, with the further nodes of second-order elements: what spheres push."""
+        body = self.acted_on
+        return self.surface if body.second_order is None else surface(body, None)
 
     @cached_property
     def edge(self) -> float:
@@ -533,7 +566,7 @@ class Live:
         self._require_free(command.name)
         at, radius = np.array(command.place), command.radius
         assert radius is not None and command.value is not None  # see `checked`
-        body, still = self.problem.body, np.zeros(self.dim)
+        body, still = self.acted_on, np.zeros(self.dim)
         nodes, stiffness = Grasp(command.name, command.place, radius, command.place, command.value).patch(body, None)
         grip = Grip(command.name, at, radius, nodes, stiffness, body.nodes[nodes], still, still, self.time)
         motion = np.array(command.begin) if command.begin else grip.mean_motion(self._moment.positions)
@@ -658,7 +691,7 @@ class Live:
 
     @property
     def _acting(self) -> Acting:
-        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.surface, self._weight)
+        return Acting(tuple(self._grips.values()), tuple(self._balls.values()), self.touched, self._weight)
 
     def _frame(self) -> None:
         """Advance by a frame; halve the step where energy rises without work."""
@@ -685,8 +718,7 @@ class Live:
         self._grips = {name: one.settled for name, one in self._grips.items()}
         self._balls = {name: one.settled for name, one in self._balls.items()}
         if self._weight.moves:
-            self._weight = self._weight.settled
-            self.body = self._weighted()
+            self.settle()
 
     def _cut_what_is_ready(self) -> None:
         """Carry out the cut that another thread has built, if there is one."""
@@ -722,7 +754,12 @@ class Live:
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
-        return self._kinetic(moment) + self.body.potential.energy(moment.positions) + acting.stored(moment.positions)
+        known = self._known
+        if known is None or known[0] is not moment:  # that at the end of a frame is that at the begin of the next
+            self._known = known = moment, self._kinetic(moment) + self.body.potential.energy(moment.positions)
+        return known[1] + acting.stored(moment.positions)
+
+    _known: tuple[Moment, float] | None = None
 
     def _kinetic(self, moment: Moment) -> float:
         return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2
@@ -742,7 +779,7 @@ class Live:
     @cached_property
     def contact_stiffness(self) -> float:
         """The pressure per depth of a sphere [Pa/m]: that which does not shorten the step much."""
-        nodes, areas = self.surface
+        nodes, areas = self.touched
         stable = self._stable if np.isfinite(self._stable) and self._stable > 0 else self.settings.frame
         stiffest = float((areas / self.body.mass[nodes]).max())
         if not stiffest:

@@ -63,7 +63,13 @@ class Frame:
 
 
 class Stepper(Protocol):
-    """Takes the steps of a frame."""
+    """Takes the steps of a frame.
+
+    Attributes:
+        before: the state before the last one, which schemes over two steps need; None without one.
+    """
+
+    before: Moment | None
 
     @property
     def name(self) -> str:
@@ -83,6 +89,7 @@ class Compiled:
     """Steps of leapfrog in one compiled loop, for springs of constant stiffness under loads that do not change."""
 
     name = "leapfrog, compiled"
+    before: Moment | None = None
 
     def __init__(self, body: Body, springs: ConstantSprings) -> None:
         """Store what the loop reads."""
@@ -163,11 +170,11 @@ class StepByStep:
         self._scheme: Scheme = scheme
         self._body: Body = scheme.body
         self.name = name
-        self._before: Moment | None = None
+        self.before: Moment | None = None
 
     def forget(self) -> None:
         """Forget the state before the last one, and the force at it."""
-        self._before = None
+        self.before = None
         self._scheme.forget()
 
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
@@ -180,13 +187,13 @@ class StepByStep:
         self._scheme.body = replace(body, loading=loading)
         account = Account()
         account.open(loading, last.positions, last.time / span)
-        history = History(last, self._before)
+        history = History(last, self.before)
         for _ in range(n):
             taken = self._scheme.advance(history, h, account)
             if not isinstance(taken, Advance):
                 return Frame(last, 0.0, 0.0, stacked([], last.positions.shape[1]), solved=False)
             account, history = taken.account, History(taken.moment, history.last)
-        self._before = history.before
+        self.before = history.before
         level = history.last.time / span
         touches = loading.touches(history.last.positions, level)[len(body.loading.interactions) :]
         forces = stacked([one.force for one in touches], last.positions.shape[1])
