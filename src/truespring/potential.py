@@ -171,22 +171,34 @@ class Unstressed(Potential, Protocol):
         ...
 
 
-class ConstantSprings(NamedTuple):
-    """Springs of zero rest length and constant stiffness, and a pressure in each element.
+class ConstantCells(NamedTuple):
+    """Elements of one kind with springs of zero rest length and constant stiffness, and a pressure in each.
 
-    The force on node i is the sum of w (x_i - x_j), plus (offset + slope ln J) / J times the derivative of the volume
-    of each element, J its volume over the undeformed one.
+    The energy of an element is shear / 2 times the quadratic form of its matrix, plus its undeformed volume times the
+    law of the volume, whose derivative by ln J is offset + slope ln J in space; see `kernels.pressures`.
 
     Attributes:
-        springs: starts (n_nodes + 1,), columns (n_blocks,) and weights [N/m] (n_blocks,) of the neighbours of nodes.
-        cells: elements (n_elements, k), at_starts (n_nodes + 1,), at (n_elements * k,): the elements of each node;
-            undeformed volumes [m^3], offset and slope [Pa] (n_elements,).
-        form: the kind of elements, see `kernels.leapfrog.measure`.
+        elements: node numbers, shape (n_elements, k).
+        matrices: quadratic forms by class [m], shape (n_classes, k, k); rows sum to zero.
+        of: the class of each element, shape (n_elements,).
+        shear: shear modulus [Pa], shape (n_elements,).
+        undeformed: undeformed volume [m^3], area times thickness in 2D, shape (n_elements,).
+        across: shear modulus in plane stress, else 0 [Pa], shape (n_elements,).
+        offset, slope: of the derivative of the energy density by ln J [Pa], shape (n_elements,).
+        simplices: simplices of an element, whose weighted sum is its volume, shape (n_simplices, dim + 1).
+        weight: factor of the sum of their determinants [-], or [m] in 2D.
     """
 
-    springs: tuple[ShortInts, ShortInts, Floats]
-    cells: tuple[ShortInts, ShortInts, ShortInts, Floats, Floats, Floats]
-    form: tuple[Any, ...]
+    elements: ShortInts
+    matrices: Floats
+    of: Ints
+    shear: Floats
+    undeformed: Floats
+    across: Floats
+    offset: Floats
+    slope: Floats
+    simplices: Ints
+    weight: float
 
 
 @runtime_checkable
@@ -194,8 +206,8 @@ class Explicit(Potential, Protocol):
     """A potential whose force compiled loops may compute."""
 
     @property
-    def constant_springs(self) -> ConstantSprings | None:
-        """The springs and elements; None if the potential has another form."""
+    def constant_springs(self) -> tuple[ConstantCells, ...] | None:
+        """The elements by kind; None if the potential has another form."""
         ...
 
 

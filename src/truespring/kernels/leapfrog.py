@@ -1,6 +1,14 @@
 """Many steps of leapfrog at once for springs of zero rest length and constant stiffness, with a pressure in elements.
 
-One thread, and the same order of all sums in each run.
+One thread, and the same order of all sums in each run. Positions, velocities and forces have shape (dim, n_nodes), so
+that loops over nodes use vector registers.
+
+A `body` is (columns, straight, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other
+elements as starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements of all
+kinds: node numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for each
+kind the number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,), and
+undeformed volumes, across, offset and slope of the pressure (n_elements,), see `kernels.pressures`. `zero` is a tuple
+of dim zeros.
 """
 
 import math
@@ -9,86 +17,118 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from truespring.kernels import measures
-from truespring.kernels.gaussian import add_forces, pulls
+from truespring.kernels import columns
+from truespring.kernels.pressures import density, pressure
+from truespring.kernels.small import minus, plus, scaled, unsigned
 from truespring.kernels.threads import kernel
+from truespring.kernels.volumes import slopes
 
-# Volume ratio below which the pressure is continued linearly: that of the law is infinite for collapsed elements.
-_SMALLEST = 0.1
-
-
-def measure(count, x, elements, form, slope, volume):
-    """Write volumes and slopes of all elements: `form` is (lanes,), (thickness,) or (simplices, weight, zero)."""
+# Most nodes of an element.
+_MOST = 32
 
 
-@overload(measure)
-def _measure(count, x, elements, form, slope, volume):
-    import numba
+def _at(x, i, zero):
+    """Return column i of an array of shape (len(zero), n)."""
 
-    def hexahedra(count, x, elements, form, slope, volume):
-        measures.hexahedra(0, count, x, elements, form[0], 1, slope, volume)
 
-    def quadrilaterals(count, x, elements, form, slope, volume):
-        measures.quadrilaterals(0, count, x, elements, form[0], 1, slope, volume)
-
-    def simplices(count, x, elements, form, slope, volume):
-        measures.of_simplices(0, count, x, elements, form[0], form[1], form[2], 1, slope, volume)
-
-    if len(form) == 3:
-        return simplices
-    return hexahedra if isinstance(form[0], numba.types.Integer) else quadrilaterals
+@overload(_at)
+def _at_column(x, i, zero):
+    return {
+        2: lambda x, i, zero: (x[0, unsigned(i)], x[1, unsigned(i)]),
+        3: lambda x, i, zero: (x[0, unsigned(i)], x[1, unsigned(i)], x[2, unsigned(i)]),
+    }[len(zero)]
 
 
 @kernel
-def pressures(volume: Any, undeformed: Any, offset: Any, slope: Any, pressure: Any) -> None:
-    """Write the derivative of the energy by the volume of each element, (offset + slope ln J) / J; shapes (n,)."""
-    bound = math.log(_SMALLEST)
-    for e in range(len(volume)):
-        ratio = volume[e] / undeformed[e]
-        if ratio > _SMALLEST:
-            pressure[0, e] = (offset[e] + slope[e] * math.log(ratio)) / ratio
-        else:
-            there = (offset[e] + slope[e] * bound) / _SMALLEST
-            pressure[0, e] = there + (slope[e] / _SMALLEST - there) / _SMALLEST * (ratio - _SMALLEST)
+def _subtract_springs(x: Any, starts: Any, others: Any, weights: Any, force: Any, zero: Any) -> None:
+    """Subtract the forces of springs, the sum of w (x_i - x_j), from those on the nodes."""
+    for i in range(x.shape[1]):
+        if starts[i + 1] > starts[i]:
+            here, total = _at(x, i, zero), zero
+            for p in range(starts[i], starts[i + 1]):
+                d = minus(here, _at(x, others[unsigned(p)], zero))
+                total = plus(total, scaled(weights[unsigned(p)], d))
+            for c in range(len(zero)):
+                force[c, i] -= total[c]
 
 
 @kernel
-def forces(x: Any, springs: Any, cells: Any, form: Any, work: Any, external: Any, force: Any, zero: Any) -> None:
-    """Write loads minus internal force of all nodes.
-
-    Arguments as in `steps`.
-    """
-    elements, at_starts, at, undeformed, offset, slope_by = cells
-    slope, volume, pressure = work
-    measure(len(elements), x, elements, form, slope, volume)
-    pressures(volume, undeformed, offset, slope_by, pressure)
-    pulls(0, len(x), x, springs[0], springs[1], springs[2], force, zero)
-    add_forces(0, len(x), at_starts, at, slope, pressure, force, zero)
-    for i in range(len(x)):
+def _measure(x: Any, e: int, cells: Any, at: Any, slope: Any, zero: Any) -> float:
+    """Write the derivatives of an element's volume, shape (k, 3), return the volume; `at` is a work array (k, 3)."""
+    numbers, starts, kinds, counts, simplices, weights = cells[:6]
+    first, k, kind, total = starts[e], starts[e + 1] - starts[e], kinds[e], 0.0
+    for a in range(k):
         for c in range(len(zero)):
-            force[i, c] = external[i, c] - force[i, c]
+            at[a, c] = x[c, unsigned(numbers[first + a])]
+    slopes(at, np.arange(k), simplices[kind, : counts[kind]], weights[kind], slope, zero)
+    for a in range(k):
+        for c in range(len(zero)):
+            total += slope[a, c] * (at[a, c] - at[0, c])
+    return total / len(zero)
 
 
 @kernel
-def pull(x: Any, grips: Any, share: float, force: Any, held: Any) -> None:
+def _subtract_pressures(x: Any, cells: Any, force: Any, zero: Any) -> None:
+    """Subtract the forces of the pressure in elements from those on their nodes."""
+    numbers, starts = cells[:2]
+    undeformed, across, offset, by_log = cells[6:]
+    at, slope = np.zeros((_MOST, 3)), np.empty((_MOST, 3))
+    for e in range(len(undeformed)):
+        volume = _measure(x, e, cells, at, slope, zero)
+        p = pressure(volume / undeformed[e], across[e], offset[e], by_log[e])
+        for a in range(starts[e + 1] - starts[e]):
+            for c in range(len(zero)):
+                force[c, unsigned(numbers[starts[e] + a])] -= p * slope[a, c]
+
+
+@kernel
+def _subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
+    """Subtract the internal force of a body from the forces on its nodes [N], shape (dim, n_nodes)."""
+    lattice, straight, constants, springs, cells = body
+    columns.subtract_forces(x, lattice, straight, constants, force)
+    if len(springs[1]) > 0:
+        _subtract_springs(x, springs[0], springs[1], springs[2], force, zero)
+    _subtract_pressures(x, cells, force, zero)
+
+
+@kernel
+def energy(x: Any, body: Any, zero: Any) -> Any:
+    """Return the energy of a body, but for a constant [J]; finite in inverted elements, too, see `pressure`."""
+    lattice, straight, constants, springs, cells = body
+    total = columns.energy(x, lattice, straight, constants)
+    for i in range(len(springs[0]) - 1):
+        for p in range(springs[0][i], springs[0][i + 1]):
+            for c in range(len(zero)):
+                away = x[c, i] - x[c, unsigned(springs[1][p])]
+                total += springs[2][p] / 4 * away * away
+    undeformed, across, offset, by_log = cells[6:]
+    at, slope = np.zeros((_MOST, 3)), np.empty((_MOST, 3))
+    for e in range(len(undeformed)):
+        ratio = _measure(x, e, cells, at, slope, zero) / undeformed[e]
+        total += undeformed[e] * density(ratio, across[e], offset[e], by_log[e])
+    return total
+
+
+@kernel
+def _pull(x: Any, grips: Any, share: float, force: Any, held: Any) -> None:
     """Add the forces of springs from nodes to places that move, and write the sum for each grasp to `held`."""
     nodes, of, stiffness, rest, begin, end = grips
     held[:] = 0.0
     for q in range(len(nodes)):
         i, g = nodes[q], of[q]
-        for c in range(x.shape[1]):
+        for c in range(len(x)):
             motion = begin[g, c] + share * (end[g, c] - begin[g, c])
-            own = stiffness[q] * (x[i, c] - rest[q, c] - motion)
-            force[i, c] -= own
+            own = stiffness[q] * (x[c, i] - rest[q, c] - motion)
+            force[c, i] -= own
             held[g, c] += own
 
 
 @kernel
-def push(x: Any, balls: Any, share: float, force: Any, held: Any) -> None:
+def _push(x: Any, balls: Any, share: float, force: Any, held: Any) -> None:
     """Add the forces of spheres on nodes of the surface, and write minus their sum for each sphere to `held`."""
     nodes, areas, radius, stiffness, begin, end = balls
     held[:] = 0.0
-    dim = x.shape[1]
+    dim = len(x)
     arm, centre = np.empty(dim), np.empty(dim)
     for b in range(len(radius)):
         for c in range(dim):
@@ -97,14 +137,50 @@ def push(x: Any, balls: Any, share: float, force: Any, held: Any) -> None:
             i = nodes[q]
             square = 0.0
             for c in range(dim):
-                arm[c] = x[i, c] - centre[c]
+                arm[c] = x[c, i] - centre[c]
                 square += arm[c] * arm[c]
             if square < radius[b] ** 2 and square > 0.0:
                 length = math.sqrt(square)
                 size = stiffness[b] * areas[q] * (radius[b] - length) / length
                 for c in range(dim):
-                    force[i, c] += size * arm[c]
+                    force[c, i] += size * arm[c]
                     held[b, c] -= size * arm[c]
+
+
+@kernel
+def _work(n: int, ends: Any, before: Any, after: Any) -> float:
+    """Return the work of grasps or spheres in a step of n from the forces on them before and after it [J]."""
+    total = 0.0
+    for g in range(len(before)):
+        for c in range(before.shape[1]):
+            total -= (before[g, c] + after[g, c]) / 2 * (ends[1][g, c] - ends[0][g, c]) / n
+    return total
+
+
+@kernel
+def _advance(h: float, ended: float, alpha: float, x: Any, v: Any, force: Any, inverse: Any, external: Any) -> None:
+    """End a step, by `ended` times half a kick, and begin the next one; the force becomes the loads.
+
+    Arguments as in `steps`.
+    """
+    kick, braked, kept = h / 2, 1 / (1 + ended * h / 2 * alpha), 1 - h / 2 * alpha
+    for c in range(len(x)):
+        for i in range(x.shape[1]):
+            change = kick * force[c, i] * inverse[c, i]
+            half = kept * ((v[c, i] + ended * change) * braked) + change
+            x[c, i] += h * half
+            v[c, i] = half
+            force[c, i] = external[c, i]
+
+
+@kernel
+def _dissipated(v: Any, inverse: Any) -> float:
+    """Return the sum of mass times squared velocity over the free directions [J]."""
+    total = 0.0
+    for c in range(len(v)):
+        for i in range(v.shape[1]):
+            total += v[c, i] * v[c, i] / inverse[c, i] if inverse[c, i] > 0 else 0.0
+    return total
 
 
 @kernel
@@ -115,18 +191,15 @@ def steps(
     x: Any,
     v: Any,
     force: Any,
-    mass: Any,
-    free: Any,
+    inverse: Any,
     external: Any,
-    springs: Any,
-    cells: Any,
-    form: Any,
-    work: Any,
+    body: Any,
     grips: Any,
     balls: Any,
     held: Any,
     account: Any,
     zero: Any,
+    known: bool,
 ) -> None:
     """Take n steps of length h [s] of leapfrog with half a kick at both ends, as `motion.Leapfrog` does.
 
@@ -134,16 +207,10 @@ def steps(
 
     Args:
         alpha: damping by mass [1/s].
-        x, v, force: positions [m], velocities [m/s], and loads minus internal forces [N] with those of grasps and
-            spheres; all are overwritten. Shape (n_nodes, dim).
-        mass: [kg], shape (n_nodes,).
-        free: 1 for free directions, else 0, shape (n_nodes, dim).
-        external: dead loads [N], shape (n_nodes, dim).
-        springs: starts (n_nodes + 1,), columns, weights (n_blocks,), see `gaussian.pulls`.
-        cells: elements (n_elements, k), at_starts, at, see `gaussian.add_forces`; undeformed volumes, and the offset
-            and the slope of the pressure over ln J, shape (n_elements,).
-        form: see `measure`.
-        work: slopes (n_elements, k, dim), volumes (n_elements,), pressures (1, n_elements).
+        x, v, force: positions [m], velocities [m/s], zero in held directions, and all forces [N]; overwritten.
+        inverse: 1 / mass of the nodes [1/kg], 0 in held directions, shape (dim, n_nodes).
+        external: dead loads [N], shape (dim, n_nodes).
+        body: see above.
         grips: nodes, numbers of their grasp, stiffness, shape (n,), rest (n, dim), motion at begin and end (n_grasps,
             dim).
         balls: nodes of the surface and their areas (n,), radius, stiffness (n_balls,), centre at begin and end
@@ -151,37 +218,30 @@ def steps(
         held: forces of the body on grasps (n_grasps, dim), and on spheres (n_balls, dim); overwritten.
         account: work of grasps and spheres on the body [J], and energy dissipated by damping [J]; added to.
         zero: tuple of dim zeros.
+        known: whether `force` is that at the begin; else it is computed.
     """
-    dim, half_step = len(zero), h / 2
     on_grips, on_balls = held
-    before_grips, before_balls = on_grips.copy(), on_balls.copy()
+    begin = force.copy()  # with the grasps of the frame before, where it is known
+    if not known:
+        begin[:] = external
+        _subtract_forces(x, body, begin, zero)
+    _pull(x, grips, 0.0, begin, on_grips)
+    _push(x, balls, 0.0, begin, on_balls)
+    if not known:
+        force[:] = begin
+    ended = 0.0
     for s in range(n):
-        for i in range(len(x)):
-            for c in range(dim):
-                half = free[i, c] * (v[i, c] + half_step * (force[i, c] / mass[i] - alpha * v[i, c]))
-                x[i, c] += h * half
-                v[i, c] = half
+        _advance(h, ended, alpha, x, v, force, inverse, external)
+        ended = 1.0
         if alpha > 0.0:
-            lost = 0.0
-            for i in range(len(x)):
-                for c in range(dim):
-                    lost += mass[i] * v[i, c] * v[i, c]
-            account[1] += alpha * h * lost
-        forces(x, springs, cells, form, work, external, force, zero)
+            account[1] += alpha * h * _dissipated(v, inverse)
+        _subtract_forces(x, body, force, zero)
         share = (s + 1) / n
-        before_grips[:] = on_grips
-        before_balls[:] = on_balls
-        pull(x, grips, share, force, on_grips)
-        push(x, balls, share, force, on_balls)
-        for g in range(len(on_grips)):
-            for c in range(dim):
-                moved = (grips[5][g, c] - grips[4][g, c]) / n
-                account[0] -= (before_grips[g, c] + on_grips[g, c]) / 2 * moved
-        for b in range(len(on_balls)):
-            for c in range(dim):
-                moved = (balls[5][b, c] - balls[4][b, c]) / n
-                account[0] -= (before_balls[b, c] + on_balls[b, c]) / 2 * moved
-        braked = 1 + half_step * alpha
-        for i in range(len(x)):
-            for c in range(dim):
-                v[i, c] = free[i, c] * (v[i, c] + half_step * force[i, c] / mass[i]) / braked
+        before_grips, before_balls = on_grips.copy(), on_balls.copy()
+        _pull(x, grips, share, force, on_grips)
+        _push(x, balls, share, force, on_balls)
+        account[0] += _work(n, grips[4:], before_grips, on_grips) + _work(n, balls[4:], before_balls, on_balls)
+    braked = 1 + h / 2 * alpha
+    for c in range(len(x)):
+        for i in range(x.shape[1]):
+            v[c, i] = (v[c, i] + h / 2 * force[c, i] * inverse[c, i]) / braked

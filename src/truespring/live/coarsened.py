@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from truespring.dynamics import Dynamics
 from truespring.errors import LiveError, TruespringError
+from truespring.live.completed import completed
 from truespring.live.session import Live
 from truespring.models import Model
 from truespring.problem import Problem
@@ -68,7 +68,9 @@ def coarsened(text: StudyText, factor: float | str, model: str | None = None) ->
 
 def cost(problem: Problem, model: Model) -> float:
     """Return the time that a frame takes on this machine over the time between frames [-], from rest."""
-    live = Live(replace(problem, dynamics=replace(problem.dynamics or Dynamics(1.0), start="rest")), model)
+    problem, _ = completed(problem)
+    assert problem.dynamics is not None  # see `completed`
+    live = Live(replace(problem, dynamics=replace(problem.dynamics, start="rest")), model)
     live.step()  # compiles
     taken = []
     for _ in range(_FRAMES):

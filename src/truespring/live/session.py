@@ -12,7 +12,9 @@ from truespring.arrays import Floats, Ints
 from truespring.dynamics import Damping, Dynamics, Energies
 from truespring.errors import LiveError, TruespringError
 from truespring.live.actions import Ball, Grip, HasBody, Weight
+from truespring.live.choosing import Schemes
 from truespring.live.commands import Command, Log, checked
+from truespring.live.completed import completed, with_materials
 from truespring.live.cut import (
     Aside,
     Built,
@@ -26,13 +28,11 @@ from truespring.live.cut import (
     loose_parts,
 )
 from truespring.live.state import State
-from truespring.live.steppers import Acting, Compiled, Frame, StepByStep, Stepper, fitting
+from truespring.live.steppers import Acting, Frame
 from truespring.loading import Body as LoadedBody
 from truespring.material import Material
 from truespring.models import Model, as_model
-from truespring.motion.explicit import SAFE, Leapfrog
-from truespring.motion.follow import balance_of, begin_of
-from truespring.motion.implicit import Implicit
+from truespring.motion.follow import begin_of
 from truespring.motion.moving import Body
 from truespring.motion.stages import Moment
 from truespring.potential import Potential
@@ -43,8 +43,6 @@ from truespring.tools.surface import surface
 
 #: Time between frames by default [s].
 FRAME = 1 / 60
-#: Density of a body without one: that of water [kg/m^3].
-WATER = 1000.0
 #: Gravity of a body without such a load [m/s^2], against the last direction.
 GRAVITY = 9.81
 # Radius of a grasp by default: the larger of these shares of a typical edge and of the size of the body.
@@ -114,6 +112,7 @@ class Live:
         model: the model.
         settings: how steps are taken.
         notes: what was assumed, and what happened, in sentences.
+        why: why steps are taken as they are, if that was chosen by measuring their time, else "".
         log: the commands since the begin.
         begun: what the session begins with.
 
@@ -152,16 +151,19 @@ class Live:
             model: the model of the body.
             models: models to which the command "model" changes, by name.
             frame: time between frames [s].
-            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog unless it has no stable step.
+            scheme: "leapfrog", "bdf2", "midpoint", "euler", or "auto": leapfrog, unless it has no stable
+                step, or takes longer than a frame and bdf2 takes less.
             step: longest time step [s]; "auto" for that of the problem, or half of leapfrog's stable step.
             iterations: Newton iterations of each step of an implicit scheme; 0 solves it.
 
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
+        self._decided: str | None = None  # the scheme, once it is chosen
         self.settings = Settings(frame, scheme, step, iterations)
         self.model = as_model(model)
-        self.problem = self._completed(problem)
+        self.problem, notes = completed(problem)
+        self.notes.extend(notes)
         self._whole = self._left = Whole.of(self.problem, self.model, dict(models or {}))
         self._aside = Aside()
         self._changes: dict[str, float] = {}
@@ -183,20 +185,10 @@ class Live:
         self._aside.forget()
         self._stepper.forget()
 
-    def _completed(self, problem: Problem) -> Problem:
-        """Return a problem with density and dynamics."""
-        if problem.material is not None and any(one.density is None for one in problem.materials):
-            self.notes.append(f"no density is given: that of water, {WATER:g} kg/m^3, is taken")
-            problem = _with_materials(problem, lambda one: replace(one, density=one.density or WATER))
-        if problem.dynamics is None:
-            self.notes.append("no dynamics are given: the body begins at its equilibrium, without damping")
-            problem = replace(problem, dynamics=Dynamics(1.0, start="equilibrium"))
-        return problem
-
     @property
     def _dynamics(self) -> Dynamics:
         dynamics = self.problem.dynamics
-        assert dynamics is not None  # see `_completed`
+        assert dynamics is not None  # see `completed`
         return dynamics
 
     def _clear(self) -> None:
@@ -222,20 +214,15 @@ class Live:
         dynamics, settings = self._dynamics, self.settings
         wanted = dynamics.scheme if settings.scheme == "auto" else settings.scheme
         asked = dynamics.step if settings.step == "auto" else settings.step
-        self._stepper: Stepper
-        if wanted == "leapfrog" or (wanted == "auto" and self._stable > 0):
-            if not self._stable:
-                raise LiveError('leapfrog has no stable step with a barrier: use bdf2, or contact = "penalty"')
-            safe = SAFE * self._stable
-            self._longest = min(safe, asked) if isinstance(asked, int | float) else safe
-            springs = fitting(self._plain)
-            plain = StepByStep(Leapfrog(self._plain), "leapfrog")
-            self._stepper = plain if springs is None else Compiled(self._plain, springs)
-            return
-        scheme = "bdf2" if wanted == "auto" else wanted
-        self._longest = float(asked) if isinstance(asked, int | float) else settings.frame / 4
-        balance = balance_of(self.body, Newton(), None, self._geometry)
-        self._stepper = StepByStep(Implicit(self._plain, balance, scheme, settings.iterations), scheme)
+        step = float(asked) if isinstance(asked, int | float) else None
+        schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
+        choice = schemes.chosen(self._decided or wanted)
+        self._stepper, self._longest = choice.stepper, choice.longest
+        if self._decided is None:
+            self.why = choice.why
+            if choice.slow:
+                self.notes.append(choice.why)
+        self._decided = choice.scheme
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""
@@ -617,7 +604,7 @@ class Live:
 
         if not self._changes and problem.dynamics is self._dynamics:
             return problem
-        return replace(_with_materials(problem, changed), dynamics=self._dynamics)
+        return replace(with_materials(problem, changed), dynamics=self._dynamics)
 
     def _do_damping(self, command: Command) -> None:
         assert command.value is not None  # see `checked`
@@ -628,7 +615,7 @@ class Live:
     def _do_model(self, command: Command) -> None:
         if command.name not in self.models:
             raise LiveError(f"model '{command.name}' is unknown; allowed: {', '.join(self.models) or 'none'}")
-        self.model = self._left.models[command.name]
+        self.model, self._decided = self._left.models[command.name], None
         before = self._moment
         self._build()
         if len(self.body.potential.nodes) != len(before.positions):
@@ -756,7 +743,7 @@ class Live:
         """Return kinetic and stored energy [J]."""
         known = self._known
         if known is None or known[0] is not moment:  # that at the end of a frame is that at the begin of the next
-            self._known = known = moment, self._kinetic(moment) + self.body.potential.energy(moment.positions)
+            self._known = known = moment, self._kinetic(moment) + self._stepper.elastic(moment.positions)
         return known[1] + acting.stored(moment.positions)
 
     _known: tuple[Moment, float] | None = None
@@ -849,15 +836,6 @@ def replayed(live: Live, commands: Sequence[Command], frames: int) -> Live:
             live.repeat(left.pop(0))
         live.step()
     return live
-
-
-def _with_materials(problem: Problem, change: Callable[[Material], Material]) -> Problem:
-    """Return a problem with each material changed, that of the body first, then those of its regions."""
-    if problem.material is None:
-        return problem
-    material = change(problem.material)
-    regions = [replace(one, material=change(one.material)) for one in problem.regions]
-    return replace(problem, material=material, regions=regions)
 
 
 def _begins(several: Sequence[Part]) -> tuple[Part, ...]:

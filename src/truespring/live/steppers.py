@@ -1,10 +1,8 @@
-"""Ways to take the steps of a frame: compiled loops where a potential has the form for them, else step by step."""
+"""Ways to take the steps of a frame, and the one that takes steps of any scheme."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
-
-import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Loading
@@ -13,7 +11,6 @@ from truespring.motion.advance import Advance, Scheme
 from truespring.motion.moving import Body
 from truespring.motion.record import Account
 from truespring.motion.stages import History, Moment
-from truespring.potential import ConstantSprings, Explicit
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,82 +81,9 @@ class Stepper(Protocol):
         """Forget what is kept of the last state: the next frame begins at another one."""
         ...
 
-
-class Compiled:
-    """Steps of leapfrog in one compiled loop, for springs of constant stiffness under loads that do not change."""
-
-    name = "leapfrog, compiled"
-    before: Moment | None = None
-
-    def __init__(self, body: Body, springs: ConstantSprings) -> None:
-        """Store what the loop reads."""
-        dim = body.potential.nodes.shape[1]
-        k, n_elements = springs.cells[0].shape[1], len(springs.cells[0])
-        self.body, self._springs = body, springs
-        self._zero = (0.0,) * dim
-        self._work = np.empty((n_elements, k, dim)), np.empty(n_elements), np.empty((1, n_elements))
-        self._free = (~body.held).astype(float)
-        self._force: Floats | None = None
-
-    def forget(self) -> None:
-        """Forget the force at the end of the last frame."""
-        self._force = None
-
-    def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
-        """Return the frame after n steps of length h [s] from a state."""
-        from truespring.kernels import leapfrog
-
-        body, springs = self.body, self._springs
-        dead = body.loading.dead_force(last.time / body.duration)
-        external = np.ascontiguousarray(dead + acting.weight.at(0.0))
-        x, v, dim = last.positions.copy(), last.velocity.copy(), len(self._zero)
-        grips, balls = self._arrays(acting, dim)
-        held = np.zeros((len(acting.grips), dim)), np.zeros((len(acting.balls), dim))
-        loop = (springs.springs, springs.cells, springs.form, self._work)
-        if self._force is None:
-            self._force = np.empty_like(x)
-            leapfrog.forces(x, *loop, external, self._force, self._zero)
-            older = acting.older(last.time)
-            pulling, pushing = self._arrays(older, dim)
-            leapfrog.pull(x, pulling, 0.0, self._force, np.zeros((len(older.grips), dim)))
-            leapfrog.push(x, pushing, 0.0, self._force, np.zeros((len(older.balls), dim)))
-        account, force = np.zeros(2), self._force.copy()
-        parts, done = n if acting.weight.moves else 1, 0.0  # the loop has constant loads
-        for part in range(parts):
-            ends = part / parts, (part + 1) / parts
-            before, begin = external, x.copy()
-            external = np.ascontiguousarray(dead + acting.weight.at(ends[1]))
-            moving = (grips, balls) if parts == 1 else (_between(grips, *ends), _between(balls, *ends))
-            known = (body.mass, self._free, external, *loop, *moving, held, account, self._zero)
-            leapfrog.steps(n // parts, h, body.damping.mass, x, v, force, *known)
-            done += float(((before + external) * (x - begin)).sum()) / 2
-        self._force = force
-        done, damped = done + account[0], account[1]
-        return Frame(Moment(last.time + n * h, x, v), float(done), float(damped), np.concatenate(held))
-
-    @staticmethod
-    def _arrays(acting: Acting, dim: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return grasps and spheres as arrays, see `kernels.leapfrog.steps`."""
-        grips, balls = acting.grips, acting.balls
-        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-        ends = [[one.begin for one in grips], [one.end for one in grips]]
-        held = (
-            np.concatenate([none, *(one.nodes for one in grips)]),
-            np.concatenate([none, *(np.full(len(one.nodes), g) for g, one in enumerate(grips))]),
-            np.concatenate([nothing, *(one.stiffness for one in grips)]),
-            np.concatenate([np.zeros((0, dim)), *(one.rest for one in grips)]),
-            *(stacked(end, dim) for end in ends),
-        )
-        centres = [[one.begin for one in balls], [one.end for one in balls]]
-        sizes = [np.array([one.radius for one in balls]), np.array([one.stiffness for one in balls])]
-        nodes, areas = acting.surface
-        return held, (nodes, areas, *sizes, *(stacked(one, dim) for one in centres))
-
-
-def _between(arrays: tuple[Any, ...], begin: float, end: float) -> tuple[Any, ...]:
-    """Return arrays whose last two are the places at the begin and the end of a frame for a part of it."""
-    *others, first, last = arrays
-    return (*others, first + begin * (last - first), first + end * (last - first))
+    def elastic(self, positions: Floats) -> float:
+        """Return the elastic energy [J] at positions [m], shape (n_nodes, dim); it may be infinite where inverted."""
+        ...
 
 
 class StepByStep:
@@ -176,6 +100,10 @@ class StepByStep:
         """Forget the state before the last one, and the force at it."""
         self.before = None
         self._scheme.forget()
+
+    def elastic(self, positions: Floats) -> float:
+        """Return the elastic energy [J], infinite where the law is not defined."""
+        return self._body.potential.energy(positions)
 
     def frame(self, last: Moment, acting: Acting, n: int, h: float) -> Frame:
         """Return the frame after n steps of length h [s] from a state."""
@@ -207,15 +135,6 @@ class StepByStep:
         own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
         loading = acting.weight.added_to(body.loading, times, span)
         return replace(loading, interactions=(*loading.interactions, *own))
-
-
-def fitting(body: Body) -> ConstantSprings | None:
-    """Return the springs of a body if compiled steps take all that acts on it, else None."""
-    loading = body.loading
-    still = all(len(part.amplitude.places) == 1 for part in loading.parts)
-    if body.damper is not None or loading.interactions or loading.follows or not still:
-        return None
-    return body.potential.constant_springs if isinstance(body.potential, Explicit) else None
 
 
 def names(one: Sequence[Grip | Ball]) -> tuple[str, ...]:

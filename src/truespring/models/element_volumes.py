@@ -97,11 +97,6 @@ class ElementVolumes:
         }
         return known.get(kind, (measures.of_simplices, (*self.form, (0.0,) * self.problem.mesh.dim)))
 
-    @property
-    def kernel_form(self) -> tuple[Any, ...]:
-        """The arguments of the kernel of the kind of elements, which tell the kind, see `kernels.leapfrog.measure`."""
-        return self._road[1]
-
     def at(self, positions: Floats) -> tuple[Floats, Floats]:
         """Return slopes and volumes at positions [m], see Measured; those of the last positions are kept."""
         last: Measured | None = self.__dict__.pop("_last", None)

@@ -20,7 +20,7 @@ from truespring.models.laws import LAWS
 from truespring.models.semidefinite import clipped, is_semidefinite
 from truespring.models.spring_data import PRESSURE, SpringData
 from truespring.models.summed import SummedSprings
-from truespring.potential import ConstantSprings, SparseMatrix, VolumeStiffness
+from truespring.potential import ConstantCells, SparseMatrix, VolumeStiffness
 from truespring.problem import Problem
 
 # Smallest number of elements, or of nodes, for which threads share the work.
@@ -232,15 +232,19 @@ class GaussianElements:
         return self.law.constant_springs and len(self.laplacians.matrices) == 1
 
     @property
-    def constant_springs(self) -> ConstantSprings | None:
-        """The springs and elements for compiled loops, see Explicit; None unless the pressure is linear in ln J."""
-        known, constants = self._weights, self._by_element
-        if known is None or constants.plane_stress:
+    def constant_springs(self) -> tuple[ConstantCells, ...] | None:
+        """The elements for compiled loops, see Explicit; None unless the springs are constant."""
+        constants, invariants = self._by_element, self.law.invariants
+        if not self.constant or invariants is None:
             return None
-        pattern, at = self._pattern, self._at_rest.law.at
-        volumes = self._volumes, at.by_y.copy(), at.by_y_y.copy()
-        cells = (pattern.elements, pattern.at_starts, pattern.at, *volumes)
-        return ConstantSprings((pattern.starts, pattern.columns, known), cells, self._measures.kernel_form)
+        zero, n = np.zeros(len(self._volumes)), len(self._volumes)
+        at = invariants(zero + 3, zero, constants)  # undeformed, without the condition of plane stress
+        shear, offset, slope = (
+            np.broadcast_to(one, n).astype(np.float64) for one in (2 * at.by_trace, at.by_y, at.by_y_y)
+        )
+        matrices, of = self._forms
+        law = (shear, self._volumes, shear if constants.plane_stress else zero, offset, slope)
+        return (ConstantCells(self._pattern.elements, matrices[0], of, *law, *self._measures.form),)
 
     @cached_property
     def _at_rest(self) -> _State:
@@ -459,6 +463,12 @@ class SummedGaussian(SummedSprings[GaussianElements]):
     """Gaussian springs on elements of several kinds."""
 
     cell_note = CHANGE_OF_TENSION
+
+    @property
+    def constant_springs(self) -> tuple[ConstantCells, ...] | None:
+        """The elements of all kinds for compiled loops, see Explicit; None unless all springs are constant."""
+        found = [part.constant_springs for part in self.parts]
+        return None if None in found else tuple(cells for one in found if one is not None for cells in one)
 
     @property
     def semidefinite_at_rest(self) -> bool:
