@@ -1,6 +1,11 @@
 """Spring models to be carried to other simulators, each with something of its own, and what a file says of them."""
 
+import importlib.util
+import sys
+from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -105,3 +110,27 @@ def difference(displacement: Floats, case: str) -> float:
     ours = expected(case)
     largest = np.linalg.norm(ours, axis=1).max()
     return float(np.linalg.norm(displacement[:, : ours.shape[1]] - ours, axis=1).max() / largest)
+
+
+def write(files: Mapping[str, str | bytes], folder: Path) -> Path:
+    """Write files of a target; return the folder."""
+    folder.mkdir(exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    return folder
+
+
+def imported(file: Path) -> ModuleType:
+    """Import a file as a module of its own, with modules of its folder."""
+    spec = importlib.util.spec_from_file_location(f"{file.stem}_{abs(hash(str(file)))}", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    sys.path.insert(0, str(file.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(file.parent))
+        for name in [path.stem for path in file.parent.glob("*.py") if path != file]:
+            sys.modules.pop(name, None)
+    return module

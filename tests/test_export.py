@@ -6,8 +6,10 @@ Every file is read by another reader than its writer: MuJoCo itself, ElementTree
 import ast
 import io
 import json
+import os
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,8 +28,9 @@ from scipy.sparse.linalg import spsolve
 import truespring as ts
 from tests.c_runtime import opened
 from tests.calculix import displacements
-from tests.exports import CASES, difference, expected, exported
+from tests.exports import CASES, difference, expected, exported, write
 from tests.studies import changed, written
+from tests.test_export_surfaces import Glb, from_obj
 from tests.wording import in_order
 from truespring.arrays import Floats
 from truespring.cli import main
@@ -658,12 +661,12 @@ def test_what_no_target_has_is_an_error_before_anything_is_solved(
         with pytest.raises(ExportError) as raised:
             ts.export(problem, springs, target, tmp_path)
         assert in_order(str(raised.value), TARGETS[target].program, *words)
-    for write in (
+    for make in (
         lambda: fem_deck(problem, [1.0], "saint-venant-kirchhoff"),
         lambda: spring_deck(problem, springs.potential(problem), [1.0]),
     ):
         with pytest.raises(ExportError) as raised:
-            write()
+            make()
         assert in_order(str(raised.value), *words)
     assert not list(tmp_path.iterdir())
 
@@ -677,6 +680,8 @@ def test_a_target_writes_the_files_that_it_names(target: str) -> None:
             files = target_files(one, [target])[target]
             assert next(iter(files)) == names[0] and all(files.values())
             seen |= files.keys()
+    if target == "mujoco":
+        seen |= target_files(beyond_springs(rule="gaussian"), [target])[target].keys()
     assert seen == set(names)
 
 
@@ -721,6 +726,43 @@ def _by_arrays(values: Mapping[str, Any]) -> Floats:
     return here - nodes
 
 
+def _by_warp(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    """In float64, in a process of its own."""
+    pytest.importorskip("warp", reason="Warp is not installed: pip install 'truespring[warp]'")
+    write(files, folder)
+    ask = "import numpy, springs_warp as s; b = s.Springs(device='cpu'); b.settle(4.0); numpy.save('x', b.positions())"
+    subprocess.run(
+        [sys.executable, "-c", ask],
+        cwd=folder,
+        env=os.environ | {"SPRINGS_FLOAT64": "1", "PYTHONPATH": str(folder)},
+        check=True,
+        capture_output=True,
+    )
+    return np.asarray(np.load(folder / "x.npy") - in_space(exported("bending").problem.mesh.nodes))
+
+
+def _by_gltf(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    """The last morph target; of a plane body all nodes are shown."""
+    file = Glb(bytes(files["surface.glb"]))  # type: ignore[arg-type]
+    (primitive,) = file.json["meshes"][0]["primitives"]
+    return np.asarray(file.array(primitive["targets"][-1]["POSITION"]))
+
+
+def _by_obj(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    return from_obj(str(files["deformed.obj"]))[0] - from_obj(str(files["rest.obj"]))[0]
+
+
+def _by_usd(files: Mapping[str, str | bytes], folder: Path) -> Floats:
+    pxr = pytest.importorskip("pxr", reason="usd-core is not installed")
+    from pxr import Usd, UsdGeom
+
+    assert pxr
+    write(files, folder)
+    stage = Usd.Stage.Open(str(folder / "surface.usda"))
+    points = UsdGeom.Mesh(stage.GetDefaultPrim()).GetPointsAttr()
+    return np.array(points.Get()) - np.array(points.Get(0))
+
+
 def _by_c(files: Mapping[str, str | bytes], folder: Path) -> Floats:
     with opened(bytes(files["body.bin"])) as body:  # type: ignore[arg-type]
         body.call("reset", 0.0)
@@ -732,6 +774,10 @@ def _by_c(files: Mapping[str, str | bytes], folder: Path) -> Floats:
 RUNS: dict[str, Callable[[Mapping[str, str | bytes], Path], Floats]] = {
     "calculix": _by_calculix,
     "mujoco": _by_mujoco,
+    "warp": _by_warp,
+    "gltf": _by_gltf,
+    "obj": _by_obj,
+    "usd": _by_usd,
     "c": _by_c,
     "npz": lambda files, folder: _by_arrays(dict(np.load(io.BytesIO(bytes(files["springs.npz"]))))),  # type: ignore[arg-type]
     "json": lambda files, folder: _by_arrays(json.loads(files["springs.json"])),
@@ -750,7 +796,10 @@ def test_every_target_is_run_or_says_why_not() -> None:
     assert RUNS.keys() == {name for name, target in TARGETS.items() if not target.unrun}
 
 
-@pytest.mark.parametrize("target", RUNS)
+_SLOW = {"warp": pytest.mark.verification}  # its kernels are compiled
+
+
+@pytest.mark.parametrize("target", [pytest.param(one, marks=[_SLOW[one]] if one in _SLOW else []) for one in RUNS])
 def test_the_files_of_a_target_give_our_equilibrium_elsewhere(target: str, tmp_path: Path) -> None:
     program = {"calculix": "ccx", "c": "cc"}.get(target)
     if program is not None and shutil.which(program) is None:
@@ -819,13 +868,13 @@ def test_the_verb_writes_and_tells(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_a_target_that_cannot_take_the_springs_does_not_stop_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    coupled = str(written(tmp_path, changed(('rule = "lloyd"', 'rule = "biquadratic"'))))
-    both = ["--to", "mujoco", "--to", "json"]
-    assert main(["export", coupled, *both, "--out", str(tmp_path), "--json"]) == 1
+    curved = str(written(tmp_path, changed(('rule = "lloyd"', 'rule = "lloyd"\nlaw = "neo-hookean"'))))
+    both = ["--to", "abaqus", "--to", "json"]
+    assert main(["export", curved, *both, "--out", str(tmp_path), "--json"]) == 1
     told = capsys.readouterr()
-    assert in_order(told.err, "not written", "MuJoCo does not support", "coupl")
-    assert (tmp_path / "study" / "json" / "exported.json").exists() and not (tmp_path / "study" / "mujoco").exists()
-    assert main(["export", coupled, "--to", "mujoco", "--out", str(tmp_path)]) == 2
+    assert in_order(told.err, "not written", "Abaqus does not support", "force law")
+    assert (tmp_path / "study" / "json" / "exported.json").exists() and not (tmp_path / "study" / "abaqus").exists()
+    assert main(["export", curved, "--to", "abaqus", "--out", str(tmp_path)]) == 2
     # the same files of two targets
     assert main(["export", str(written(tmp_path)), "--to", "calculix", "--to", "abaqus", "--out", str(tmp_path)]) == 0
     assert all((tmp_path / "study" / name / "springs.inp").exists() for name in ("calculix", "abaqus"))

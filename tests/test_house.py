@@ -207,6 +207,7 @@ ALLOWED = {
     "exports": {
         "outputs",
         "equilibrium",
+        "linear",
         "models",
         "solvers",
         "potential",

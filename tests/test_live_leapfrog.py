@@ -125,7 +125,7 @@ def test_an_inverted_body_recovers() -> None:
     wrong = rest.copy()
     inside = np.flatnonzero(np.abs(damped.mesh.nodes - 0.03).max(axis=1) < 1e-9)
     wrong[inside] += 0.03  # beyond the next nodes
-    live.put(Moment(0.0, wrong, np.zeros_like(wrong)))
+    live.go_on(live.state, Moment(0.0, wrong, np.zeros_like(wrong)))
     assert live.warnings and not np.isfinite(live.body.potential.energy(wrong))
     live.step(90)
     assert not live.warnings and not [note for note in live.notes if "begins again" in note]
@@ -221,11 +221,21 @@ def test_frames_of_another_state_begin_with_its_own_forces() -> None:
     first, second = Live(CUBE, ts.Springs("gaussian")), Live(CUBE, ts.Springs("gaussian"))
     first.step(5)
     second.step(2)
-    second.put(first.moment)
+    second.go_on(first.state)
     first._stepper.forget()
     first.step()
     second.step()
     assert np.array_equal(first.positions, second.positions)
+
+
+def test_the_choice_of_a_scheme_says_what_was_measured() -> None:
+    live = Live(CUBE, ts.Springs("gaussian"))
+    assert live.scheme == "leapfrog, compiled" and live.why.startswith("leapfrog: ") and not live.notes
+    slow = Live(CUBE, ts.Springs("gaussian"), frame=1e-6)  # in no time at all
+    assert slow.scheme == "leapfrog, compiled" and "real-time factor" in slow.why and slow.notes == [slow.why]
+    barrier = replace(CUBE, tools=[ts.Sphere("ball", 0.01, (0.03, 0.075, 0.03), contact="barrier")])
+    assert Live(barrier, ts.Springs("gaussian")).why == "bdf2: leapfrog has no stable step"
+    assert Live(CUBE, ts.Springs("gaussian"), scheme="bdf2").why == ""
 
 
 def test_what_compiled_steps_take() -> None:

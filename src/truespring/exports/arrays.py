@@ -36,12 +36,17 @@ _UNITS = {
     "young": "Pa",
     "density": "kg/m^3",
     "thickness": "m",
+    "mass": "kg",
+    "start": "m",
+    "damping": "1/s",
+    "time_step": "s",
+    "settled": "s",
 }
 
 
-def npz(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.npz, which loads without pickle; unknown values are NaN or empty strings."""
-    values = _values(exported)
+def npz(exported: Exported, more: Mapping[str, Any] | None = None) -> Mapping[str, str | bytes]:
+    """Return springs.npz, which loads without pickle, with `more` values; unknown ones are NaN or empty strings."""
+    values = _values(exported) | dict(more or {})
     values["units"] = [f"{name}: {unit}" for name, unit in _units(values).items()]
     arrays: dict[str, Any] = {name: _array(value) for name, value in values.items()}
     file = io.BytesIO()

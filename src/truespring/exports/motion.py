@@ -4,14 +4,15 @@ The equilibrium does not depend on masses, damping or initial positions, as long
 """
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats
+from truespring.equilibrium import Solution
 from truespring.exports.exported import Exported
-from truespring.mesh import element_corner_measures
-from truespring.models.spring_data import PlainSprings
-from truespring.potential import SparseMatrix
+from truespring.exports.frequencies import highest_frequency, lowest_frequency
+from truespring.exports.whole import Whole, all_nodes
 
 # Default density [kg/m^3], and mass of each node of a network without material [kg].
 _DENSITY, _NODE_MASS = 1000.0, 1.0
@@ -19,10 +20,10 @@ _DENSITY, _NODE_MASS = 1000.0, 1.0
 _SMALLEST_MASS = 1e-12
 # Time step times highest frequency; semi-implicit Euler is stable up to 2.
 _STEP = 1.0
+# Times that the time step is halved if the motion is unstable.
+_HALVINGS = 3
 # Lowest over highest frequency, if the lowest is unknown: no equilibrium was found, or it is unstable.
 _GUESSED = 1e-3
-# Up to this number of unknowns, all frequencies are computed by a dense solver.
-_FEW = 100
 # Distances from equilibrium over the largest displacement: the body has settled; the simulation ends.
 _SETTLED, _SURELY = 1e-3, 1e-5
 # w t of a critically damped oscillation, at which (1 + w t) exp(-w t) is below 1e-5.
@@ -56,22 +57,35 @@ class Motion:
     words: tuple[str, ...]
 
 
-def motion_of(exported: Exported, network: PlainSprings) -> Motion:
+_KNOWN: WeakKeyDictionary[Solution, Motion] = WeakKeyDictionary()
+
+
+def motion_of(exported: Exported) -> Motion:
     """Return lumped masses, damping that is critical for the lowest frequency, and the time to settle.
 
-    The time is found by simulation under the full load from the start: semi-implicit Euler with implicit damping.
+    The time is found by simulation under the full load from the start: semi-implicit Euler with implicit damping. The
+    result is kept as long as the solution, for other targets.
     """
-    mass, assumed = _masses(exported)
-    around = np.bincount(network.springs.ravel(), np.repeat(network.stiffness, 2), len(mass))
-    free = ~exported.held.all(axis=1)
-    # In any position the tangent of a spring is at most k [[I, -I], [-I, I]]; Gershgorin's circles bound the sum.
-    highest = float(np.sqrt((2 * around[free] / mass[free]).max(initial=0.0))) or 1.0
-    lowest = _lowest_frequency(exported, network, mass)
+    if exported.path not in _KNOWN:
+        _KNOWN[exported.path] = _motion(exported)
+    return _KNOWN[exported.path]
+
+
+def _motion(exported: Exported) -> Motion:
+    whole = all_nodes(exported)
+    mass, assumed = masses(whole)
+    start = _start(whole)
+    highest = highest_frequency(whole, mass, start)
+    lowest = lowest_frequency(whole, mass)
     frequency = _GUESSED * highest if lowest is None else lowest
     source = "a guess, since no stable equilibrium is known" if lowest is None else "that of the equilibrium"
-    damping, time_step, start = 2 * frequency, _STEP / highest, _start(exported, network)
-    usual = int(np.ceil(_USUAL / (frequency * time_step)))
-    steps, settles = _settled(exported, network, (mass, damping, time_step, start), usual)
+    damping, time_step = 2 * frequency, _STEP / highest
+    for _ in range(_HALVINGS + 1):
+        usual = int(np.ceil(_USUAL / (frequency * time_step)))
+        steps, settles, stable = _settled(whole, (mass, damping, time_step, start), usual)
+        if stable:
+            break
+        time_step /= 2
     return Motion(
         mass,
         damping,
@@ -102,12 +116,11 @@ def _settling(steps: int, time_step: float, settles: bool | None, known: bool) -
     )
 
 
-def _masses(exported: Exported) -> tuple[Floats, tuple[str, ...]]:
+def masses(whole: Whole) -> tuple[Floats, tuple[str, ...]]:
     """Return the lumped mass of each node [kg], shape (n_nodes,), and the assumptions as sentences."""
-    problem, mesh = exported.problem, exported.problem.mesh
-    words = []
+    problem, words = whole.exported.problem, []
     if not problem.materials:
-        mass = np.full(mesh.n_nodes, _NODE_MASS)
+        mass = np.full(len(whole.nodes), _NODE_MASS)
         words.append(
             f"The network has no masses: {_NODE_MASS:g} kg per node is assumed; the equilibrium does not depend on it."
         )
@@ -117,9 +130,7 @@ def _masses(exported: Exported) -> tuple[Floats, tuple[str, ...]]:
                 f"A density of {_DENSITY:g} kg/m^3 is assumed where none is given; the equilibrium does not depend on "
                 "it."
             )
-        density = problem.of_elements(lambda material: material.density or _DENSITY)
-        shares = problem.body.thickness * density[:, None] * element_corner_measures(mesh)
-        mass = np.bincount(mesh.elements.ravel(), shares.ravel(), mesh.n_nodes).astype(np.float64)
+        mass = whole.lumped_mass(problem.of_elements(lambda material: material.density or _DENSITY))
     if mass.min() < _SMALLEST_MASS:
         factor = _SMALLEST_MASS / mass.min()
         words.append(f"Masses are multiplied by {factor:.3g}, because simulators reject smaller ones.")
@@ -127,30 +138,7 @@ def _masses(exported: Exported) -> tuple[Floats, tuple[str, ...]]:
     return mass, tuple(words)
 
 
-def _lowest_frequency(exported: Exported, network: PlainSprings, mass: Floats) -> float | None:
-    """Return the lowest frequency at the equilibrium [rad/s], None if there is no stable equilibrium."""
-    state, free = exported.state, np.flatnonzero(~exported.held.ravel())
-    if state is None or state.negative_eigenvalues or not free.size:
-        return None
-    root = np.sqrt(np.repeat(mass, exported.held.shape[1])[free])
-    lowest = _lowest_eigenvalue(network.hessian(state.positions), free, root)
-    return float(np.sqrt(lowest)) if lowest > 0 else None
-
-
-def _lowest_eigenvalue(tangent: SparseMatrix, free: Ints, root: Floats) -> float:
-    """Return the lowest eigenvalue of M^-1/2 K M^-1/2 on the free directions [1/s^2]; `root` is M^1/2."""
-    from scipy import sparse
-    from scipy.sparse.linalg import eigsh
-
-    scale = sparse.diags_array(1 / root)
-    matrix = sparse.csc_array(scale @ sparse.csr_array(tangent)[free][:, free] @ scale)
-    if free.size <= _FEW:
-        return float(np.linalg.eigvalsh(matrix.toarray())[0])
-    first = np.random.default_rng(free.size).standard_normal(free.size)
-    return float(eigsh(matrix, 1, sigma=0.0, v0=first, tol=1e-6, return_eigenvectors=False)[0])
-
-
-def _start(exported: Exported, network: PlainSprings) -> Floats:
+def _start(whole: Whole) -> Floats:
     """Return the initial positions [m], shape (n_nodes, dim): free nodes move by the mean of their neighbours.
 
     If supports jumped to their positions while other nodes stood still, the body could fold and stay folded.
@@ -158,12 +146,12 @@ def _start(exported: Exported, network: PlainSprings) -> Floats:
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
 
-    nodes, held = network.nodes, exported.held
-    (first, second), n_nodes = network.springs.T, len(nodes)
+    nodes, held = whole.nodes, whole.held
+    (first, second), n_nodes = whole.springs.T, len(nodes)
     ends = np.concatenate([first, second]), np.concatenate([second, first])
     joined = sparse.csr_array(sparse.coo_array((np.ones(len(ends[0])), ends), shape=(n_nodes, n_nodes)))
     laplacian = sparse.csr_array(sparse.diags_array(joined.sum(axis=1) * (1 + _SLACK)) - joined)
-    displacement = exported.motion.copy()
+    displacement = whole.motion.copy()
     for axis in np.flatnonzero(displacement.any(axis=0)):
         free = np.flatnonzero(~held[:, axis])
         if free.size:
@@ -172,26 +160,27 @@ def _start(exported: Exported, network: PlainSprings) -> Floats:
     return np.asarray(nodes + displacement)
 
 
-def _settled(
-    exported: Exported, network: PlainSprings, motion: tuple[Floats, float, float, Floats], usual: int
-) -> tuple[int, bool | None]:
-    """Simulate; return the number of steps to settle within 0.1 % of the equilibrium, and whether it settles."""
-    longest = min(_LONGEST * usual, _BUDGET // len(network.springs))
-    if exported.state is None or longest < usual:
-        return usual, None
+def _settled(whole: Whole, motion: tuple[Floats, float, float, Floats], usual: int) -> tuple[int, bool | None, bool]:
+    """Simulate the motion.
+
+    Returns the number of steps to settle within 0.1 % of the equilibrium, whether it settles, and whether it is stable.
+    """
+    longest, goal = min(_LONGEST * usual, _BUDGET // len(whole.springs)), whole.positions
+    if goal is None or longest < usual:
+        return usual, None, True
     mass, damping, step, start = motion
-    goal = exported.state.positions
-    largest = float(np.linalg.norm(exported.state.displacement, axis=1).max()) or 1.0
-    free = ~exported.held
-    force, gain = exported.external_force, np.where(free, step / mass[:, None], 0.0)
+    largest = float(np.linalg.norm(goal - whole.nodes, axis=1).max()) or 1.0
+    force, gain = whole.force, np.where(~whole.held, step / mass[:, None], 0.0)
     positions, velocity, last = start.copy(), np.zeros(start.shape), 0
     for number in range(1, longest + 1):
-        velocity += gain * (force - network.gradient(positions))
+        velocity += gain * (force - whole.potential.gradient(positions))
         velocity /= 1 + step * damping
         positions += step * velocity
         away = float(np.sqrt(((positions - goal) ** 2).sum(axis=1).max())) / largest
+        if not np.isfinite(away):
+            return usual, False, False
         if away > _SETTLED:
             last = number
         elif away < _SURELY:
-            return last + 1 + last // 10, True
-    return longest, False if longest == _LONGEST * usual else None
+            return last + 1 + last // 10, True, True
+    return longest, False if longest == _LONGEST * usual else None, True

@@ -1,56 +1,49 @@
-"""MuJoCo MJCF files: nodes are bodies on slide joints, springs are spatial tendons.
+"""MuJoCo: nodes are bodies on slide joints; springs are spatial tendons, or forces of a Python driver.
 
 Source: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
-import re
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-
-from truespring.arrays import Bools, Floats, in_space
+from truespring.exports.arrays import npz
 from truespring.exports.exported import Exported
-from truespring.exports.motion import Motion, motion_of
-from truespring.mesh.selections import AXES
+from truespring.exports.features import Feature, features
+from truespring.exports.forces import NAME, spring_forces
+from truespring.exports.mjcf import Scene, flex_lines, scene_lines
+from truespring.exports.motion import motion_of
+from truespring.exports.scripts import script
+from truespring.exports.surfaces import is_surface, surface_of
+from truespring.exports.tetrahedra import flex_scene
+from truespring.exports.whole import all_nodes
 from truespring.models.spring_data import PlainSprings
+
+#: Features of springs and loads that tendons have.
+_IN_TENDONS = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
 
 
 def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs.xml, an MJCF file with the loads; the simulation settles at the equilibrium."""
-    network = exported.network
-    return {"springs.xml": "\n".join([*_lines(exported, network, motion_of(exported, network)), ""])}
+    """Return springs.xml, an MJCF file with the loads; the simulation settles at the equilibrium.
+
+    If tendons do not express the springs, also a driver that adds their forces, its module and data, and flex.xml, the
+    body as MuJoCo's own finite elements where it has these.
+    """
+    whole, contact = all_nodes(exported), bool(exported.options.get("contact", False))
+    driven = bool({feature for feature, _ in features(exported.problem, exported.springs)} - _IN_TENDONS)
+    surface = surface_of(whole)
+    scene = Scene(exported, whole, motion_of(exported), contact, (driven or contact) and is_surface(surface))
+    flex = list(flex_lines(scene, "surface", surface)) if scene.flex else []
+    if not driven:
+        return {"springs.xml": scene_lines(scene, (*_EXPLAINED, _TENDONS), [*flex, *_tendons(exported.network)])}
+    return {
+        "springs.xml": scene_lines(scene, (*_EXPLAINED, _DRIVEN), flex),
+        "drive.py": script("mujoco_drive", exported),
+        NAME: spring_forces(),
+        **npz(exported),
+        **flex_scene(scene),
+    }
 
 
-def _lines(exported: Exported, network: PlainSprings, motion: Motion) -> Iterator[str]:
-    nodes = in_space(motion.start)
-    length = float(np.median(network.rest_length))
-    extent = float(np.ptp(nodes, axis=0).max())
-    yield '<mujoco model="truespring">'
-    yield "<!--"
-    for line in (*exported.header, *_EXPLAINED, *motion.words):
-        yield f"  {_comment(line)}"
-    yield "-->"
-    yield f'<option timestep="{motion.time_step!r}" gravity="0 0 0" integrator="Euler">'
-    yield '  <flag contact="disable" energy="enable"/>'
-    yield "</option>"
-    # MuJoCo's default memory grows with the square of the number of nodes; a step needs 300 bytes per node.
-    yield f'<size memory="{16 + len(nodes) // 500}M"/>'
-    yield f'<statistic extent="{extent!r}" meansize="{length!r}" center="{_numbers(nodes.mean(axis=0))}"/>'
-    looked_on = -90 if exported.problem.mesh.dim == 2 else -20
-    yield f'<visual><global azimuth="90" elevation="{looked_on}"/><headlight ambient="0.7 0.7 0.7"/></visual>'
-    yield '<asset><texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="48"/></asset>'
-    yield f'<custom><numeric name="settled" data="{motion.duration!r}"/></custom>'
-    yield "<default>"
-    yield f'  <site size="{0.1 * length!r}" rgba="0.2 0.2 0.2 1"/>'
-    yield f'  <tendon width="{0.04 * length!r}" rgba="0.12 0.35 0.7 1"/>'
-    yield '  <general gaintype="fixed" gainprm="0" biastype="affine"/>'
-    yield "</default>"
-    yield "<worldbody>"
-    for number, (place, held, mass) in enumerate(zip(nodes, exported.held, motion.mass.tolist(), strict=True)):
-        yield f'  <body name="n{number}" pos="{_numbers(place)}"><site name="n{number}"/>'
-        yield from _slides(number, held, mass, motion.damping)
-        yield "  </body>"
-    yield "</worldbody>"
+def _tendons(network: PlainSprings) -> Iterator[str]:
     yield "<tendon>"
     springs = zip(network.springs.tolist(), network.stiffness.tolist(), network.rest_length.tolist(), strict=True)
     for number, ((first, second), stiffness, rest) in enumerate(springs):
@@ -58,42 +51,17 @@ def _lines(exported: Exported, network: PlainSprings, motion: Motion) -> Iterato
         yield f'    <site site="n{first}"/><site site="n{second}"/>'
         yield "  </spatial>"
     yield "</tendon>"
-    yield "<actuator>"
-    for node, axis in np.argwhere((exported.external_force != 0) & ~exported.held).tolist():
-        joint, force = f"n{node}{AXES[axis]}", float(exported.external_force[node, axis])
-        yield f'  <general name="{joint}" joint="{joint}" biasprm="{force!r} 0 0"/>'
-    yield "</actuator>"
-    if exported.state is not None and not exported.held.all():
-        away = (exported.state.positions - motion.start)[~exported.held]
-        yield f'<keyframe><key name="equilibrium" qpos="{_numbers(away)}"/></keyframe>'
-    yield "</mujoco>"
 
 
 _EXPLAINED = (
-    "Node i is body and site n<i>, spring j is tendon s<j>, both counted from 0 as in the study.",
+    "Node i is body and site n<i>, counted from 0 as in the study; nodes on edges of elements of second order follow.",
     "Each body has slide joints in the free directions of its node; in the others it is fixed at its final position.",
     "Nodal forces are actuators of constant force; gravity is off, weight is included in these forces.",
     "The full load acts from the start. Supports that move start at their final positions, other nodes are displaced "
     "by the mean of their neighbours. The keyframe 'equilibrium' is the state given above.",
 )
-
-
-def _slides(number: int, held: Bools, mass: float, damping: float) -> Iterator[str]:
-    """Yield the slide joints and mass of a node; a node without free directions is fixed to the world, without mass."""
-    if held.all():
-        return
-    for axis in np.flatnonzero(~held):
-        direction = " ".join("1" if other == axis else "0" for other in range(3))
-        name = f"n{number}{AXES[axis]}"
-        yield f'    <joint name="{name}" type="slide" axis="{direction}" damping="{damping * mass!r}"/>'
-    # A body on slide joints does not rotate; MuJoCo requires moments of inertia nevertheless.
-    yield f'    <inertial pos="0 0 0" mass="{mass!r}" diaginertia="{mass!r} {mass!r} {mass!r}"/>'
-
-
-def _numbers(values: Floats) -> str:
-    return " ".join(repr(value) for value in values.tolist())
-
-
-def _comment(line: str) -> str:
-    """Return a line with "--" separated, which XML comments must not contain."""
-    return re.sub("-(?=-)", "- ", line)
+_TENDONS = "Spring j is tendon s<j>, counted from 0 as in the study."
+_DRIVEN = (
+    "THIS FILE HAS NO SPRINGS: drive.py adds their forces and those of the elements in each step (mjcb_passive). Run "
+    "it by: python drive.py"
+)

@@ -9,15 +9,21 @@ from truespring.exports.c import c
 from truespring.exports.calculix import calculix
 from truespring.exports.decks import SPRINGA
 from truespring.exports.features import ALL, Feature
+from truespring.exports.gltf import gltf
 from truespring.exports.mujoco import mujoco
+from truespring.exports.obj import obj
 from truespring.exports.sofa import sofa
-from truespring.exports.target import Target
+from truespring.exports.target import Option, Target
+from truespring.exports.usd import usd
+from truespring.exports.warp import warp
 
 _DECKS = ("springs.inp", "fem.inp")
 _IN_DECKS = "springs.inp has the springs as SPRINGA elements; fem.inp has the same body as finite elements."
 _NOT_IN_DECKS = "Density and contact are left out; weight is in the nodal forces."
 _ARRAYS = "All springs, elements, constants, supports and loads are arrays; see docs/export/arrays.md."
 _NOTHING = "Nothing of the model is left out."
+_SHAPES = "The surface at rest and at the load levels, in metres and float32."
+_NO_SPRINGS = "Springs, supports and loads are left out: the files are for viewing."
 _FOLLOWED = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
 
 #: Export targets by name.
@@ -44,12 +50,15 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
         ),
         "mujoco": Target(
             mujoco,
-            "MuJoCo MJCF: springs.xml of bodies on slide joints and spatial tendons",
+            "MuJoCo MJCF: springs.xml of bodies on slide joints and tendons, drive.py for other springs",
             "MuJoCo",
-            ("springs.xml",),
-            _FOLLOWED,
-            expressed="Nodes are bodies on slide joints, springs are spatial tendons, loads are actuators.",
-            left_out="The body has no surface and no contact.",
+            ("springs.xml", "drive.py", "spring_forces.py", "springs.npz", "flex.xml"),
+            ALL,
+            expressed="Nodes are bodies on slide joints, loads are actuators, the surface is a flex. Springs that are "
+            "straight are spatial tendons; others, and elements, are forces that drive.py adds in each step. flex.xml "
+            "is an approximation by MuJoCo's own finite elements.",
+            left_out="The surface has no contact without the option contact.",
+            options=MappingProxyType({"contact": Option(False, "contact of the surface with other bodies")}),
         ),
         "sofa": Target(
             sofa,
@@ -69,6 +78,44 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             ALL,
             expressed="body.bin has springs, elements, masses, supports and dead loads; truespring.h moves them.",
             left_out="Contact is with spheres only, without friction; the body does not touch itself.",
+        ),
+        "warp": Target(
+            warp,
+            "a Python script of NVIDIA Warp kernels: springs_warp.py, with springs.npz",
+            "Warp",
+            ("springs_warp.py", "springs.npz", "newton_mount.py"),
+            ALL - {Feature.STIFFENING, Feature.FIBRES},
+            expressed="Springs, functions of the volume and coupled springs are kernels, in float32 or float64; loads "
+            "are constant forces.",
+            left_out="Contact is not set up. newton_mount.py was not run.",
+        ),
+        "gltf": Target(
+            gltf,
+            "glTF 2.0: surface.glb, the surface with a morph target of each load level and an animation",
+            "glTF",
+            ("surface.glb",),
+            ALL,
+            expressed=_SHAPES,
+            left_out=_NO_SPRINGS,
+        ),
+        "obj": Target(
+            obj,
+            "Wavefront OBJ: rest.obj and deformed.obj, the surface at rest and at full load",
+            "OBJ",
+            ("rest.obj", "deformed.obj"),
+            ALL,
+            expressed=_SHAPES,
+            left_out=_NO_SPRINGS,
+            options=MappingProxyType({"levels": Option(False, "a file for each load level, level_1.obj and so on")}),
+        ),
+        "usd": Target(
+            usd,
+            "Universal Scene Description: surface.usda, the surface with a time sample of each load level",
+            "USD",
+            ("surface.usda",),
+            ALL,
+            expressed=_SHAPES,
+            left_out=_NO_SPRINGS,
         ),
         "npz": Target(npz, "NumPy arrays: springs.npz", "npz", ("springs.npz",), ALL, _ARRAYS, _NOTHING),
         "json": Target(

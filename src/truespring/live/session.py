@@ -159,7 +159,8 @@ class Live:
         Raises ProblemError and ModelError as `solve`, LiveError if the scheme cannot be used.
         """
         self.notes: list[str] = []
-        self._decided: str | None = None  # the scheme, once it is chosen
+        self._decided: str | None = None  # the scheme of "auto", once it is chosen
+        self.why = ""
         self.settings = Settings(frame, scheme, step, iterations)
         self.model = as_model(model)
         self.problem, notes = completed(problem)
@@ -216,13 +217,12 @@ class Live:
         asked = dynamics.step if settings.step == "auto" else settings.step
         step = float(asked) if isinstance(asked, int | float) else None
         schemes = Schemes(self._plain, self._geometry, self._stable, settings.frame, step, settings.iterations)
-        choice = schemes.chosen(self._decided or wanted)
+        choice = schemes.chosen(self._decided or wanted if wanted == "auto" else wanted)
         self._stepper, self._longest = choice.stepper, choice.longest
-        if self._decided is None:
-            self.why = choice.why
+        if wanted == "auto" and self._decided is None:
+            self._decided, self.why = choice.scheme, choice.why
             if choice.slow:
                 self.notes.append(choice.why)
-        self._decided = choice.scheme
 
     def _begin(self) -> Moment:
         """Return the state at the begin: at rest or at the equilibrium, as the dynamics of the problem say."""

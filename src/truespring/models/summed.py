@@ -197,11 +197,11 @@ class SummedLinks(SummedSprings[Any]):
     """Elements of several kinds whose energy is a function of the squared lengths of links."""
 
     def spring_data(self) -> SpringData:
-        """Return the springs and, for each kind of element, numbers, links and coupling [J/m^4], as arrays."""
+        """Return the springs and, for each kind of element, numbers, nodes, links and coupling [J/m^4], as arrays."""
         arrays: dict[str, Any] = {"springs": self.springs}
         for (numbers, block), part in zip(self.problem.mesh.blocks, self.parts, strict=True):
             own = part.spring_data().arrays
-            arrays[f"elements_{block.element}"] = numbers
+            arrays |= {f"elements_{block.element}": numbers, f"corners_{block.element}": block.elements}
             arrays |= {f"{name}_{block.element}": own[name] for name in ("links", "coupling")}
         return SpringData(None, arrays, COUPLING)
 

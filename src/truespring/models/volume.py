@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import factorial
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,13 @@ class VolumeTerm:
         section, kind = self.problem.section, self.problem.mesh.kind
         assert section is not None  # required by springs
         return np.array(kind.simplices), section.thickness * kind.simplex_weight / factorial(kind.dim)
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """Modulus [Pa] and undeformed volume [m^3], shape (n_elements,), and the simplices of an element."""
+        kind = self.problem.mesh.kind
+        of_kind = {"simplices": np.array(kind.simplices), "simplex_weight": np.array(kind.simplex_weight)}
+        return {"kappa": self.kappa, "volume": self._at_rest, **of_kind}
 
     def _volumes(self, positions: Floats) -> Floats:
         """Return the signed volume of each element [m^3], area times thickness in 2D, shape (n_elements,)."""

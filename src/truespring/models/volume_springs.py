@@ -81,9 +81,11 @@ class VolumeSprings:
         return self.network.stretch(positions)
 
     def spring_data(self) -> SpringData:
-        """Return the springs and `kappa`, the modulus of the volume term [Pa], shape (n_elements,), as arrays."""
+        """Return springs and volume term as arrays: modulus and undeformed volume of elements, simplices of an element.
+
+        See docs/export/arrays.md."""
         plain = self.network.spring_data()
-        return SpringData(self.network, {**plain.arrays, "kappa": self.term.kappa}, VOLUME_TERM)
+        return SpringData(self.network, {**plain.arrays, **self.term.arrays}, VOLUME_TERM)
 
     @property
     def cells(self) -> dict[str, Ints]:
