@@ -53,7 +53,8 @@ def _row(study: Study, name: str, model: Springs) -> str:
     """Return the row of a model."""
     exported = solve_springs(study.problem, model, study.solver)
     written = target_files(exported, ["c"])["c"]
-    live = Live(replace(study.problem, dynamics=None), model, scheme="leapfrog")
+    still = [replace(one, displacement=None) for one in study.problem.supports]  # a session needs histories of others
+    live = Live(replace(study.problem, supports=still, dynamics=None), model, scheme="leapfrog")
     ours = _of_ours(live)
     header, body = str(written["truespring.h"]), bytes(written["body.bin"])  # type: ignore[arg-type]
     found = [_of_c(header, body, max(20, int(_SECONDS / ours)), flags) for flags in _FLAGS.values()]

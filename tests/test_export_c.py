@@ -218,6 +218,7 @@ def test_a_body_without_equilibrium_says_so() -> None:
     assert code < 0 and "full load was not reached" in library().driver_text(code).decode()
 
 
+@pytest.mark.verification  # compiles the runtime again
 def test_single_precision() -> None:
     one = solved("tetrahedra")
     x = deformed(one.problem.mesh.nodes)
@@ -486,16 +487,16 @@ def test_the_program_settles_and_prints(tmp_path: Path) -> None:
     done = subprocess.run([program, tmp_path / "body.bin"], capture_output=True, text=True, check=False)
     assert done.returncode == 1 and "cut off" in done.stderr
     assert subprocess.run([program, tmp_path / "none"], capture_output=True, check=False).returncode == 2
-    if shutil.which("c++"):
-        compiled(
-            files["truespring.h"], files["main.c"], tmp_path, "-Wall", "-Wextra", "-Werror", "-x", "c++", compiler="c++"
-        )
 
 
-def test_a_title_cannot_end_the_comment(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compiler", ["cc", "c++"])
+def test_a_title_cannot_end_the_comment_in_c_and_in_cpp(compiler: str, tmp_path: Path) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no compiler: {compiler} is not installed")
     one = replace(exported("two springs"), title='*/ int main; /* " \\ ??/')
-    files = files_of(one)
-    compiled(files["truespring.h"], files["main.c"], tmp_path, *FLAGS)
+    files, flags = files_of(one), ("-Wall", "-Wextra", "-Werror", "-fsyntax-only")
+    language = ("-std=c99", "-pedantic") if compiler == "cc" else ("-x", "c++")
+    compiled(files["truespring.h"], files["main.c"], tmp_path, *flags, *language, compiler=compiler)
 
 
 # --- shipped bodies, and fuzzing: long -------------------------------------------------------------------------------

@@ -222,7 +222,6 @@ def test_it_is_bound_to_this_machine() -> None:
     own = listening(0)
     address, port = own.getsockname()
     assert address == "127.0.0.1"
-    own.listen()
     with pytest.raises(LiveError, match=f"port {port}: "):
         listening(port)
     own.close()

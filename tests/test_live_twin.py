@@ -11,7 +11,7 @@ import pytest
 
 import truespring as ts
 from truespring.errors import LiveError
-from truespring.live import Live, hold, quicker
+from truespring.live import Live, hold
 from truespring.live.beside import Beside, Job
 from truespring.live.commands import Command
 from truespring.live.ghost import Ghost
@@ -111,7 +111,7 @@ def test_a_released_body_comes_to_the_equilibrium_of_solve() -> None:
     live.pull(TIP, UP)
     live.step(20)
     live.release("pull")
-    live.step(300)
+    live.step(280)
     state = ts.solve(body(loads=weight, dynamics=None), SPRINGS, NEWTON).states[-1]
     assert np.abs(live.positions - state.positions).max() < 1e-6 * np.abs(state.displacement).max()
 
@@ -206,7 +206,7 @@ def test_an_error_at_rest_lasts_until_the_body_moves() -> None:
     live = session()
     ring, measures = Ring(live), Measures(live)
     live.pull(TIP, UP)
-    ring.step(60)
+    ring.step(40)
     still, then = live.positions, live.time
     right = live.problem.mesh.nodes + 1.01 * (still - live.problem.mesh.nodes)
     measures.take(Ghost(then, "rest", right, own=still), ring)
@@ -221,17 +221,18 @@ def test_an_error_at_rest_lasts_until_the_body_moves() -> None:
     assert measures.words()["solver"].startswith("none")
 
 
-def test_a_reference_too_far_behind_goes_on_from_rest() -> None:
+def test_a_reference_too_far_behind_goes_on_from_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("truespring.live.beside._FAR", 0.3)
     live = session()
     ring, found = Ring(live), beside(live)
     live.pull(TIP, UP)
-    ring.step(240)  # 4 s
+    ring.step(24)
     assert not of(told(found, live), "moving")
     (rest,) = of(told(found, live, still=True), "rest")
     ring.step(3)
     ghosts = of(told(found, live, still=False), "moving")
     assert [one.time for one in ghosts] == pytest.approx([live.time - 2 / 60, live.time - 1 / 60, live.time])
-    assert ghosts[0].since == pytest.approx(4.0)
+    assert ghosts[0].since == pytest.approx(0.4)
     assert np.abs(ghosts[-1].positions - rest.positions).max() < 1e-9 * 0.1
     live.release("pull")
     ring.step(3)
@@ -248,7 +249,7 @@ def test_changes_of_the_body_are_followed() -> None:
     live.do("poisson", value=0.2)
     live.do("model", "other")
     live.gravity(0.5)
-    ring.step(240)
+    ring.step(3)
     (ghost,) = of(told(found, live, still=True), "rest")
     stiffer = ts.Material(6e3, 0.2, density=1000.0)
     static = held(live, body(material=stiffer, loads=[ts.Gravity((0.0, -0.5))]))
@@ -322,12 +323,14 @@ def test_a_coarser_mesh_is_quick_and_says_so(monkeypatch: pytest.MonkeyPatch) ->
     live.pull(TIP, UP)
     ring.step(30)
     ghosts = of(told(found, live, still=True), "rest")
-    assert [(one.coarse, one.own is None) for one in ghosts] == [(33, True), (33, False), (0, False)]
-    rough, fine = ghosts[0].positions, ghosts[-1].positions
-    moved = fine - live.problem.mesh.nodes
-    assert 1e-6 < np.linalg.norm(rough - fine) / np.linalg.norm(moved) < 0.05
-    measures.take(ghosts[1], ring)
-    assert "33 nodes" in measures.words()["model"]
+    assert [(one.coarse, one.own is None) for one in ghosts] == [(33, True), (0, False)]
+    errors = []
+    for ghost in ghosts:
+        measures.take(ghost, ring)
+        assert measures.model is not None
+        errors.append(measures.model.error)
+        assert ("on 33 nodes" in measures.words()["model"]) == (ghost.coarse > 0)
+    assert 1e-3 < errors[1] != errors[0] == pytest.approx(errors[1], rel=0.3)
 
 
 def test_second_order_elements_are_interpolated() -> None:
@@ -340,26 +343,6 @@ def test_second_order_elements_are_interpolated() -> None:
     state = ts.solve(held(live, live.problem), FEM, NEWTON).states[-1]
     assert len(state.all_positions) > len(state.positions) == len(ghost.positions)
     assert np.abs(ghost.positions - state.positions).max() < 1e-8 * np.abs(state.displacement).max()
-
-
-@pytest.mark.parametrize("implicit", [0.5, 2.0])
-def test_the_reference_moves_by_the_quicker_scheme(implicit: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(quicker, "_seconds", lambda live: implicit if live.scheme == "bdf2" else 1.0)
-    live = session(model=FEM)
-    notes = quicker.choose_scheme(live)
-    if implicit < 1:
-        assert live.scheme == "bdf2" and "BDF2" in notes[0] and "0.5 s a frame, leapfrog 1 s" in notes[0]
-    else:
-        assert live.scheme == "leapfrog" and not notes
-
-
-def test_a_frame_that_is_timed_leaves_a_session_where_it_was() -> None:
-    live = session(model=FEM)
-    live.pull(TIP, UP)
-    live.step(2)
-    before = live.state
-    assert quicker._seconds(live) > 0
-    assert live.moment is before.moment and live.grasps == before.grips
 
 
 def test_a_model_that_cannot_be_sent_says_so() -> None:

@@ -75,9 +75,19 @@ function see(data) {
   }
 }
 
+const LATE = 0.1; // s
+function behind() {
+  return Math.max(0, (lastFrame ? lastFrame.time : lastGhost.time) - lastGhost.time);
+}
+
+function title() {
+  if (!lastGhost.moving) return "distance from FEM at rest";
+  return behind() > LATE ? `distance from FEM, ${behind().toFixed(1)} s ago` : "distance from FEM in motion";
+}
+
 function compare() {
-  const title = lastGhost.moving ? "distance from FEM in motion" : "distance from FEM at rest";
-  scene.compare(lastGhost.number, lastGhost.places, lastGhost.distances, title);
+  scene.compare(lastGhost.number, lastGhost.places, lastGhost.distances, title());
+  scene.call(title(), lastGhost.moving && behind() > LATE);
 }
 
 function hear(message) {
@@ -356,6 +366,7 @@ function write(message) {
     errors.push(item("FEM", kind === "rest" ? `at rest, at most ${farthest} away` : `${behind.toFixed(1)} s behind, at most ${farthest} away`));
   }
   find("errors").replaceChildren(...errors);
+  if (scene && lastGhost) scene.call(title(), lastGhost.moving && behind() > LATE);
   list(find("warnings"), message.warnings);
   list(find("notes"), [message.scheme, ...message.notes]);
   list(find("held"), message.marks.map((one) => `${one.name}${one.force ? `: ${one.force}` : ""}`));

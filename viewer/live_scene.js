@@ -5,7 +5,7 @@ import {
   plainMaterial, restOf, shade, sharedRenderer, spot, surface,
 } from "./view.js";
 
-const BODY = "#c9dfee", NEAR = 24; // pixels within which a node is picked
+const BODY = "#c9dfee", LATE = "#8a929a", NEAR = 24; // pixels within which a node is picked
 const MARK = 8, GRASP = 0, PIN = 1, SPHERE = 2; // see docs/live.md
 
 // A scale bar of a round length; `scale` is pixels per unit.
@@ -165,6 +165,12 @@ export function createLiveScene(canvas, body, { begin = [], press, drag, drop, k
       reference = { number, distances, title, most: most < least && most > least / 4 ? least : most };
       colour();
       view.again();
+    },
+
+    // What the colours show, and whether the outline is that of another time than the body's.
+    call(title, behind) {
+      if (reference) reference.title = title;
+      rim.material.color.set(behind ? LATE : INK);
     },
 
     forget() {

@@ -1,9 +1,10 @@
 """The verb `live`: a session of a study in a browser."""
 
 import argparse
+import sys
 from pathlib import Path
 
-from truespring.cli.printing import say, show
+from truespring.cli.printing import say, show, writing
 from truespring.cli.verb import CONVERGED, Verb, seconds
 
 
@@ -81,6 +82,7 @@ def _run(options: argparse.Namespace) -> int:
         show(address)
         if isinstance(loop, HapticLoop):
             show(f"haptic port {loop.device.port}, token {loop.device.token:016x}")
+        sys.stdout.flush()  # a script waits for it
         if not options.no_browser:
             import webbrowser
 
@@ -90,6 +92,10 @@ def _run(options: argparse.Namespace) -> int:
         for line in (*loop.messages, *loop.live.notes):
             say(f"note: {line}")
     serve(loop, title, port=options.port, seconds=options.seconds, opened=known)
+    with writing(options.record or Path()):
+        written = loop.save()
+    if written:
+        say(written)
     return CONVERGED
 
 

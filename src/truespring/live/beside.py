@@ -14,7 +14,6 @@ from truespring.live.commands import Command
 from truespring.live.follower import Follower
 from truespring.live.ghost import Ghost
 from truespring.live.hold import Hold
-from truespring.live.quicker import choose_scheme
 from truespring.live.rest import InterruptedSearchError
 from truespring.live.session import Live, Settings
 from truespring.live.solved import solved
@@ -26,8 +25,8 @@ from truespring.problem import Problem
 
 # Time behind the session beyond which a follower waits for a state to go on from [s].
 _FAR = 3.0
-# Frames between two of shorter steps that are shown.
-_EVERY = 6
+# Frames between two of shorter steps that are shown; fewer if these take longer [s].
+_EVERY, _LONG = 6, 0.5
 # Seconds of computing that a follower may be ahead of another one.
 _FAIR = 1.0
 
@@ -42,6 +41,7 @@ class Job:
         model: the model of the session at its begin.
         models: the models to which the session may change, by name.
         settings: how the session takes its steps.
+        scheme: the scheme that it takes, a word of `Dynamics`; empty for that of the settings.
     """
 
     problem: Problem
@@ -49,6 +49,7 @@ class Job:
     model: Model | Potential
     models: Mapping[str, Model]
     settings: Settings
+    scheme: str = ""
 
 
 class Beside:
@@ -76,19 +77,20 @@ class Beside:
                 job.model,
                 models=job.models,
                 frame=settings.frame,
-                scheme=settings.scheme,
+                scheme=job.scheme or settings.scheme,
                 iterations=settings.iterations,
             )
 
         self._moving = Follower(moving, self._begins_at_rest, "the reference's motion")
         self._finer = Follower(finer, True, "the motion with shorter steps")
-        self._chooses, self._frame_time = settings.scheme == "auto", settings.frame
+        self._frame_time = settings.frame
         self.notes: list[str] = []
         self.held: State | None = None
         self._frame, self._run = 0, 0
         self._hold, self._work = Hold(), _nothing()
         self._rest: Floats | None = None
         self._unsolved: tuple[State, float] | None = None
+        self._shown = 0.0
         self._hear: Callable[[], None] = lambda: None
 
     # --- what it is told ----------------------------------------------------------------------------------------
@@ -164,9 +166,6 @@ class Beside:
         for each in ready:
             each.spent = max(each.spent, most - _FAIR)
         one = min(ready, key=lambda each: each.spent)
-        if one is self._moving and self._chooses:
-            self._chooses = False
-            self.notes += choose_scheme(one.live)
         found = one.step()
         self._note(one)
         if not found:
@@ -194,7 +193,8 @@ class Beside:
 
     def _refined(self) -> Iterator[Ghost]:
         one = self._finer
-        if one.frame % _EVERY == 0:
+        if one.frame % _EVERY == 0 or one.spent - self._shown > _LONG:
+            self._shown = one.spent
             order = next((order for name, order in ORDERS.items() if one.live.scheme.startswith(name)), 2)
             says = f"{one.live.step_length:.3g} s a step"
             moved = one.live.positions

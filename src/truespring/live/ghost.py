@@ -18,7 +18,8 @@ class Ghost:
         own: of "rest", the equilibrium of the session's own model [m], shape (n_nodes, dim), of "solved" its frame with
             steps as in the session; None if it is not known.
         since: time at which a motion began as that of the session, or from rest [s].
-        coarse: number of nodes of the larger mesh on which it was found and interpolated from; 0 for its own mesh.
+        coarse: number of nodes of the mesh of larger cells on which the difference of both models was found, which was
+            added to the session's positions; 0 for its own mesh.
         order: of "finer", the order of the scheme in the step.
         says: how it was found, in a few words.
         run: number of restarts of the session before it.

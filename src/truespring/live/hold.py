@@ -25,7 +25,7 @@ class Found:
     Attributes:
         reference: of the reference, positions of all its nodes [m], shape (n_nodes, dim).
         own: of the session's model [m], shape (n_nodes, dim); None if it is not known, or not known yet.
-        coarse: number of nodes of the larger mesh from which that of the reference was interpolated, else 0.
+        coarse: number of nodes of the mesh of larger cells by which the reference is estimated, else 0.
     """
 
     reference: Floats
@@ -104,17 +104,29 @@ class Hold:
             stop: asked after each iteration whether to give up: then InterruptedSearchError is raised.
         """
         here = held.moment.positions[: live.problem.mesh.n_nodes]
-        rough = self.reference.roughly(live, held, here, stop) if self.reference.takes_long(live) else None
+        rough = self._roughly(live, same, held, stop) if self.reference.takes_long(live) else None
         if rough is not None:
             yield rough
         own = self.own.find(same, held, [held.moment.positions], stop)
         own = None if own is None else own[: len(here)]
-        if rough is not None and own is not None:
-            yield Found(rough.reference, own, rough.coarse)
         starts = [here, *([] if own is None else [own]), *([] if rough is None else [rough.reference])]
         fine = self.reference.find(live, held, starts, stop)
         if fine is not None:
             yield Found(fine, own)
+
+    def _roughly(self, live: Live, same: Live, held: State, stop: Callable[[], bool]) -> Found | None:
+        """Return an estimate of the reference: the state plus the difference of both models on a mesh of larger cells.
+
+        The error of that mesh, common to both, cancels. None without such a mesh. Arguments as `follow`.
+        """
+        here = held.moment.positions
+        n_nodes = live.problem.mesh.n_nodes
+        if here.shape != live.problem.mesh.nodes.shape:
+            return None
+        right, own = (one.roughly(body, held, here, stop) for one, body in ((self.reference, live), (self.own, same)))
+        if right is None or own is None:
+            return None
+        return Found(here + right.reference[:n_nodes] - own.reference[:n_nodes], None, right.coarse)
 
 
 def on_all_nodes(potential: Potential, positions: Floats) -> Floats | None:

@@ -145,6 +145,13 @@ class Loop:
         if self._twin is not None:
             self._twin.close()
 
+    def save(self) -> str:
+        """Write the session to files, after `stop` or before `start`, and return what was written, as a sentence.
+
+        Empty without a folder to write to, or where nothing has moved.
+        """
+        return "" if self._save is None or not self.live.log.frames else self._save(self.live)
+
     # --- the thread ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:

@@ -23,6 +23,8 @@ class Frames(Protocol):
         ...
 
 
+# Errors below this are not told apart.
+_SMALLEST = 1e-5
 # An error of the last moments is that of now [s].
 _NOW = 0.05
 # A body is where it was if it has moved by less than this share of its displacement.
@@ -69,8 +71,10 @@ class Measured:
 
 
 def percent(error: float) -> str:
-    """Return an error in percent with two digits: "2.3 %"."""
-    return "not known" if not np.isfinite(error) else f"{100 * error:.2g} %"
+    """Return an error in percent with two digits: "2.3 %"; the smallest is "under 0.001 %"."""
+    if not np.isfinite(error):
+        return "not known"
+    return f"{100 * error:.2g} %" if error >= _SMALLEST or not error else f"under {100 * _SMALLEST:g} %"
 
 
 def relative(positions: Floats, right: Floats, undeformed: Floats, compared: Bools) -> float:
@@ -166,7 +170,7 @@ class Measures:
         unrest = None if ghost.own is None or frame is None else self._relative(frame, ghost.own)
         says = "at rest" if ghost.own is not None else "held still"
         if ghost.coarse:
-            says += f", by the reference on {ghost.coarse} nodes"
+            says += f", by the difference of both models on {ghost.coarse} nodes"
         return replace(self._between(mine, ghost, says), frame=frame, unrest=unrest)
 
     def _moving(self, ghost: Ghost, frame: Floats | None) -> Measured | None:

@@ -1,5 +1,6 @@
 """Open a study as a session with its loop."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from truespring.live.haptic import PERIOD, Haptic
 from truespring.live.haptic_loop import HapticLoop
 from truespring.live.loop import Loop
 from truespring.live.measured import Measures
+from truespring.live.record import write_session
 from truespring.live.session import FRAME, Live
 from truespring.live.twin import Twin
 from truespring.models import Fem
@@ -43,14 +45,23 @@ def opened(
     study, name = found.study, found.study.model if model is None else model
     models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
     live = Live(study.problem, study.entries[name], models=models, frame=FRAME if haptic is None else PERIOD)
-    known: dict[str, Any] = {"model": name, "about": found.notes}
     right = _reference(study, reference) if twin else None
+    more: dict[str, Any] = {
+        "model": name,
+        "about": found.notes,
+        "save": None if folder is None else _saving(study, folder),
+    }
     if right is not None:
         beside = Twin(live, study.entries[right])
         about = (*found.notes, f"the reference is '{right}'")
-        known |= {"twin": beside, "gauge": Measures(live, beside), "about": about}
-    loop = Loop(live, **known) if haptic is None else HapticLoop(Haptic(live, haptic), **known)
+        more |= {"twin": beside, "gauge": Measures(live, beside), "about": about}
+    loop = Loop(live, **more) if haptic is None else HapticLoop(Haptic(live, haptic), **more)
     return loop, study.title
+
+
+def _saving(study: Study, folder: Path) -> Callable[[Live], str]:
+    """Return what writes a session of a study to a folder, and says which files it wrote."""
+    return lambda live: f"written: {', '.join(str(file) for file in write_session(live, study, folder))}"
 
 
 def _reference(study: Study, name: str | None) -> str | None:

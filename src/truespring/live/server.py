@@ -2,11 +2,12 @@
 
 import asyncio
 import secrets
+import signal
 import socket
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.resources import files
 from importlib.util import find_spec
 from string import Template
@@ -206,6 +207,7 @@ def listening(port: int) -> socket.socket:
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         own.bind((ADDRESS, port))
+        own.listen()  # what connects before the server runs waits for it
     except OSError as error:
         own.close()
         raise LiveError(f"port {port}: {error.strerror}: choose another port, or none for a free one") from None
@@ -217,6 +219,21 @@ def require() -> None:
     for name in ("starlette", "uvicorn", "websockets"):
         if find_spec(name) is None:
             raise LiveError(f"live needs the package {name}: pip install 'truespring[live]'")
+
+
+@contextmanager
+def _interrupted(end: Callable[[], None]) -> Iterator[None]:
+    """Call a function where the process is interrupted or terminated within the block, instead of ending at once."""
+    known = (signal.SIGINT, signal.SIGTERM)
+    if threading.current_thread() is not threading.main_thread():  # only that may change what a signal does
+        yield
+        return
+    former = [signal.signal(one, lambda *_: end()) for one in known]
+    try:
+        yield
+    finally:
+        for one, before in zip(known, former, strict=True):
+            signal.signal(one, before)
 
 
 def serve(
@@ -246,6 +263,7 @@ def serve(
     limits: dict[str, Any] = {"ws_max_size": LARGEST, "ws_per_message_deflate": False, "ws": "websockets-sansio"}
     quiet: dict[str, Any] = {"log_level": "error", "access_log": False, "server_header": False, "lifespan": "off"}
     running = uvicorn.Server(uvicorn.Config(application(server), timeout_graceful_shutdown=1, **limits, **quiet))
+    running.capture_signals = nullcontext  # type: ignore[method-assign,assignment]  # it would end the process at once
     ends = threading.Timer(seconds or 0.0, lambda: setattr(running, "should_exit", True))
     ends.daemon = True
     loop.start()
@@ -253,7 +271,8 @@ def serve(
         if seconds is not None:
             ends.start()
         opened(f"http://{ADDRESS}:{own.getsockname()[1]}/?token={server.token}")
-        running.run(sockets=[own])
+        with _interrupted(lambda: setattr(running, "should_exit", True)):
+            running.run(sockets=[own])
     finally:
         ends.cancel()
         loop.stop()

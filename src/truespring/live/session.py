@@ -51,6 +51,8 @@ _PATCH, _SHARE = 1.6, 0.05
 _PINNED = 10.0
 # Energy that a frame may gain without work, over the largest energy so far: more is an instability.
 _GAIN = 0.05
+# An oscillation over the size of the body that is no instability but a rounding error.
+_SMALL = 1e-7
 # The step is halved up to so many times.
 _HALVINGS = 6
 # Largest motion in a frame: of a sphere over its radius, of a grasp over the size of the body.
@@ -736,8 +738,14 @@ class Live:
         if not np.isfinite(after):  # an inverted element: its energy is not known
             after = self._kinetic(taken.moment)
         before = before if np.isfinite(before) else after
-        self._largest = max(self._largest, abs(taken.done), before)
+        self._largest = max(self._largest, abs(taken.done), before, self._rounding)
         return after - before - taken.done + taken.damped <= _GAIN * self._largest
+
+    @property
+    def _rounding(self) -> float:
+        """An energy far above rounding errors [J]: of an oscillation by _SMALL of the size that limits the step."""
+        step = self._stable if 0 < self._stable < np.inf else self.settings.frame
+        return float(self.body.mass.sum()) * (_SMALL * self.size / step) ** 2
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""

@@ -54,7 +54,8 @@ class Twin:
         Raises LiveError if problem or models cannot be sent to another process.
         """
         self._live = live
-        job = Job(live.problem, reference, live.model, live.models, live.settings)
+        scheme = live.scheme.split(",")[0]
+        job = Job(live.problem, reference, live.model, live.models, live.settings, scheme)
         self.notes: list[str] = []
         self.ended = ""
         self._log, self._told, self._frame = live.log, 0, -1

@@ -149,7 +149,7 @@ typedef struct {
     const uint32_t *surface;            /* nodes of the surface */
     truespring_part part[TRUESPRING_PARTS];
     /* Work. */
-    truespring_real *f, *before; /* loads minus internal forces [N] */
+    truespring_real *f, *before; /* loads minus internal forces [N]; work */
     uint32_t *gripped;           /* a bit for each grasp, n_surface */
     int known;                   /* whether f belongs to x */
     truespring_grip grip[TRUESPRING_GRIPS];
@@ -637,6 +637,7 @@ static inline truespring_density truespring_in_space(uint32_t law, const truespr
 static inline truespring_density truespring_of_sheet(uint32_t law, const truespring_real *c, truespring_real I1,
                                                      truespring_real y)
 {
+    const truespring_real enough = (truespring_real)(TRUESPRING_SINGLE ? 1e-8 : 1e-17);
     truespring_real lam = c[1], mu = c[0], z, C = 1, mixed, curvature = 1;
     truespring_density at;
     int k;
@@ -655,7 +656,7 @@ static inline truespring_density truespring_of_sheet(uint32_t law, const truespr
         change = slope / (curvature > 0 ? curvature : (slope < 0 ? -slope : slope) + mu);
         change = change > 2 ? 2 : change > -2 ? change : -2;
         z -= change;
-        if (change * change <= (truespring_real)1e-24) break;
+        if (change * change <= enough) break; /* the error that is left is about the square of the change */
     }
     C = truespring_exp(z);
     at = truespring_in_space(law, c, I1 + C, y + z / 2);
@@ -900,7 +901,10 @@ static inline truespring_real truespring_elastic(const truespring_body *body, co
     return energy;
 }
 
-/* --- grasps and spheres ------------------------------------------------------------------------------------------ */
+/* --- grasps and spheres ------------------------------------------------------------------------------------------- */
+
+/* They act from the time on at which they are added, up to that at which they are removed: a step begins with the
+ * forces of the end of the last one. */
 
 /* Call it after writing positions or loads. The share of the load may change between steps without it: a step begins
  * with the loads of the end of the last one. */
@@ -935,7 +939,6 @@ static inline void truespring_release(truespring_body *body, int number)
     if (number < 0 || number >= TRUESPRING_GRIPS) return;
     for (q = 0; q < body->n_surface; q++) body->gripped[q] &= ~(UINT32_C(1) << number);
     body->grip[number].active = 0;
-    body->known = 0;
 }
 
 /* Hold the nodes of the surface around a point by springs, where they are. */
@@ -966,7 +969,6 @@ static inline int truespring_grip_at(truespring_body *body, int number, const tr
     memcpy(g->end, g->begin, sizeof g->end);
     memcpy(g->now, g->begin, sizeof g->now);
     g->active = 1;
-    body->known = 0;
     return 0;
 }
 
@@ -1016,10 +1018,8 @@ static inline int truespring_sphere(truespring_body *body, int number, const tru
         return TRUESPRING_ARGUMENT;
     if (!(radius > 0)) {
         b->active = 0;
-        body->known = 0;
         return 0;
     }
-    if (!b->active || b->radius != radius) body->known = 0;
     b->radius = radius;
     b->stiffness = stiffness > 0 ? stiffness : truespring_contact_stiffness(body);
     memcpy(b->end, centre, sizeof b->end);
@@ -1125,8 +1125,7 @@ static inline truespring_real truespring_force(const truespring_body *body, true
 /* Return the elastic energy [J]. */
 static inline truespring_real truespring_energy(truespring_body *body)
 {
-    body->known = 0; /* body.f is used as work */
-    return truespring_force(body, body->f);
+    return truespring_force(body, body->before);
 }
 
 /* Return the kinetic energy [J]. */
