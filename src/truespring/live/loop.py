@@ -259,11 +259,11 @@ class Loop:
         self._tell()
 
     def _node(self, order: Order) -> int:
-        """Return the number of the node of an order among those of the mesh."""
+        """Return the number of the node of an order among those of the mesh, or of the surface's node nearest to it."""
         nodes = self._drawn.nodes
         if order.node is None or not 0 <= order.node < len(nodes):
             raise TruespringError(f"{order.kind}: node {order.node}: the drawn nodes are 0 to {len(nodes) - 1}")
-        return int(nodes[order.node])
+        return self.live.node_at(self.live.positions[nodes[order.node]].tolist())
 
     def _held(self) -> list[str]:
         return [*self.live.grasps, *self.live.spheres]
