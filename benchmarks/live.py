@@ -1,4 +1,4 @@
-"""Measure live sessions: python -m benchmarks.live; writes live.json and the table of docs/live_parts/speed.md.
+"""Measure live sessions: python -m benchmarks.live; writes live.json and the table of docs/live.md.
 
 A cube of 60 mm, soft as liver (3 kPa, Poisson's ratio 0.45, 1060 kg/m^3), stands under gravity while a patch of its top
 is drawn up by 25 mm and back in half of a swing of 1 Hz; the liver of examples/organ.toml hangs in its supports while a
@@ -30,7 +30,7 @@ from truespring.study import read_study
 FRAME, FRAMES = 1 / 60, 30
 BEGIN, END = "<!-- begin of the measured table -->", "<!-- end of the measured table -->"
 _HERE = Path(__file__).parent
-PAGE = _HERE.parent / "docs" / "live_parts" / "speed.md"
+PAGE = _HERE.parent / "docs" / "live.md"
 # Steps that finite elements take, and turns of the loop at 1 kHz.
 _FEM_STEPS, _TICKS = 5, 2000
 TICK = 1e-3
