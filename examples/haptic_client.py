@@ -41,7 +41,7 @@ def exchanged(
         sent.append(now)
         try:
             reply = FRAME.unpack(device.recv(FRAME.size))
-        except TimeoutError:
+        except OSError:  # late, or the session has ended
             continue
         trips.append(time.perf_counter() - reply[-1])
         forces.append(reply[8:11])

@@ -94,13 +94,25 @@ def test_the_driver_settles_on_our_equilibrium(name: str, drive: Any) -> None:
         ("soft_block", "springs"),
         ("tissue", "gaussian"),
         ("tissue", "biquadratic"),
-        ("organ", "gaussian"),
     ],
 )
 def test_shipped_bodies_settle_on_our_equilibrium(example: str, model: str, drive: Any) -> None:
     module, folder = drive(shipped(example, model))
-    distance, _ = settled(module, folder)
+    distance, _ = settled(module, folder, 1.6)
     assert distance < 1e-4
+
+
+@pytest.mark.verification
+def test_the_organ_keeps_its_equilibrium(drive: Any) -> None:
+    """Of nearly ten thousand voxels, moved by its supports; to settle from the start takes MuJoCo minutes."""
+    module, folder = drive(shipped("organ", "gaussian"))
+    model = mujoco.MjModel.from_xml_path(str(folder / "springs.xml"))
+    springs, data = module.install(model), mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
+    mujoco.mj_step(model, data, 20)
+    mujoco.mj_forward(model, data)
+    assert not any(warning.number for warning in data.warning)
+    assert module.distance(model, data, springs.body) < 1e-4
 
 
 @pytest.mark.parametrize(("key", "factor"), [("stiffness", 1.01), ("mu", 1.01), ("volume", 1.01)])
@@ -201,3 +213,14 @@ def test_flex_is_biquadratic_springs_on_triangles_or_tetrahedra(name: str, drive
 def test_bodies_that_move_have_no_flex() -> None:
     """MuJoCo takes initial positions as undeformed."""
     assert "flex.xml" not in target_files(body("gaussian, moved"), ["mujoco"])["mujoco"]
+
+
+@pytest.mark.parametrize(("arguments", "bound"), [([], 1e-4), (["--file", "flex.xml"], 1.0)])
+def test_the_driver_is_a_program(
+    arguments: list[str], bound: float, drive: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module, _ = drive(body("gaussian, sheet"))
+    monkeypatch.setattr("sys.argv", ["drive.py", *arguments])
+    assert module.main() == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert "has moved by" in shown[0] and float(shown[1].rpartition(":")[2]) < bound

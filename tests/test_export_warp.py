@@ -60,3 +60,45 @@ def test_a_network_with_rest_lengths(tmp_path: Path, monkeypatch: pytest.MonkeyP
     springs = module.Springs(device="cpu")
     springs.settle(4.0)
     assert springs.distance() < 1e-6
+    monkeypatch.setattr("sys.argv", ["springs_warp.py", "--device", "cpu", "--times", "1"])
+    assert module.main() == 0
+
+
+def test_leapfrog_keeps_the_energy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of elastic energy, load and motion, for some periods; the error falls with the square of the step."""
+    one = body("gaussian")
+    module, potential = script(folder_of(one, tmp_path), monkeypatch), one.path.potential
+    assert potential is not None
+    errors = []
+    for factor in (0.5, 0.25):
+        springs = module.Springs(device="cpu")
+        totals = []
+        for _ in range(40):
+            springs.leapfrog(factor * springs.time_step, round(10 / factor))
+            x, v, mass = springs.positions(), springs.v.numpy(), springs.mass.numpy()
+            work = (springs.load.numpy() * (x - potential.nodes)).sum()
+            totals.append(potential.energy(x) - work + (mass[:, None] * v**2).sum() / 2)
+            largest = (mass[:, None] * v**2).sum() / 2
+        assert largest > 0
+        errors.append(np.ptp(totals) / max(abs(work), largest))
+    assert errors[0] < 0.02 and errors[1] < 0.35 * errors[0]
+
+
+def test_a_grasp_holds_and_pulls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At equilibrium the springs of the grasp carry what the body pulls with."""
+    one = body("gaussian")
+    module, potential = script(folder_of(one, tmp_path), monkeypatch), one.path.potential
+    assert potential is not None
+    springs = module.Springs(device="cpu")
+    corner = potential.nodes[one.probe]
+    hand = springs.grasp(corner, 1e-6)
+    springs.move(hand, (0.0, 0.004, 0.0))
+    springs.settle(4.0)
+    x = springs.positions()
+    goal = corner + np.array([0.0, 0.004, 0.0])
+    pull = float(springs.grasps[hand][2].value) * (goal - x[one.probe])
+    needed = potential.gradient(x)[one.probe] - one.external_force[one.probe]
+    assert pull == pytest.approx(needed, rel=1e-5, abs=1e-5 * np.linalg.norm(needed))
+    assert x[one.probe, 1] > corner[1] + 0.001
+    with pytest.raises(ValueError, match="no node is within"):
+        springs.grasp((1.0, 1.0, 1.0), 1e-3)

@@ -277,13 +277,16 @@ ALLOWED = {
     "errors": set(),
     "arrays": set(),
     "completing": set(),
+    "plugins": set(),
     "memory": set(),
     "ranks": set(),
     "remembering": set(),
     "deprecation": set(),
     "opening": set(),
 }
-OPEN_TO_ALL = {"arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels", "remembering"}
+OPEN_TO_ALL = {
+    *("arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels", "remembering", "plugins"),
+}
 HEAVY = {
     "matplotlib",
     "pyvista",

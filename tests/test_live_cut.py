@@ -11,6 +11,8 @@ from truespring.errors import LiveError, ModelError
 from truespring.live import Live
 from truespring.live.blade import Blade
 from truespring.live.commands import Command
+from truespring.live.loop import Loop
+from truespring.live.orders import Order
 from truespring.live.remaining import remaining
 from truespring.live.session import replayed
 from truespring.mesh import remainder
@@ -410,3 +412,21 @@ def test_a_given_potential_cannot_be_cut() -> None:
     potential = gaussian().potential(body)
     with Live(body, potential) as live, pytest.raises(ModelError, match="a given potential cannot be cut"):
         live.cut(*across(0.015))
+
+
+@pytest.mark.parametrize("large", [3000, 0], ids=["at once", "aside"])
+def test_a_page_cuts_a_small_body_at_once_and_a_large_one_aside(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("truespring.live.loop._LARGE", large)
+    with Live(bar((5, 1, 1)), gaussian()) as live:
+        loop = Loop(live)
+        body = loop.latest.drawn.number
+        start, end, depth = across(0.025)
+        loop.ask(Order("cut", place=(*start, *end, *depth)))
+        loop.turn()
+        assert live.is_cutting == (large == 0)
+        while live.is_cutting:
+            loop.turn()
+        assert live.elements_left.tolist() == [0, 1, 3, 4]
+        loop.turn()
+        assert loop.latest.drawn.number == body + 1
+        assert len(loop.latest.positions) == live.problem.mesh.n_nodes

@@ -16,6 +16,8 @@ import truespring as ts
 from truespring.errors import LiveError
 from truespring.live import Live
 from truespring.live.haptic import FRAME, GRASP, HOLD, SPHERE, TOUCH, Haptic, Reply, Request, packed_request, read_reply
+from truespring.live.haptic_loop import HapticLoop
+from truespring.live.orders import Order
 from truespring.problem import Problem
 
 CLIENT = Path(__file__).parents[1] / "examples" / "haptic_client.py"
@@ -248,3 +250,25 @@ def test_the_client_of_the_examples_feels_the_body() -> None:
         assert np.linalg.norm(forces, axis=1).max() > 0
         assert measured["packets a second"] > 0
         assert haptic.counts["followed"] >= len(forces)
+
+
+def test_a_page_watches_while_the_device_moves_the_body() -> None:
+    """A loop with a device: the frame of the page comes each 1/60 s, and its orders are carried out then."""
+    with live_bar() as live, Haptic(live, token=TOKEN, clock=Clock()) as haptic:
+        loop = HapticLoop(haptic)
+        shown: list[float] = []
+        loop.watch(lambda: shown.append(loop.latest.time))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as device:
+            device.connect(("127.0.0.1", haptic.port))
+            device.settimeout(5.0)
+            loop.ask(Order("gravity", value=0.0))
+            for number in range(40):
+                device.send(packed_request(TOKEN, Request(HOLD, number, 0.0, place_at(number))))
+                loop.turn()
+                assert read_reply(device.recv(128)).frames == 1
+        np.testing.assert_allclose(shown, [0.017, 0.034], rtol=1e-9)
+        assert [one.kind for one in live.log.commands].count("gravity") == 1
+        loop.ask(Order("pause"))
+        for _ in range(20):
+            loop._follow()
+        assert live.log.frames == 40

@@ -266,3 +266,13 @@ def test_a_body_at_rest_keeps_its_step() -> None:
     steps = live.steps_a_frame
     live.step(10)
     assert live.steps_a_frame == steps and not live.notes
+
+
+def test_a_node_within_a_plane_body_stands_for_the_nearest_of_its_boundary() -> None:
+    loop = loop_of()
+    inside = next(k for k, at in enumerate(loop.latest.positions) if at == pytest.approx((0.02, 0.01)))
+    loop.ask(Order("pull", "pull 1", node=inside))
+    turns(loop, 1)
+    assert [one.name for one in loop.latest.marks] == ["pull 1"] and not loop.messages
+    x, y = loop.live.grasps["pull 1"].at
+    assert (x, abs(y - 0.01)) == pytest.approx((0.02, 0.01))

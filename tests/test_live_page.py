@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import truespring
+from truespring.study import read_study
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = [
@@ -42,14 +43,15 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(params=["block.toml", "strip.toml"])
-def address(request: pytest.FixtureRequest) -> Iterator[str]:
+def address(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     command = [sys.executable, "-m", "truespring", "live", str(EXAMPLES / request.param), "--no-browser"]
-    command += ["--seconds", "300", "--quiet"]
+    command += ["--seconds", "300", "--quiet", "--record", str(tmp_path / "recorded")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         yield process.stdout.readline().strip()
         process.terminate()
-        process.wait(20)
+        assert process.wait(30) == 0
+    assert read_study(tmp_path / "recorded" / "session.toml").problem.dynamics is not None
 
 
 class Seen:
@@ -104,6 +106,8 @@ def test_a_point_is_pulled_by_the_mouse(address: str, browser: Any) -> None:
     assert seen.place(node)[1] > begin[1] + 0.03
     assert seen.ask("truespringLive.counts.lags.length") > 3
     assert "measuring" in seen.page.inner_text("#errors") or "%" in seen.page.inner_text("#errors")
+    seen.until("truespringLive.readout.errors.model !== null && truespringLive.readout.errors.time !== null", 1200)
+    assert seen.page.inner_text("#errors").count("%") >= 2
     mouse.up()
     seen.until("truespringLive.readout.marks.length === 0")
     host = re.sub(r"^http://|/.*$", "", address)

@@ -17,7 +17,8 @@ import truespring as ts
 from tests.calculix import displacements, needs_ccx
 from truespring.arrays import Floats
 from truespring.exports.calculix import FORCE_UNIT
-from truespring.exports.decks import fem_twin, joined, real
+from truespring.exports.continuum import fem_twin
+from truespring.exports.decks import joined, real
 
 LENGTH, HEIGHT, FORCE = 0.4, 0.04, 0.01  # [m], [m], [N]
 MATERIAL = ts.Material(100e3, 0.3, density=1000.0)

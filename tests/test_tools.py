@@ -13,7 +13,7 @@ from truespring.arrays import Floats
 from truespring.conditions import Interaction
 from truespring.errors import ExportError, MeshError, ProblemError, StudyError
 from truespring.exports import TARGETS, export
-from truespring.exports.decks import check_fem
+from truespring.exports.continuum import check_fem
 from truespring.mesh import SecondOrder
 from truespring.mesh.facets import triangles_of
 from truespring.mesh.files.stl import stl_bytes

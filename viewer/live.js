@@ -330,8 +330,9 @@ function alertOf(words) {
 
 function item(name, words, quiet = false) {
   const part = document.createElement("span"), bold = document.createElement("b");
-  bold.textContent = words;
-  part.append(`${name} `, bold);
+  const [, figure, more] = /^(.*? %)(?=[ ,])(.*)$/.exec(words) || [null, words, ""];
+  bold.textContent = figure;
+  part.append(`${name} `, bold, more);
   if (quiet) part.className = "quiet";
   return part;
 }

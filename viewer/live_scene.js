@@ -129,6 +129,18 @@ export function createLiveScene(canvas, body, { begin = [], press, drag, drop, k
     include: (add) => [body.rest, ...begin].forEach(add), loose: 1.2, frontal: body.dim === 2, press, drag, drop, keys, from, signal: ends.signal,
   });
 
+  const all = Uint32Array.from({ length: n }, (_, i) => i), bounding = new Set(body.outline);
+  function nearest(nodes, [x, y], near) {
+    const { towards } = view.axes(), found = { node: -1, depth: -Infinity };
+    for (const i of nodes) {
+      const [a, b] = view.pixel(mine.array, i), far = Math.hypot(a - x, b - y);
+      if (far > near) continue;
+      const depth = dot(towards, mine.array, i) - 0.004 * far; // beside the nearest in sight
+      if (depth > found.depth) Object.assign(found, { node: i, depth });
+    }
+    return found.node;
+  }
+
   // --- what may be done with it ---------------------------------------------------------------------------------
 
   return {
@@ -158,7 +170,7 @@ export function createLiveScene(canvas, body, { begin = [], press, drag, drop, k
     compare(number, positions, distances, title) {
       let farthest = 0;
       for (const one of distances) farthest = Math.max(farthest, one);
-      const least = reference ? reference.most : 0, most = rounded(Math.max(farthest, 1e-6));
+      const least = reference ? reference.most : 0, most = rounded(Math.max(farthest, 1e-6) * body.size) / body.size;
       theirs.array.set(positions);
       theirs.needsUpdate = true;
       // The scale shrinks only where the distances are much smaller, so that it does not flicker.
@@ -193,15 +205,10 @@ export function createLiveScene(canvas, body, { begin = [], press, drag, drop, k
     },
 
     // The node nearest to a pixel, of several the one towards the eye; -1 where there is none.
-    node([x, y], near = NEAR) {
-      const { towards } = view.axes(), found = { node: -1, depth: -Infinity, far: near };
-      for (let i = 0; i < n; i++) {
-        const [a, b] = view.pixel(mine.array, i), far = Math.hypot(a - x, b - y);
-        if (far > near) continue;
-        const depth = dot(towards, mine.array, i) - 0.004 * far; // beside the nearest in sight
-        if (depth > found.depth) Object.assign(found, { node: i, depth, far });
-      }
-      return found.node;
+    // In the plane only the boundary can be held: on the body it is the nearest node of that.
+    node(at, near = NEAR) {
+      if (body.dim === 3) return nearest(all, at, near);
+      return nearest(all, at, near) < 0 ? -1 : nearest(bounding, at, Infinity);
     },
 
     place: (i) => [...mine.array.subarray(3 * i, 3 * i + 3)],

@@ -74,6 +74,10 @@ class ExportError(TruespringError):
     """A target of export cannot represent the model or its loads."""
 
 
+class PluginError(TruespringError):
+    """An entry of an installed package cannot be used: the package, its entry point and what is wrong."""
+
+
 class OutputError(TruespringError):
     """An output folder cannot be written, or another run is writing to it."""
 

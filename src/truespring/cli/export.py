@@ -15,7 +15,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="TARGET",
-        **one_of(TARGETS),
+        **one_of(TARGETS, "truespring.targets"),
         help=f"{', '.join(TARGETS)}; repeat for several targets",
     )
     parser.add_argument(

@@ -24,6 +24,12 @@ def _add(parser: argparse.ArgumentParser) -> None:
         help="elements N times as large; default: auto, the smallest N for which this machine keeps real time",
     )
     parser.add_argument("--port", type=_port, default=0, metavar="N", help="port, default: a free one")
+    parser.add_argument(
+        "--haptic",
+        type=_port,
+        metavar="N",
+        help="UDP port of a haptic device at 1 kHz, 0 for a free one: docs/live.md describes its packets",
+    )
     parser.add_argument("--no-browser", action="store_true", help="print the address only, and open no browser")
     parser.add_argument("--no-twin", action="store_true", help="compute no reference beside the model")
     parser.add_argument(
@@ -57,6 +63,7 @@ _PORTS = 65535
 
 
 def _run(options: argparse.Namespace) -> int:
+    from truespring.live.haptic_loop import HapticLoop
     from truespring.live.opening import opened
     from truespring.live.server import require, serve
 
@@ -68,10 +75,13 @@ def _run(options: argparse.Namespace) -> int:
         coarsen=options.coarsen,
         twin=not options.no_twin,
         folder=options.record,
+        haptic=options.haptic,
     )
 
     def known(address: str) -> None:
         show(address)
+        if isinstance(loop, HapticLoop):
+            show(f"haptic port {loop.device.port}, token {loop.device.token:016x}")
         sys.stdout.flush()  # a script waits for it
         if not options.no_browser:
             import webbrowser

@@ -13,7 +13,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
         "--law",
         default="neo-hookean",
         metavar="L",
-        **one_of(LAWS),
+        **one_of(LAWS, "truespring.laws"),
         help=f"law of the reference: {', '.join(LAWS)}; default: neo-hookean",
     )
     parser.add_argument(

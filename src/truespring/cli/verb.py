@@ -59,18 +59,44 @@ def relative_error(text: str) -> float:
     return number
 
 
-def one_of(names: Iterable[str]) -> dict[str, Any]:
-    """Return keyword arguments of add_argument for an option with values `names`; an error suggests the nearest."""
-    allowed = tuple(names)
+class _Choices(tuple[str, ...]):
+    """Names of an option's values, to which installed packages add those of a group of entry points.
+
+    The packages are searched only for a value that is none of the names: that takes longer than to print the help.
+    """
+
+    group = ""
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or name in self.further
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """The names that installed packages add."""
+        if not self.group:
+            return ()
+        from truespring.plugins import entry_points
+
+        return tuple(dict.fromkeys(point.name for point in entry_points(self.group)))
+
+
+def one_of(names: Iterable[str], group: str = "") -> dict[str, Any]:
+    """Return keyword arguments of add_argument for an option with values `names`; an error suggests the nearest.
+
+    Entry points of installed packages in `group` are values, too; they are not in the help.
+    """
+    choices = _Choices(names)
+    choices.group = group
 
     def known(text: str) -> str:
-        if text not in allowed:
+        if text not in choices:
+            allowed = (*choices, *choices.further)
             raise argparse.ArgumentTypeError(
                 f"'{text}' is unknown{nearest(text, allowed)}; allowed: {', '.join(allowed)}"
             )
         return text
 
-    return {"type": known, "choices": allowed}
+    return {"type": known, "choices": choices}
 
 
 #: Options that every verb accepts, by attribute of the parsed options.

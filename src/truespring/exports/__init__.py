@@ -63,6 +63,7 @@ def with_expectation(exported: Exported, target: str, files: Files) -> Files:
         "left_out": known.left_out,
         "not_run": known.unrun,
         **exported.expectation,
+        **known.details(exported),
     }
     return {**files, "exported.json": json.dumps(values, indent=2, allow_nan=False) + "\n"}
 

@@ -4,21 +4,18 @@ CalculiX is a finite element program by Dhondt and Wittig, https://www.calculix.
 St. Venant-Kirchhoff law.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 from truespring.errors import ExportError
-from truespring.exports.decks import (
-    LAST_ONLY,
-    Dialect,
-    Step,
-    comments,
-    deck,
-    deck_files,
-    fem_twin,
-    real,
-    spring_twin,
-)
+from truespring.exports.continuum import fem_twin
+from truespring.exports.decks import LAST_ONLY, Dialect, Solids, Step, comments, deck, real
 from truespring.exports.exported import Exported
+from truespring.exports.keyword_files import deck_files, deck_values
+from truespring.exports.mean_strain import hourglass_control
+from truespring.exports.spring_elements import spring_twin
 from truespring.models.spring_data import PlainSprings
 from truespring.problem import Problem
 
@@ -65,15 +62,27 @@ def spring_deck(problem: Problem, network: PlainSprings, levels: Sequence[float]
 
 
 def calculix(exported: Exported) -> dict[str, str]:
-    """Return `springs.inp`, and `fem.inp` if the problem has a continuum that CalculiX supports."""
+    """Return `springs.inp` or `twin.inp`, and `fem.inp` if the problem has a continuum that CalculiX supports."""
     return deck_files(_DIALECT, exported)
 
 
-def _explained(name: str) -> tuple[str, ...]:
+def calculix_values(exported: Exported) -> Mapping[str, Any]:
+    """Return what exported.json states of a twin."""
+    return deck_values(_DIALECT, exported)
+
+
+def _explained(name: str, force_unit: float) -> tuple[str, ...]:
+    own = (
+        f"Units: metres, and {force_unit:g} N for forces: stiffness is in {force_unit:g} N/m, moduli and pressure in "
+        f"{force_unit:g} Pa, energy in {force_unit:g} J; ccx replaces a D1 below 1e-10, whatever the unit."
+    )
+    usual = (
+        "Units: metres, and micronewtons (uN) for forces, because ccx treats any residual below 1e-6 as zero: "
+        "stiffness is in uN/m, Young's modulus and pressure in uN/m^2, density in 1e-6 kg/m^3, energy in uJ."
+    )
     return (
         f"Run it by: ccx {name}",
-        "Units: metres, and micronewtons (uN) for forces, because ccx treats any residual below 1e-6 as zero: "
-        "stiffness is in uN/m, Young's modulus and pressure in uN/m^2, density in 1e-6 kg/m^3, energy in uJ.",
+        usual if force_unit == FORCE_UNIT else own,
         "Node i of truespring, counted from 0, is node i + 1. Each step is a load level, time is the load factor; each "
         f"step gives the total loads and displacements. {name}.dat has the displacement of all nodes at the end of "
         f"each step, {name}.frd the fields.",
@@ -112,4 +121,43 @@ def _output(continuum: bool) -> list[str]:
     ]
 
 
-_DIALECT = Dialect("CalculiX", "NLGEOM", FORCE_UNIT, comments, _start, _output, _explained, _FEM)
+def _twin_unit(modulus: float) -> float:
+    """Return a unit of force [N], a power of ten, in which D1 = 2 / modulus is above 1e-10."""
+    return max(FORCE_UNIT, 10.0 ** math.ceil(math.log10(1e-10 * modulus))) if modulus else FORCE_UNIT
+
+
+_HOURGLASS = (
+    "C3D8R and CPE4R in CalculiX 2.20 have the mean strain of the element, and a control of hourglass modes, which "
+    "SPRING2 elements take away again."
+)
+
+_SOLIDS = Solids(
+    names=MappingProxyType({}),
+    overlaid=frozenset({"C3D8", "CPE4"}),
+    control=hourglass_control,
+    least_shear=0.0,
+    of_overlaid=(
+        "Each element is two on the same nodes: C3D8 (CPE4) with C10 = mu/2 and the bulk modulus -mu/3, and C3D8R "
+        "(CPE4R) with C10 = 0 and lam + mu; the stress of an element is the sum of both.",
+        _HOURGLASS,
+        "They also have the rest of the springs' stiffness against hourglass modes.",
+    ),
+    of_others=(
+        "Elements are hyperelastic; those of Gaussian springs are equal on triangles and tetrahedra of first order. On "
+        "others, the springs have one volume change an element and do not lock: the twin is stiffer.",
+    ),
+    of_volume=(
+        "The volume term kappa/2 (V / V0 - 1)^2 V0 is *HYPERELASTIC, NEO HOOKE with C10 = 0 and D1 = 2 / kappa: C3D4 "
+        "and CPE3, which equal it, and C3D8R and CPE4R, which equal it at small strain. " + _HOURGLASS,
+    ),
+)
+
+_ELASTIC = (
+    "Biquadratic springs are St. Venant-Kirchhoff finite elements of first order; *ELASTIC with NLGEOM is this law in "
+    "CalculiX. The displacement is that of the springs at all loads; of CPS4 and CPS3, which CalculiX expands to "
+    "bricks and wedges with free faces, within about 2 %.",
+)
+
+_DIALECT = Dialect(
+    "CalculiX", "NLGEOM", FORCE_UNIT, comments, _start, _output, _explained, _FEM, _twin_unit, _SOLIDS, _ELASTIC
+)

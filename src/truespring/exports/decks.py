@@ -6,8 +6,8 @@ Source: CalculiX CrunchiX User's Manual, https://www.dhondt.de; Abaqus Keywords 
 
 import itertools
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -17,43 +17,16 @@ from truespring.arrays import Floats, Ints
 from truespring.conditions import Loading
 from truespring.errors import ExportError
 from truespring.exports.exported import Exported, printable
-from truespring.exports.features import Feature, refuse_fibres, refuse_others, refuse_unwritten
-from truespring.loading import Body, BodyForce, FacePressure, Load, nodal_force
-from truespring.mesh import Mesh, plural
-from truespring.mesh.facets import facet_keys
-from truespring.mesh.files.inp_elements import FACES
-from truespring.models import Fem
-from truespring.models.quadratic import QuadraticPotential
-from truespring.models.spring_data import PlainSprings
-from truespring.problem import Problem
 
 #: Writes results only of the last increment of a step.
 LAST_ONLY = "FREQUENCY=1000000"
-
-#: Features that SPRINGA elements support. Their rest length is the distance of their nodes.
-SPRINGA = frozenset({Feature.NEGATIVE})
 
 # Limit of the first increment, as a share of the full load: larger ones may converge to another equilibrium.
 _LARGEST_INCREMENT = 0.25
 # Period of a step that is not a load level.
 _NO_TIME = 1e-9
-# Offset of unsupported nodes, as a share of their longest spring; stiffness below which a direction is unsupported, as
-# a share of the largest.
-_ASIDE, _LOOSE = 1e-2, 1e-9
 # Numbers per line.
 _A_LINE = 16
-
-_SOLIDS = {"tetrahedron": "C3D4", "pyramid": "C3D8", "wedge": "C3D8", "hexahedron": "C3D8"}
-# CalculiX has no pyramids, and integrates wedges (C3D6) at two points. Collapsed bricks are equal to truespring's
-# elements: pyramids exactly, wedges up to quadrature at large strain.
-_AS_BRICKS = ("pyramid", "wedge")
-_BRICKS_EXPLAINED = "** Wedges and pyramids are written as collapsed bricks: some of their corners are the same node."
-_PLANES = {"triangle": "3", "quadrilateral": "4"}
-# Types of second-order elements.
-_SECOND_ORDER = {"triangle": "6", "tetrahedron": "C3D10"}
-
-#: Interpolations that both programs support: first order, fully integrated, and second order on simplices.
-ELEMENTS = ("linear", "quadratic")
 
 
 class Step(NamedTuple):
@@ -68,6 +41,29 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Solids:
+    """The hyperelastic elements of a program.
+
+    Attributes:
+        names: types that differ from those of *ELASTIC, by the latter.
+        overlaid: types of *ELASTIC that elements of mean strain are put over, which carry the stiffness against a
+            change of volume; see `twins`.
+        control: returns the stiffness against hourglass modes that the program adds to elements of mean strain, see
+            `mean_strain.hourglass_control`; None if it adds nothing that matters.
+        least_shear: C10 of elements that resist only their change of volume, over its modulus.
+        of_overlaid, of_others, of_volume: sentences on twins with and without such elements, and on a volume term.
+    """
+
+    names: Mapping[str, str]
+    overlaid: frozenset[str]
+    control: Callable[[Floats, Floats], Floats] | None
+    least_shear: float
+    of_overlaid: Sequence[str]
+    of_others: Sequence[str]
+    of_volume: Sequence[str]
+
+
+@dataclass(frozen=True)
 class Dialect:
     """The differences between the programs that read keyword decks.
 
@@ -78,8 +74,11 @@ class Dialect:
         opening: returns the lines before the nodes, given the header.
         start: returns the lines that start a step; the second argument is True for geometric nonlinearity.
         output: returns the output requests; the argument is True for a continuum.
-        explained: returns sentences on how to run a file, its units and its results, given its name.
+        explained: returns sentences on how to run a file, its units and its results, given its name and unit of force.
         of_elements: sentences on the finite elements.
+        twin_unit: returns the unit of force [N] of a deck whose stiffest material has a modulus [Pa].
+        solids: the types of hyperelastic elements.
+        of_elastic: sentences on elements of *ELASTIC as a twin of biquadratic springs.
     """
 
     program: str
@@ -88,8 +87,11 @@ class Dialect:
     opening: Callable[[Sequence[str]], list[str]]
     start: Callable[[Step, bool], list[str]]
     output: Callable[[bool], list[str]]
-    explained: Callable[[str], Sequence[str]]
+    explained: Callable[[str, float], Sequence[str]]
     of_elements: Sequence[str]
+    twin_unit: Callable[[float], float]
+    solids: Solids
+    of_elastic: Sequence[str]
 
 
 class OwnLoad(NamedTuple):
@@ -194,240 +196,6 @@ def number_set(kind: str, name: str, numbers: Ints) -> Iterator[str]:
     yield f"*{kind}, {kind}={name}"
     for first in range(0, len(numbers), _A_LINE):
         yield joined(numbers[first : first + _A_LINE] + 1)
-
-
-# --- the continuum -------------------------------------------------------------------------------
-
-
-def fem_twin(problem: Problem, law: str, force_unit: float, element: str = "linear") -> Twin:
-    """Return the body as first-order finite elements, or second-order ("quadratic") triangles and tetrahedra.
-
-    Pressure and gravity are *DLOAD, other loads are nodal forces; on quadratic elements gravity is nodal forces too.
-    Raises ExportError if the problem is not supported.
-    """
-    check_fem(problem, law, element)
-    nodes, blocks = problem.mesh.nodes, _blocks(problem)
-    finer = second_order(problem, element)
-    own: list[Load] = []
-    on_nodes: list[Load] = []
-    for load in problem.loads:
-        by_program = load.cards(problem.mesh) and (finer is None or load.follows)
-        (own if by_program else on_nodes).append(load)
-    if finer is None:
-        loading = _on_nodes(problem.loading, on_nodes, problem.body, nodes)
-    else:
-        nodes, blocks = finer.nodes, [(fem_element(problem, element), np.arange(len(finer.elements)), finer.elements)]
-        loading = _on_nodes(finer.loading, on_nodes, finer.body, nodes)
-    bricks = any(kind in _AS_BRICKS for kind in problem.mesh.element_kinds)
-    lines = [_BRICKS_EXPLAINED] if bricks else []
-    for kind, numbers, elements in blocks:
-        lines.append(f"*ELEMENT, TYPE={kind}, ELSET=BODY")
-        rows = np.column_stack([numbers, elements]) + 1
-        lines += map(joined, rows.tolist())
-    for number in range(len(problem.materials)):
-        lines += _material(problem, number, force_unit)
-    return Twin(nodes, lines, loading, [line for load in own for line in _dload(problem.mesh, load, force_unit)])
-
-
-def usual_element(problem: Problem) -> str:
-    """Return the default interpolation: "quadratic" on triangles and tetrahedra, as for Fem, else "linear"."""
-    return "quadratic" if problem.mesh.element in _SECOND_ORDER else "linear"
-
-
-def second_order(problem: Problem, element: str) -> QuadraticPotential | None:
-    """Return the potential of second-order elements, whose nodes the deck shares; None for "linear"."""
-    finer = Fem("linear", element).potential(problem)
-    return finer if isinstance(finer, QuadraticPotential) else None
-
-
-def check_fem(problem: Problem, law: str, element: str = "linear") -> None:
-    """Raise ExportError for no continuum, an unknown `element`, and what decks of finite elements do not support."""
-    if problem.material is None or problem.section is None:
-        raise ExportError("a spring network has no continuum: finite elements need a mesh of elements and a material")
-    refuse_fibres(problem, "decks of finite elements")
-    refuse_unwritten(problem, "decks of finite elements")
-    for load in problem.loads:
-        if law != "linear" and load.follows and not load.cards(problem.mesh):
-            raise ExportError(
-                f"{load.words()} follows the body, and there is no keyword for it: use {load.instead} instead, or the "
-                "linear law, where it is nodal forces"
-            )
-    if element not in ELEMENTS or (element == "quadratic" and problem.mesh.element not in _SECOND_ORDER):
-        raise ExportError(
-            f"element = '{element}' is not available for a mesh of {problem.mesh.element} elements; allowed: "
-            f'"linear" for all, "quadratic" for {" and ".join(map(plural, _SECOND_ORDER))}'
-        )
-
-
-def fem_element(problem: Problem, element: str = "linear") -> str:
-    """Return the element types: CPS4, CPE4, CPS3, CPE3, C3D8 or C3D4; for "quadratic" CPS6, CPE6 or C3D10."""
-    if element == "linear":
-        return " and ".join(dict.fromkeys(kind for kind, _, _ in _blocks(problem)))
-    name = _SECOND_ORDER[problem.mesh.element]
-    return name if problem.mesh.dim == 3 else _plane(problem) + name
-
-
-def _plane(problem: Problem) -> str:
-    return "" if problem.section is None else problem.section.elements
-
-
-def _blocks(problem: Problem) -> list[tuple[str, Ints, Ints]]:
-    """Return type, numbers and nodes of the first-order elements, for each kind."""
-    found = []
-    for numbers, part in problem.mesh.blocks:
-        kind = _SOLIDS[part.element] if part.element in _SOLIDS else _plane(problem) + _PLANES[part.element]
-        bricks = part.element in _AS_BRICKS
-        found.append((kind, numbers, part.elements[:, part.kind.merged] if bricks else part.elements))
-    return found
-
-
-def _material(problem: Problem, number: int, force_unit: float) -> Iterator[str]:
-    """Yield the lines of a material and of its elements."""
-    material, several = problem.materials[number], len(problem.materials) > 1
-    name = f"PART{number + 1}" if several else "BODY"
-    if several:
-        yield from number_set("ELSET", name, np.flatnonzero(problem.material_numbers == number))
-    yield f"*MATERIAL, NAME=M{number + 1}"
-    yield "*ELASTIC"
-    yield f"{real(material.young / force_unit)}, {real(material.poisson)}"
-    if material.density is not None:
-        yield "*DENSITY"
-        yield real(material.density / force_unit)
-    yield f"*SOLID SECTION, ELSET={name}, MATERIAL=M{number + 1}"
-    if problem.mesh.dim == 2 and problem.section is not None:
-        yield real(problem.section.thickness)
-
-
-def _dload(mesh: Mesh, load: Load, force_unit: float) -> Iterator[OwnLoad]:
-    """Yield the *DLOAD of a load: gravity, or pressure on faces, which follows them in nonlinear decks."""
-    for card in load.cards(mesh):
-        match card:
-            case BodyForce(acceleration):
-                size = float(np.linalg.norm(acceleration))
-                direction = [*(acceleration / (size or 1.0)), 0.0][:3]
-                yield OwnLoad("BODY", "GRAV", size, f", {joined(map(real, direction))}")
-            case FacePressure(facets, pressure):
-                for number, face, pressed in _faces(mesh, facets):
-                    yield OwnLoad(str(number + 1), f"P{face}", float(pressure[pressed]) / force_unit)
-
-
-def _faces(mesh: Mesh, facets: Ints) -> Iterator[tuple[int, int, int]]:
-    """Yield element, face number from 1 and row in `facets`, for each element face that is one of `facets`."""
-    keys = _face_keys(facets)
-    for numbers, part in mesh.blocks:
-        bricks = part.element in _AS_BRICKS
-        nodes = part.elements[:, part.kind.merged] if bricks else part.elements
-        for face, local in enumerate(FACES["hexahedron" if bricks else part.element], 1):
-            places = _places(_face_keys(nodes[:, local]), keys)
-            for element in np.flatnonzero(places >= 0).tolist():
-                yield int(numbers[element]), face, int(places[element])
-
-
-def _face_keys(faces: Ints) -> Ints:
-    """Return a row for each face, equal for faces with the same corners."""
-    padded = np.concatenate([faces, faces[:, -1:]], axis=1) if faces.shape[1] == len("abc") else faces
-    return np.stack(facet_keys(padded.T), axis=1)
-
-
-def _places(rows: Ints, others: Ints) -> Ints:
-    """Return the index of each row in `others`, -1 if it is not there, shape (n_rows,)."""
-    both = np.unique(np.concatenate([others, rows]), axis=0, return_inverse=True)[1].ravel()
-    place = np.full(len(both), -1)
-    place[both[: len(others)]] = np.arange(len(others))
-    return np.asarray(place[both[len(others) :]])
-
-
-def _on_nodes(loading: Loading, loads: Sequence[Load], body: Body, nodes: Floats) -> Loading:
-    """Return the supports with `loads` as nodal forces; loads that follow the body act as on the undeformed body."""
-    spreads = [load.spread(body) for load in loads]
-    potentials = [load.following(body, loading.held) for load in loads]
-    return replace(
-        loading,
-        external_force=nodal_force((one for one in spreads if one is not None), nodes.shape),
-        following=tuple(one for one in potentials if one is not None),
-    ).at_rest(nodes)
-
-
-# --- springs -------------------------------------------------------------------------------------
-
-
-def spring_twin(problem: Problem, network: PlainSprings, force_unit: float) -> Twin:
-    """Return the springs as SPRINGA elements, one element set for each stiffness.
-
-    Raises ExportError for features that are not in SPRINGA.
-    """
-    refuse_others(problem, network.spring_data(), SPRINGA, "a SPRINGA element")
-    members: dict[str, list[int]] = {}
-    for number, stiffness in enumerate((network.stiffness / force_unit).tolist()):
-        members.setdefault(real(stiffness), []).append(number)
-    lines: list[str] = []
-    for group, (stiffness, numbers) in enumerate(members.items(), 1):
-        lines.append(f"*ELEMENT, TYPE=SPRINGA, ELSET=S{group}")
-        lines += (f"{number + 1}, {joined((network.springs[number] + 1).tolist())}" for number in numbers)
-        lines += [f"*SPRING, ELSET=S{group}", "", stiffness]  # the blank line is for directions
-    plane = ["NALL, 3, 3"] if network.nodes.shape[1] == 2 else []  # SPRINGA acts in 3D: hold z
-    lines += ["*BOUNDARY", *plane] if plane else []
-    aside = _aside(network, problem.loading)
-    return Twin(network.nodes, lines, problem.loading, aside=aside, for_good=plane)
-
-
-def is_led_aside(problem: Problem, network: PlainSprings) -> bool:
-    """Return whether a deck of springs needs a step that displaces unsupported nodes before the first level."""
-    return bool(_aside(network, problem.loading).any())
-
-
-def _aside(network: PlainSprings, loading: Loading) -> Floats:
-    """Return the offset of nodes with a free direction in which no spring acts at rest [m], shape (n_nodes, dim).
-
-    The springs stiffen as the node moves, but Newton's method without line search cannot start at zero stiffness.
-    """
-    n_nodes, dim = network.nodes.shape
-    ends = network.springs
-    along = np.diff(network.nodes[ends], axis=1)[:, 0]
-    length = np.linalg.norm(along, axis=1)
-    along /= length[:, None]
-    stiffness, reach = np.zeros((n_nodes, dim, dim)), np.zeros(n_nodes)
-    for end in ends.T:
-        np.add.at(stiffness, end, network.stiffness[:, None, None] * along[:, :, None] * along[:, None, :])
-        np.maximum.at(reach, end, length)
-    largest = float(np.abs(stiffness).max())
-    free = ~loading.held
-    stiffness = stiffness * free[:, :, None] * free[:, None, :] + largest * np.eye(dim) * loading.held[:, None, :]
-    values, vectors = np.linalg.eigh(stiffness)
-    loose = np.abs(values) <= _LOOSE * largest
-    ways = np.where(loose[:, None, :], vectors, 0.0)  # as columns
-    pulled = np.einsum("nai,nbi,nb->na", ways, ways, loading.external_force)
-    size = np.linalg.norm(pulled, axis=1)
-    idle = loose.any(axis=1) & (size == 0)
-    pulled[idle] = ways[idle, :, :].sum(axis=2)
-    size = np.linalg.norm(pulled, axis=1)
-    share = np.divide(_ASIDE * reach, size, out=np.zeros(n_nodes), where=size > 0)
-    return np.asarray(share[:, None] * pulled)
-
-
-# --- the files of a target -------------------------------------------------------------------------
-
-
-def deck_files(dialect: Dialect, exported: Exported) -> dict[str, str]:
-    """Return `springs.inp`, and `fem.inp` if the problem has a continuum that the program supports."""
-    problem, levels, files = exported.problem, levels_of(exported), {}
-    notes = ["SPRINGA elements do not support prestress, volume terms, coupled springs and loads that follow a face."]
-    try:
-        check_fem(problem, "saint-venant-kirchhoff")
-        element = usual_element(problem)
-        twin = fem_twin(problem, "saint-venant-kirchhoff", dialect.force_unit, element)
-        what = f"{dialect.program} {fem_element(problem, element)} elements, {dialect.nonlinear}"
-        header = [*described(exported, what, springs=False), *dialect.explained("fem"), *dialect.of_elements]
-        files["fem.inp"] = deck(dialect, twin, levels, nonlinear=True, continuum=True, header=header)
-    except ExportError as error:
-        notes.append(f"fem.inp was not written: {error}.")
-    what = f"{dialect.program} SPRINGA elements"
-    header = [*described(exported, what, springs=True), *dialect.explained("springs"), *notes]
-    twin = spring_twin(problem, exported.network, dialect.force_unit)
-    return {"springs.inp": deck(dialect, twin, levels, nonlinear=True, continuum=False, header=header), **files}
-
-
-# --- headers -------------------------------------------------------------------------------------
 
 
 def described(exported: Exported, what: str, springs: bool) -> list[str]:

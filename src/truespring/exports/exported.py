@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Bools, Floats
-from truespring.conditions import Loading
+from truespring.conditions import Loading, Refined
 from truespring.equilibrium import Solution, State, Status, solve
 from truespring.errors import ExportError
 from truespring.loading import vector_words
@@ -60,6 +60,17 @@ class Exported:
         """The springs alone; only for targets that do not support coupled springs."""
         assert self.springs.network is not None  # check_targets raises for these
         return self.springs.network
+
+    @property
+    def refined(self) -> Refined | None:
+        """The potential, if it has further nodes after those of the mesh; else None."""
+        return self.path.potential if isinstance(self.path.potential, Refined) else None
+
+    @property
+    def nodes(self) -> Floats:
+        """Undeformed positions of all nodes of the springs [m], shape (n_nodes, dim)."""
+        assert self.path.potential is not None  # it was solved here
+        return self.path.potential.nodes
 
     @property
     def held(self) -> Bools:

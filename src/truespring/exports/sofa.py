@@ -12,8 +12,19 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, in_space
 from truespring.exports.exported import Exported
+from truespring.exports.sofa_field import (
+    FIELD,
+    FIELD_EXPLAINED,
+    FIELD_IMPORTS,
+    FIELD_MODULES,
+    HYPERELASTIC,
+    NATIVE,
+    NATIVE_EXPLAINED,
+    OF_MATERIALS,
+    field_files,
+    native_material,
+)
 from truespring.mesh.facets import triangles_of
-from truespring.models.spring_data import PlainSprings
 
 #: The version of SOFA whose source code the scene was checked against.
 CHECKED = "SOFA v26.12 in development, commit 2a278d8 of 2026-08-06; the names are those of v25.06 and v26.06 too"
@@ -25,6 +36,7 @@ _PLUGINS = (
     "Sofa.Component.MechanicalLoad",
     "Sofa.Component.ODESolver.Backward",
     "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "Sofa.Component.SolidMechanics.FEM.HyperElastic",
     "Sofa.Component.SolidMechanics.Spring",
     "Sofa.Component.StateContainer",
     "Sofa.Component.Topology.Container.Constant",
@@ -44,25 +56,33 @@ _ELEMENTS = {
 
 
 def sofa(exported: Exported) -> Mapping[str, str | bytes]:
-    """Return springs_scene.py, with createScene(root) for runSofa, and main() to run it by Python."""
-    network = exported.network
+    """Return springs_scene.py, with createScene(root) for runSofa, and main() to run it by Python.
+
+    Springs beyond plain ones also need truespring_forces.py and springs.npz.
+    """
+    beyond = bool(exported.springs.beyond)
     lines = [
         '"""' + "\n".join(_docstring(exported)),
         '"""',
         "",
+        *(FIELD_IMPORTS if beyond else ()),
         "import Sofa",
         "import Sofa.Core",
         "import Sofa.Simulation",
         "import SofaRuntime",
+        *(FIELD_MODULES if beyond else ()),
         "",
-        *_data(exported, network),
+        *_data(exported),
+        FIELD if beyond else NATIVE,
         _SCENE,
     ]
-    return {"springs_scene.py": "\n".join(lines)}
+    scene = {"springs_scene.py": "\n".join(lines)}
+    return scene | (field_files(exported) if beyond else {})
 
 
 def _docstring(exported: Exported) -> Iterator[str]:
-    for line in [*exported.header, *_EXPLAINED, *_of_elements(exported)]:
+    field = FIELD_EXPLAINED if exported.springs.beyond else NATIVE_EXPLAINED
+    for line in [*exported.header, *_EXPLAINED, *field, *_of_elements(exported)]:
         safe = line.replace("\\", "/").replace('"', "'")
         yield from textwrap.wrap(safe, 110, subsequent_indent="    ", break_long_words=False) or [""]
 
@@ -73,7 +93,6 @@ _EXPLAINED = (
     "Nodes and springs are counted from 0 as in the study; a plane body lies in z = 0 and is held there.",
     "Loads and prescribed displacements increase to their full values in LOAD_STEPS animation steps, each a static "
     "solve; nodes that a support rotates move along straight lines.",
-    "SOFA ignores springs shorter than 1e-9 m.",
 )
 
 
@@ -83,8 +102,14 @@ def _of_elements(exported: Exported) -> Iterator[str]:
     if not exported.problem.materials:
         yield "A network has no finite elements. It starts from the first load level that truespring reached."
         return
+    if exported.refined is not None:
+        yield "There are no finite elements: the springs join nodes that SOFA's elements do not have."
+        return
     if element not in _ELEMENTS:
         yield f"There are no finite elements: {exported.problem.mesh.kinds} elements are not exported to SOFA."
+        return
+    if material := native_material(exported):
+        yield (f"The finite elements are SOFA's {HYPERELASTIC}, material {material}: {OF_MATERIALS[material]}")
         return
     yield (
         f"The finite elements are SOFA's {_ELEMENTS[element][1]}, method 'large': corotational linear elasticity, "
@@ -96,13 +121,14 @@ def _of_elements(exported: Exported) -> Iterator[str]:
         yield "SOFA's hexahedra are exact only for axis-aligned bricks."
 
 
-def _data(exported: Exported, network: PlainSprings) -> Iterator[str]:
+def _data(exported: Exported) -> Iterator[str]:
     """Yield the constants of the scene, each with a comment."""
-    nodes = in_space(network.nodes)
+    loading = exported.problem.loading if exported.refined is None else exported.refined.loading
+    nodes, network = in_space(exported.nodes), exported.springs.network
     held = np.ones(nodes.shape, dtype=bool)
-    held[:, : exported.held.shape[1]] = exported.held
-    motion = in_space(exported.motion)
-    force = np.where(held, 0.0, in_space(exported.external_force))
+    held[:, : loading.held.shape[1]] = loading.held
+    motion = in_space(loading.full.motion())
+    force = np.where(held, 0.0, in_space(exported.force_of(loading)))
     loaded = np.flatnonzero(force.any(axis=1))
     moved = np.argwhere(motion != 0)
     probe = [exported.probe, None if exported.state is None else _probed(exported)]
@@ -110,9 +136,10 @@ def _data(exported: Exported, network: PlainSprings) -> Iterator[str]:
     yield from _named("LOAD_STEPS", exported.load_steps, "animation steps up to full load")
     yield from _named("NODES", nodes, "undeformed positions [m]")
     yield from _named("START", _start(exported), "initial positions [m], None if undeformed")
-    yield from _named("SPRINGS", network.springs, "the two nodes of each spring")
-    yield from _named("STIFFNESS", network.stiffness, "stiffness of each spring [N/m]")
-    yield from _named("REST_LENGTH", network.rest_length, "rest length of each spring [m]")
+    if not exported.springs.beyond and network is not None:
+        yield from _named("SPRINGS", network.springs, "the two nodes of each spring")
+        yield from _named("STIFFNESS", network.stiffness, "stiffness of each spring [N/m]")
+        yield from _named("REST_LENGTH", network.rest_length, "rest length of each spring [m]")
     yield from _named("HELD", _held(held), "whether x, y, z are held, and the nodes of which")
     yield from _named("LOADED", loaded, "nodes with a force")
     yield from _named("FORCES", force[loaded], "force on each of LOADED at full load [N]")
@@ -159,9 +186,13 @@ def _held(held: Bools) -> list[tuple[list[int], list[int]]]:
 def _elements(exported: Exported) -> dict[str, Any] | None:
     """Return component, topology and material of the finite elements."""
     problem = exported.problem
-    if not problem.materials or problem.mesh.element not in _ELEMENTS:
+    if not problem.materials or problem.mesh.element not in _ELEMENTS or exported.refined is not None:
         return None
     topology, component = _ELEMENTS[problem.mesh.element]
+    if material := native_material(exported):
+        lame = problem.materials[0].lame
+        data = {"materialName": material, "ParameterSet": [float(lame.mu), float(lame.lam)]}
+        return {"component": HYPERELASTIC, "topology": {topology: problem.mesh.elements.tolist()}, "data": data}
     elements = problem.mesh.elements if problem.mesh.dim == 3 else triangles_of(problem.mesh.elements)
     times = len(elements) // len(problem.mesh.elements)
     plane: dict[str, Any] = {}
@@ -243,21 +274,7 @@ def createScene(root):
     root.addObject("RequiredPlugin", pluginName=PLUGINS)
     root.addObject("DefaultAnimationLoop")
     root.addObject("VisualStyle", displayFlags="showBehaviorModels showForceFields showInteractionForceFields")
-    springs = add_body(root, "springs")
-    springs.addObject(
-        "SpringForceField",
-        name="springs",
-        template="Vec3",
-        object1="@dofs",
-        object2="@dofs",
-        springsIndices1=[first for first, _ in SPRINGS],
-        springsIndices2=[second for _, second in SPRINGS],
-        stiffness=STIFFNESS,
-        damping=[0.0] * len(SPRINGS),
-        lengths=REST_LENGTH,
-        elongationOnly=[False] * len(SPRINGS),
-        enabled=[True] * len(SPRINGS),
-    )
+    add_springs(add_body(root, "springs"))
     if FEM is not None:
         elements = add_body(root, "fem")
         elements.addObject("MeshTopology", name="mesh", position=NODES, **FEM["topology"])

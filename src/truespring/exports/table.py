@@ -1,23 +1,22 @@
 """The table of export targets."""
 
-from collections.abc import Mapping
 from types import MappingProxyType
 
-from truespring.exports.abaqus import abaqus
+from truespring.exports.abaqus import abaqus, abaqus_values
 from truespring.exports.arrays import as_json, npz
 from truespring.exports.c import c
-from truespring.exports.calculix import calculix
-from truespring.exports.decks import SPRINGA
+from truespring.exports.calculix import calculix, calculix_values
 from truespring.exports.features import ALL, Feature
 from truespring.exports.gltf import gltf
+from truespring.exports.keyword_files import DECKS, NAMES
 from truespring.exports.mujoco import mujoco
 from truespring.exports.obj import obj
 from truespring.exports.sofa import sofa
 from truespring.exports.target import Option, Target
 from truespring.exports.usd import usd
 from truespring.exports.warp import warp
+from truespring.plugins import Table
 
-_DECKS = ("springs.inp", "fem.inp")
 _IN_DECKS = "springs.inp has the springs as SPRINGA elements; fem.inp has the same body as finite elements."
 _NOT_IN_DECKS = "Density and contact are left out; weight is in the nodal forces."
 _ARRAYS = "All springs, elements, constants, supports and loads are arrays; see docs/export/arrays.md."
@@ -27,26 +26,29 @@ _NO_SPRINGS = "Springs, supports and loads are left out: the files are for viewi
 _FOLLOWED = frozenset({Feature.PRESTRESS, Feature.FOLLOWING})
 
 #: Export targets by name.
-TARGETS: Mapping[str, Target] = MappingProxyType(
+TARGETS: Table[Target] = Table(
+    "truespring.targets",
     {
         "calculix": Target(
             calculix,
-            "CalculiX decks: springs.inp of SPRINGA elements, fem.inp of finite elements",
+            "CalculiX decks: springs.inp of SPRINGA elements or twin.inp of finite elements, and fem.inp",
             "CalculiX",
-            _DECKS,
-            SPRINGA,
+            NAMES,
+            DECKS,
             expressed=_IN_DECKS,
             left_out=_NOT_IN_DECKS,
+            details=calculix_values,
         ),
         "abaqus": Target(
             abaqus,
             "the same for Abaqus",
             "Abaqus",
-            _DECKS,
-            SPRINGA,
+            NAMES,
+            DECKS,
             expressed=_IN_DECKS,
             left_out=_NOT_IN_DECKS,
             unrun="Abaqus was not run; CalculiX reads the same keywords",
+            details=abaqus_values,
         ),
         "mujoco": Target(
             mujoco,
@@ -64,9 +66,10 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             sofa,
             "a Python scene for SOFA, of springs and finite elements; experimental",
             "SOFA",
-            ("springs_scene.py",),
-            _FOLLOWED | {Feature.NEGATIVE},
-            expressed="Springs are a MeshSpringForceField, finite elements a node of their own, loads constant forces.",
+            ("springs_scene.py", "truespring_forces.py", "springs.npz"),
+            _FOLLOWED | {Feature.NEGATIVE, Feature.VOLUME_TERM, Feature.COUPLING, Feature.PRESSURE},
+            expressed="Plain springs are a SpringForceField, others a force field in Python; finite elements are "
+            "a node of their own, loads constant forces.",
             left_out="Contact is not set up.",
             unrun="SOFA was not run; the scene is checked against the source code of SOFA",
         ),
@@ -121,5 +124,6 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
         "json": Target(
             as_json, "the same arrays as text: springs.json", "json", ("springs.json",), ALL, _ARRAYS, _NOTHING
         ),
-    }
+    },
+    Target,
 )

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 from truespring.exports.exported import Exported
 from truespring.exports.features import Feature
@@ -24,6 +25,11 @@ class Option:
     about: str
 
 
+def no_details(exported: Exported) -> Mapping[str, Any]:
+    """Return no further values."""
+    return {}
+
+
 @dataclass(frozen=True)
 class Target:
     """A program or format that spring models are exported to.
@@ -32,11 +38,12 @@ class Target:
         files: returns the files of solved springs, whose features are all in `takes`.
         about: one-line description of the files.
         program: name in error messages.
-        names: names of the files; all but the first are optional.
+        names: names of the files; which of them are written depends on the springs.
         takes: supported features of springs and loads; any other makes `check_targets` raise ExportError.
         expressed: how springs and loads are expressed, as a sentence, for exported.json.
         left_out: what of the study is not in the files, as a sentence.
         unrun: why no test runs the program on the files; empty if a test does.
+        details: returns further values of exported.json, which replace those of the same key.
         options: options by name; `files` finds their values in `Exported.options`.
     """
 
@@ -48,4 +55,5 @@ class Target:
     expressed: str
     left_out: str
     unrun: str = ""
+    details: Callable[[Exported], Mapping[str, Any]] = no_details
     options: Mapping[str, Option] = field(default_factory=lambda: MappingProxyType({}))

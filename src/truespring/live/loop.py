@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from truespring.errors import TruespringError, one_line
-from truespring.live.commands import COMMANDS, Command
+from truespring.live.commands import COMMANDS, Command, Log
 from truespring.live.drawn import Drawn, drawn
 from truespring.live.orders import Order, Orders
 from truespring.live.pace import Clock, Meter, Pace, WallClock
@@ -165,16 +165,25 @@ class Loop:
         else:
             self.orders.wait(_IDLE)
             self.pace.begin_again()
-        asked = self.orders.take()
-        for order in asked:
-            self._guarded(lambda order=order: self._carry_out(order))  # type: ignore[misc]
+        asked = self._asked()
         moves = self.running or self._single > 0
         if moves:
             self._guarded(self._advance)
+        self._end_turn(moves, asked)
+
+    def _asked(self) -> bool:
+        """Carry out what is asked; return whether anything was."""
+        asked = self.orders.take()
+        for order in asked:
+            self._guarded(lambda order=order: self._carry_out(order))  # type: ignore[misc]
+        return bool(asked)
+
+    def _end_turn(self, moves: bool, asked: bool) -> None:
+        """Compare with the twin, and make known what changed."""
         before = self._overlay
         self._guarded(self._compare)
         if moves or asked or self._overlay is not before:
-            self._publish(fresh=bool(asked))
+            self._publish(fresh=asked)
 
     def _guarded(self, done: Callable[[], None]) -> None:
         """Do something; what goes wrong becomes a message, and pauses the session unless it is a wrong order."""
@@ -191,10 +200,14 @@ class Loop:
         self._single = max(0, self._single - 1)
         before = self.live.log
         self.live.step()
-        self.meter.add(self.clock.now(), self.live.settings.frame if self.live.log is before else 0.0)
+        self._count(1, before)
+
+    def _count(self, frames: int, before: Log) -> None:
+        """Count frames by which the session advanced; `before` is its log then, another one if it began again."""
         log = self.live.log
+        self.meter.add(self.clock.now(), frames * self.live.settings.frame if log is before else 0.0)
         self.ring.add(Kept(log.frames, self.live.time, self.live.positions))
-        if log.frames % _LOOK == 0:
+        if log.frames % _LOOK < frames:
             energies = self.live.energies()
             self.still = energies.kinetic < _STILL * energies.elastic
         self._tell()
@@ -259,11 +272,11 @@ class Loop:
         self._tell()
 
     def _node(self, order: Order) -> int:
-        """Return the number of the node of an order among those of the mesh."""
+        """Return the number of the node of an order among those of the mesh, or of the surface's node nearest to it."""
         nodes = self._drawn.nodes
         if order.node is None or not 0 <= order.node < len(nodes):
             raise TruespringError(f"{order.kind}: node {order.node}: the drawn nodes are 0 to {len(nodes) - 1}")
-        return int(nodes[order.node])
+        return self.live.node_at(self.live.positions[nodes[order.node]].tolist())
 
     def _held(self) -> list[str]:
         return [*self.live.grasps, *self.live.spheres]

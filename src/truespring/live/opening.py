@@ -6,10 +6,12 @@ from typing import Any
 
 from truespring.errors import LiveError
 from truespring.live.coarsened import coarsened
+from truespring.live.haptic import PERIOD, Haptic
+from truespring.live.haptic_loop import HapticLoop
 from truespring.live.loop import Loop
 from truespring.live.measured import Measures
 from truespring.live.record import write_session
-from truespring.live.session import Live
+from truespring.live.session import FRAME, Live
 from truespring.live.twin import Twin
 from truespring.models import Fem
 from truespring.study import Study, read_text
@@ -24,6 +26,7 @@ def opened(
     coarsen: float | str = "auto",
     twin: bool = True,
     folder: Path | None = None,
+    haptic: int | None = None,
 ) -> tuple[Loop, str]:
     """Return the loop of a session of a study, which is not started yet, and the title of the study.
 
@@ -34,13 +37,14 @@ def opened(
         coarsen: element size over that of the study, or "auto", see `coarsened`.
         twin: whether a reference is computed beside the model.
         folder: where the session is written to as a study; None for nowhere.
+        haptic: UDP port of a haptic device, with which the body moves in step, 0 for a free one; None for none.
 
     Raises StudyError, LiveError and, as `Live`, ProblemError and ModelError.
     """
     found = coarsened(read_text(file), coarsen, model)
     study, name = found.study, found.study.model if model is None else model
     models = {key: one for key, one in study.entries.items() if can_vibrate(one)}
-    live = Live(study.problem, study.entries[name], models=models)
+    live = Live(study.problem, study.entries[name], models=models, frame=FRAME if haptic is None else PERIOD)
     right = _reference(study, reference) if twin else None
     more: dict[str, Any] = {
         "model": name,
@@ -51,7 +55,8 @@ def opened(
         beside = Twin(live, study.entries[right])
         about = (*found.notes, f"the reference is '{right}'")
         more |= {"twin": beside, "gauge": Measures(live, beside), "about": about}
-    return Loop(live, **more), study.title
+    loop = Loop(live, **more) if haptic is None else HapticLoop(Haptic(live, haptic), **more)
+    return loop, study.title
 
 
 def _saving(study: Study, folder: Path) -> Callable[[Live], str]:

@@ -206,7 +206,7 @@ class Live:
         made = built(self.problem, self.model) if ready is None else ready
         for size in ("surface", "touched", "edge", "contact_stiffness"):
             self.__dict__.pop(size, None)
-        self._plain, self._geometry, self._stable = made.body, made.geometry, made.stable
+        self._plain, self._geometry, self._stable, self._known = made.body, made.geometry, made.stable, None
         self._weight = self._weight_of(self._gravity)
         self.body = self._weighted()
         self._halved, self._largest = 0, 0.0
@@ -749,7 +749,12 @@ class Live:
 
     def _energy(self, moment: Moment, acting: Acting) -> float:
         """Return kinetic and stored energy [J]."""
-        return self._kinetic(moment) + self._stepper.elastic(moment.positions) + acting.stored(moment.positions)
+        known = self._known
+        if known is None or known[0] is not moment:  # that at the end of a frame is that at the begin of the next
+            self._known = known = moment, self._kinetic(moment) + self._stepper.elastic(moment.positions)
+        return known[1] + acting.stored(moment.positions)
+
+    _known: tuple[Moment, float] | None = None
 
     def _kinetic(self, moment: Moment) -> float:
         return float(np.einsum("n,ni,ni->", self.body.mass, moment.velocity, moment.velocity)) / 2

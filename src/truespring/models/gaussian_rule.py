@@ -1,20 +1,28 @@
 """The rule `gaussian`: its potential, and the stiffness of its springs."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from truespring.arrays import Floats
 from truespring.errors import ModelError
+from truespring.models.fem_potential import FemPotential
 from truespring.models.fibres import stiff_fibres
 from truespring.models.gaussian import GaussianElements, SummedGaussian
 from truespring.models.gaussian_quadratic import GaussianQuadratic, gaussian_quadratic
 from truespring.models.gaussian_weights import check_hourglass, hourglass_values, laplacians
 from truespring.models.interpolation import SIMPLICES
+from truespring.models.law import Law
 from truespring.models.laws import LAWS, law_constants
 from truespring.models.links import n_links
+from truespring.models.quadratic import QuadraticPotential
+from truespring.models.summed import SummedElements
+from truespring.plugins import Names
+from truespring.potential import Potential
 from truespring.problem import Problem
 
 #: Laws of Gaussian springs: functions of the trace of C and of the volume ratio.
-GAUSSIAN_LAWS = tuple(name for name, law in LAWS.items() if law.invariants is not None)
+GAUSSIAN_LAWS = Names(LAWS, lambda law: law.invariants is not None)
 
 DEFAULT_LAW = "neo-hookean"
 
@@ -41,6 +49,36 @@ def _of_one_kind(problem: Problem, law: str, hourglass: Floats) -> GaussianEleme
     fibres = stiff_fibres(problem)
     forms = laplacians(problem, hourglass, None if fibres is None else fibres.directions)
     return GaussianElements(problem, LAWS[law], law_constants(problem, law), forms, fibres)
+
+
+def with_law(potential: Potential | None, law: Law) -> Potential:
+    """Return a potential of Gaussian springs with another law of the same constants, a function of I1 and ln J.
+
+    Springs of second order become finite elements with the law at every Gauss point. Raises ModelError for other
+    potentials.
+    """
+    match potential:
+        case GaussianElements():
+            return replace(potential, law=law)
+        case SummedGaussian():
+            return SummedGaussian(tuple(replace(part, law=law) for part in potential.parts), potential.problem)
+        case QuadraticPotential():
+            return QuadraticPotential(potential.problem, law, potential.constants, potential.fibres)
+    raise ModelError(f"{type(potential).__name__} are not Gaussian springs: use rule = 'gaussian'")
+
+
+def with_law_at_points(potential: Potential | None, law: Law) -> Potential:
+    """Return finite elements with another law of the same constants at every Gauss point, on the mesh of the springs.
+
+    Raises ModelError for other potentials than Gaussian springs.
+    """
+    match potential:
+        case GaussianElements():
+            return FemPotential(potential.problem, law, potential.constants, potential.fibres)
+        case SummedGaussian():
+            parts = [FemPotential(part.problem, law, part.constants, part.fibres) for part in potential.parts]
+            return SummedElements(tuple(parts), potential.problem)
+    return with_law(potential, law)
 
 
 def gaussian_stiffness(

@@ -22,11 +22,12 @@ from truespring.models.model import Model
 from truespring.models.semidefinite import semidefinite
 from truespring.models.summed import SummedLinks, summed_links
 from truespring.models.symmetric import identity
+from truespring.plugins import Names
 from truespring.potential import SparseMatrix
 from truespring.problem import Problem
 
 #: Laws allowed for links: those of finite strain.
-HEML_LAWS = tuple(name for name, law in LAWS.items() if law.finite)
+HEML_LAWS = Names(LAWS, lambda law: law.finite)
 # Smallest number of elements for which threads share a slice.
 _SMALLEST_PIECE = 256
 _SIMPLICES = ("triangle", "tetrahedron")

@@ -31,6 +31,7 @@ from truespring.models.ogden import hencky, mooney_rivlin, mooney_rivlin_fault, 
 from truespring.models.rubber import arruda_boyce, gent, neo_hookean, yeoh
 from truespring.models.stretches import by_stretches
 from truespring.models.symmetric import contracted, dimensions, identity, trace
+from truespring.plugins import Table
 from truespring.problem import Problem
 
 # Largest difference of young (relative) and poisson (absolute) between a material and a law whose constants determine
@@ -69,7 +70,8 @@ def _thickness_strain(strain: Floats, constants: Constants) -> Floats:
     return np.asarray(-constants.lam / (constants.lam + 2 * constants.mu) * trace(strain))
 
 
-LAWS: MappingProxyType[str, Law] = MappingProxyType(
+LAWS: Table[Law] = Table(
+    "truespring.laws",
     {
         "linear": Law(
             linear,
@@ -210,7 +212,8 @@ LAWS: MappingProxyType[str, Law] = MappingProxyType(
             ),
             fault=ogden_fault,
         ),
-    }
+    },
+    Law,
 )
 
 

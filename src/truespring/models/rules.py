@@ -6,7 +6,7 @@ A rule consists of a function of the problem that returns stiffness [N/m], shape
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -30,6 +30,7 @@ from truespring.models.linked import LinkedElements
 from truespring.models.links import CORNERS, by_kind, link_coupling, link_vectors
 from truespring.models.pair_laws import PAIR_LAWS, STRAIGHT
 from truespring.models.summed import SummedLinks, summed_links
+from truespring.plugins import Table
 from truespring.potential import Stressed
 from truespring.problem import Problem, sample
 
@@ -103,7 +104,7 @@ class Rule:
     shapes: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     parameters: tuple[str, ...] = ()
     potential: Callable[..., Stressed] | None = None
-    laws: tuple[str, ...] = ()
+    laws: Sequence[str] = ()
     locks_on: tuple[str, ...] = ()
     remark: str = ""
     takes_fibres: bool = False
@@ -426,7 +427,8 @@ _ALL = ("triangle", "quadrilateral", "tetrahedron", "pyramid", "wedge", "hexahed
 
 _THIRD, _QUARTER = (1 / 3, 1 / 3), (1 / 4, 1 / 4)
 
-RULES: MappingProxyType[str, Rule] = MappingProxyType(
+RULES: Table[Rule] = Table(
+    "truespring.rules",
     {
         "lloyd": Rule(
             lloyd,
@@ -514,5 +516,6 @@ RULES: MappingProxyType[str, Rule] = MappingProxyType(
             locks_on=SIMPLICES,
             takes_fibres=True,
         ),
-    }
+    },
+    Rule,
 )

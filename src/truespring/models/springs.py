@@ -166,7 +166,7 @@ class Springs(Model):
     @property
     def parameters(self) -> dict[str, Any]:
         """Parameters of the rule that are set, by name."""
-        names = dict.fromkeys(name for rule in RULES.values() for name in rule.parameters)
+        names = dict.fromkeys(name for rule in RULES.own.values() for name in rule.parameters)
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     def kappa(self, problem: Problem) -> Floats:

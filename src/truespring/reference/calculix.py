@@ -12,10 +12,11 @@ from truespring.arrays import Floats
 from truespring.conditions import on_the_mesh
 from truespring.equilibrium import Solution, State, Status
 from truespring.errors import ModelError, ReferenceFileError
-from truespring.exports import refuse_untaken
 from truespring.exports.calculix import FORCE_UNIT, LAWS, fem_deck, spring_deck
-from truespring.exports.decks import check_fem, fem_element, is_led_aside, second_order, usual_element
+from truespring.exports.continuum import check_fem, fem_element, second_order, usual_element
 from truespring.exports.exported import spring_data
+from truespring.exports.features import refuse_others
+from truespring.exports.spring_elements import SPRINGA, is_led_aside
 from truespring.loading import FacePressure
 from truespring.models import Fem, Model
 from truespring.models.quadratic import QuadraticPotential
@@ -99,7 +100,7 @@ class CalculiX(Program):
         if self.springs is None:
             return None
         springs = spring_data(self.springs.potential(problem))
-        refuse_untaken("calculix", problem, springs)
+        refuse_others(problem, springs, SPRINGA, "CalculiX SPRINGA")
         return springs.network
 
     def run(

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 from truespring.equilibrium import Solution
@@ -11,6 +10,7 @@ from truespring.errors import ReferenceFileError, nearest
 from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
 from truespring.mesh.files.vtk_file import VTK_FORMATS
 from truespring.opening import open_file
+from truespring.plugins import Table
 from truespring.reference.checks import refuse_unreadable
 from truespring.reference.dat import is_dat, read_dat
 from truespring.reference.frd import is_frd, read_frd
@@ -44,7 +44,8 @@ class Format(NamedTuple):
 _FIELD, _REST = frozenset({"field"}), frozenset({"undeformed"})
 
 #: Formats by lower-case suffix; if several recognise a file, the one with its suffix is used, else the first.
-READERS: MappingProxyType[str, Format] = MappingProxyType(
+READERS: Table[Format] = Table(
+    "truespring.readers",
     {
         ".frd": Format(
             is_frd, read_frd, unnoticed="truncated after a level it reads as a run that stopped, with a note"
@@ -63,7 +64,8 @@ READERS: MappingProxyType[str, Format] = MappingProxyType(
             is_marked=False,
         ),
         ".stl": Format(is_stl, read_stl_pair, _REST, is_marked=False),  # binary files have no mark
-    }
+    },
+    Format,
 )
 
 

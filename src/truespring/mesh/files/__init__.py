@@ -9,7 +9,6 @@ and are tested on files written by those programs.
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 from truespring.deprecation import renamed_argument
@@ -21,6 +20,7 @@ from truespring.mesh.files.inp import read_inp
 from truespring.mesh.files.vtk_file import VTK_FORMATS, read_vtk
 from truespring.mesh.mesh import Mesh
 from truespring.opening import read_file
+from truespring.plugins import Table
 from truespring.units import unit_of
 
 Reader = Callable[[bytes, Path], Contents]
@@ -51,7 +51,8 @@ _GMSH = "if gmsh reads it, save it again: gmsh FILE -0 -format msh41 -o NEW.msh"
 _PARAVIEW = "if ParaView reads it, save it again there as an unstructured grid, .vtu"
 
 #: The formats by suffix in lower case; if several recognise a file, the one with its suffix is used, else the first.
-FORMATS: MappingProxyType[str, Format] = MappingProxyType(
+FORMATS: Table[Format] = Table(
+    "truespring.meshes",
     {
         ".msh": Format(is_msh, _alone(read_msh), _GMSH),
         ".inp": Format(is_inp, read_inp, unnoticed="a deck has no end mark: truncated between two lines it is shorter"),
@@ -62,7 +63,8 @@ FORMATS: MappingProxyType[str, Format] = MappingProxyType(
             _PARAVIEW,
             unnoticed="a legacy file has no end mark: truncated between two arrays it has fewer groups",
         ),
-    }
+    },
+    Format,
 )
 
 

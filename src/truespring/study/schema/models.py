@@ -164,7 +164,7 @@ class SpringsKeys(ModelKeys):
     @property
     def _parameters(self) -> dict[str, Any]:
         """Parameters of the rule, by name."""
-        return {name: getattr(self, name) for rule in RULES.values() for name in rule.parameters}
+        return {name: getattr(self, name) for rule in RULES.own.values() for name in rule.parameters}
 
     @model_validator(mode="after")
     def _stiffness_read(self) -> Self:
