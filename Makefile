@@ -38,7 +38,7 @@ hourglass: .venv/test
 
 # Times truespring, CalculiX (ccx on the path), FElupe and scikit-fem, and rebuilds docs/performance.md in at most 1.5 hours.
 # Results are kept in benchmarks/.cache, so an interrupted run resumes. SIZES=small makes a short trial run.
-# Then it measures live sessions, and rebuilds the table of docs/live_parts/speed.md.
+# Then it measures live sessions, and rebuilds the table of docs/live.md.
 bench: .venv/test .venv-peers/installed
 	$(BIN)/python -m benchmarks $(if $(filter small,$(SIZES)),--small)
 	$(BIN)/python -m benchmarks.live

@@ -213,3 +213,14 @@ def test_flex_is_biquadratic_springs_on_triangles_or_tetrahedra(name: str, drive
 def test_bodies_that_move_have_no_flex() -> None:
     """MuJoCo takes initial positions as undeformed."""
     assert "flex.xml" not in target_files(body("gaussian, moved"), ["mujoco"])["mujoco"]
+
+
+@pytest.mark.parametrize(("arguments", "bound"), [([], 1e-4), (["--file", "flex.xml"], 1.0)])
+def test_the_driver_is_a_program(
+    arguments: list[str], bound: float, drive: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module, _ = drive(body("gaussian, sheet"))
+    monkeypatch.setattr("sys.argv", ["drive.py", *arguments])
+    assert module.main() == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert "has moved by" in shown[0] and float(shown[1].rpartition(":")[2]) < bound

@@ -60,6 +60,8 @@ def test_a_network_with_rest_lengths(tmp_path: Path, monkeypatch: pytest.MonkeyP
     springs = module.Springs(device="cpu")
     springs.settle(4.0)
     assert springs.distance() < 1e-6
+    monkeypatch.setattr("sys.argv", ["springs_warp.py", "--device", "cpu", "--times", "1"])
+    assert module.main() == 0
 
 
 def test_leapfrog_keeps_the_energy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

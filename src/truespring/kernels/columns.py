@@ -10,9 +10,9 @@ three signs, and so on, the volume is that of `measures.hexahedra`, and the ener
 squares of the modes times their stiffness.
 
 Shapes: x, force (3, n_nodes); columns (n_batches, 4, WIDTH), the nodes around xi; straight (n_batches, 4, WIDTH //
-GROUP), whether GROUP nodes have consecutive numbers; constants (n_batches, CONSTANTS,
-WIDTH): stiffness of a_1, a_2, a_3, h_1, h_2, h_3, g [N/m], the inverse of the undeformed volume [1/m^3], 1 for an
-element and 0 for none, and the offset and slope of the pressure [Pa]; work (ROWS, WIDTH + 2 _PAD).
+GROUP), whether GROUP nodes have consecutive numbers; which (n_batches,), the constants of a batch; constants (n,
+CONSTANTS, WIDTH): stiffness of a_1, a_2, a_3, h_1, h_2, h_3, g [N/m], the inverse of the undeformed volume [1/m^3], 1
+for an element and 0 for none, and the offset and slope of the pressure [Pa]; work (_ROWS, WIDTH + 2 _PAD).
 """
 
 from typing import Any
@@ -199,7 +199,7 @@ def _scatter(columns: Any, straight: Any, batch: int, d: int, work: Any, force: 
 
 
 @_part
-def _measure(x: Any, columns: Any, straight: Any, constants: Any, batch: int, work: Any) -> int:
+def _measure(x: Any, columns: Any, straight: Any, which: Any, constants: Any, batch: int, work: Any) -> int:
     """Write modes, derivatives and changes of volume of a batch; return the value of `_find_changes`."""
     for d in range(3):
         _gather(x, columns, straight, batch, d, work)
@@ -212,20 +212,20 @@ def _measure(x: Any, columns: Any, straight: Any, constants: Any, batch: int, wo
     _differentiate(0, work)
     _differentiate(1, work)
     _differentiate(2, work)
-    return _find_changes(constants, batch, work)
+    return _find_changes(constants, which[batch], work)
 
 
 @kernel
-def subtract_forces(x: Any, columns: Any, straight: Any, constants: Any, force: Any) -> None:
+def subtract_forces(x: Any, columns: Any, straight: Any, which: Any, constants: Any, force: Any) -> None:
     """Subtract the internal forces of hexahedra from the forces on their nodes."""
     work = np.empty((_ROWS, WIDTH + 2 * _PAD))
     work[:] = 0.0
     for batch in range(len(columns)):
-        outside = _measure(x, columns, straight, constants, batch, work)
-        _find_pressures(constants, batch, outside, work)
-        _find_forces(constants, batch, 0, work)
-        _find_forces(constants, batch, 1, work)
-        _find_forces(constants, batch, 2, work)
+        outside, own = _measure(x, columns, straight, which, constants, batch, work), which[batch]
+        _find_pressures(constants, own, outside, work)
+        _find_forces(constants, own, 0, work)
+        _find_forces(constants, own, 1, work)
+        _find_forces(constants, own, 2, work)
         _sum_forces(0, work)
         _sum_forces(1, work)
         _sum_forces(2, work)
@@ -234,20 +234,21 @@ def subtract_forces(x: Any, columns: Any, straight: Any, constants: Any, force: 
 
 
 @kernel
-def energy(x: Any, columns: Any, straight: Any, constants: Any) -> float:
+def energy(x: Any, columns: Any, straight: Any, which: Any, constants: Any) -> float:
     """Return the energy of hexahedra, but for a constant [J]."""
     work = np.empty((_ROWS, WIDTH + 2 * _PAD))
     work[:] = 0.0
     total = 0.0
     for batch in range(len(columns)):
-        _measure(x, columns, straight, constants, batch, work)
+        _measure(x, columns, straight, which, constants, batch, work)
+        own = which[batch]
         for j in range(WIDTH):
-            if constants[batch, 8, j] > 0:
-                own = density(1 + work[_CHANGE, j], 0.0, constants[batch, 9, j], constants[batch, 10, j])
-                total += own / constants[batch, 7, j]
+            if constants[own, 8, j] > 0:
+                stored = density(1 + work[_CHANGE, j], 0.0, constants[own, 9, j], constants[own, 10, j])
+                total += stored / constants[own, 7, j]
             for q in range(7):
                 square = 0.0
                 for d in range(3):
                     square += work[_MODES + 7 * d + q, j] ** 2
-                total += constants[batch, q, j] / 2 * square
+                total += constants[own, q, j] / 2 * square
     return total

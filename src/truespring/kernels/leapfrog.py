@@ -3,12 +3,12 @@
 One thread, and the same order of all sums in each run. Positions, velocities and forces have shape (dim, n_nodes), so
 that loops over nodes use vector registers.
 
-A `body` is (columns, straight, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the other
-elements as starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements of all
-kinds: node numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for each
-kind the number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,), and
-undeformed volumes, across, offset and slope of the pressure (n_elements,), see `kernels.pressures`. `zero` is a tuple
-of dim zeros.
+A `body` is (columns, straight, which, constants, springs, cells): hexahedra as in `kernels.columns`; springs of the
+other elements as starts (n_nodes + 1,), columns and weights (n_blocks,), see `gaussian.pulls`; and the other elements
+of all kinds: node numbers (n,) and the first of each element among them (n_elements + 1,), its kind (n_elements,), for
+each kind the number of simplices (n_kinds,), the simplices (n_kinds, n_simplices, dim + 1) and their weight (n_kinds,),
+and undeformed volumes, across, offset and slope of the pressure (n_elements,), see `kernels.pressures`. `zero` is a
+tuple of dim zeros.
 """
 
 import math
@@ -84,8 +84,8 @@ def _subtract_pressures(x: Any, cells: Any, force: Any, zero: Any) -> None:
 @kernel
 def _subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
     """Subtract the internal force of a body from the forces on its nodes [N], shape (dim, n_nodes)."""
-    lattice, straight, constants, springs, cells = body
-    columns.subtract_forces(x, lattice, straight, constants, force)
+    lattice, straight, which, constants, springs, cells = body
+    columns.subtract_forces(x, lattice, straight, which, constants, force)
     if len(springs[1]) > 0:
         _subtract_springs(x, springs[0], springs[1], springs[2], force, zero)
     _subtract_pressures(x, cells, force, zero)
@@ -94,8 +94,8 @@ def _subtract_forces(x: Any, body: Any, force: Any, zero: Any) -> None:
 @kernel
 def energy(x: Any, body: Any, zero: Any) -> Any:
     """Return the energy of a body, but for a constant [J]; finite in inverted elements, too, see `pressure`."""
-    lattice, straight, constants, springs, cells = body
-    total = columns.energy(x, lattice, straight, constants)
+    lattice, straight, which, constants, springs, cells = body
+    total = columns.energy(x, lattice, straight, which, constants)
     for i in range(len(springs[0]) - 1):
         for p in range(springs[0][i], springs[0][i + 1]):
             for c in range(len(zero)):

@@ -21,6 +21,8 @@ _MODES = np.stack(
 _TURNED = np.array([1, 2, 0, 4, 5, 3, 6])
 # The nodes of the left column, around the first axis, and those of the right one.
 _LEFT, _RIGHT = np.array([0, 3, 7, 4]), np.array([1, 2, 6, 5])
+# How much more rows of nodes with consecutive numbers count, and rounding below which constants of bricks are equal.
+_IN_ORDER, _EQUAL = 0.25, 1e-13
 # Largest product of two modes in a matrix that counts as one of modes, over the largest entry: rounding.
 _ROUNDING = 1e-11
 
@@ -30,6 +32,7 @@ class Arrays(NamedTuple):
 
     columns: Any
     straight: Bools
+    which: Ints
     constants: Floats
     springs: tuple[Any, Any, Floats]
     cells: tuple[Any, ...]
@@ -84,8 +87,8 @@ def _modal(cells: ConstantCells) -> Floats | None:
     return np.asarray(cells.shear[:, None] * own[cells.of])
 
 
-def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Bools, Floats]:
-    """Return columns of bricks, whether they are straight, and constants, see `kernels.columns`.
+def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Bools, Ints, Floats]:
+    """Return columns of bricks, whether they are straight, which constants they have, and these, see `kernels.columns`.
 
     `stiffness` [N/m] has shape (n_elements, 7).
     """
@@ -116,15 +119,23 @@ def _batches(cells: ConstantCells, stiffness: Floats) -> tuple[Any, Bools, Float
     around = np.ascontiguousarray(nodes.transpose(0, 2, 1))
     groups = around.reshape(len(nodes), 4, WIDTH // GROUP, GROUP)
     straight = (np.diff(groups, axis=3) == 1).all(axis=3)
-    return around, straight, np.ascontiguousarray(constants.transpose(0, 2, 1))
+    return around, straight, *_distinct(np.ascontiguousarray(constants.transpose(0, 2, 1)))
 
 
-def _no_batches() -> tuple[Any, Bools, Floats]:
+def _distinct(constants: Floats) -> tuple[Ints, Floats]:
+    """Return which of the distinct constants each batch has, shape (n_batches,), and these: few stay in the cache."""
+    scale = np.abs(constants).max(axis=(0, 2))[:, None]
+    keys = np.round(constants / (_EQUAL * np.where(scale > 0, scale, 1.0))).reshape(len(constants), -1)
+    _, first, of = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return np.asarray(of).ravel(), np.ascontiguousarray(constants[first])
+
+
+def _no_batches() -> tuple[Any, Bools, Ints, Floats]:
     """Return the columns and constants of no bricks."""
     from truespring.kernels.columns import CONSTANTS, GROUP, WIDTH
 
     nodes, straight = np.zeros((0, 4, WIDTH), dtype=np.int32), np.zeros((0, 4, WIDTH // GROUP), dtype=bool)
-    return nodes, straight, np.zeros((0, CONSTANTS, WIDTH))
+    return nodes, straight, np.zeros(0, dtype=np.int64), np.zeros((0, CONSTANTS, WIDTH))
 
 
 def _turned(turn: int) -> Ints:
@@ -136,16 +147,16 @@ def _turned(turn: int) -> Ints:
 def _rows(elements: Any) -> tuple[int, Ints]:
     """Return the axis along which most elements follow each other, and the element after each one, -1 for none.
 
-    Of axes with equally many, that whose nodes are nearest in memory is taken.
+    An axis along which nodes have consecutive numbers, which are read at once, counts more.
     """
     found = []
     for turn in range(3):
         turned = elements[:, _turned(turn)]
         after = _after(turned[:, _LEFT], turned[:, _RIGHT])
-        away = int(np.abs(turned[:, _RIGHT] - turned[:, _LEFT]).sum())
-        found.append((-int((after >= 0).sum()), away, turn, after))
-    _, _, turn, after = min(found, key=lambda one: one[:3])
-    return turn, after
+        in_order = float((turned[:, _RIGHT] - turned[:, _LEFT] == 1).mean())
+        found.append((float((after >= 0).sum()) * (1 + _IN_ORDER * in_order), -turn, after))
+    _, turn, after = max(found, key=lambda one: one[:2])
+    return -turn, after
 
 
 def _after(left: Ints, right: Ints) -> Ints:
