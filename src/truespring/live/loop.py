@@ -235,6 +235,7 @@ class Loop:
             if self._gauge is not None:
                 self._gauge.take(ghost, self.ring)
             own = self.ring.at(ghost.time)
+            own = ghost.own if own is None else own  # at rest the equilibrium of the session's model is known, too
             if ghost.kind not in _SHOWN or own is None or own.shape != ghost.positions.shape:
                 continue
             apart = np.linalg.norm(ghost.positions - own, axis=1)
