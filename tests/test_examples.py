@@ -20,8 +20,8 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 NAMES = ("stretching", "bending", "soft_block", "tissue", "muscle")
 # Studies of motions.
 MOVING = ("gripped_block", "liver_probe", "pulled")
-# Programs around live sessions: tests/test_live_python.py and tests/test_live_haptic.py run them.
-LIVE = ("gym_loop", "haptic_client")
+# Programs around live sessions: tests/test_live_python.py, test_live_haptic.py and test_live_twin.py run them.
+LIVE = ("gym_loop", "haptic_client", "live_errors")
 
 
 @cache

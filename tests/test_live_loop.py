@@ -33,6 +33,7 @@ class Ghost:
     time: float
     kind: str
     positions: Floats
+    own: Floats | None = None
 
 
 @dataclass
@@ -228,6 +229,9 @@ def test_a_ghost_is_compared_at_its_own_time() -> None:
     twin.ghosts = [Ghost(99.0, "moving", kept[4])]  # not kept: nothing to compare with
     turns(loop, 1)
     assert loop.latest.overlay is overlay
+    twin.ghosts = [Ghost(-9.0, "rest", kept[4] + away, kept[4])]  # nor this, but it has what it is compared with
+    turns(loop, 1)
+    assert loop.latest.overlay is not None and loop.latest.overlay.distances == pytest.approx(overlay.distances)
     loop.ask(Order("restart"))
     turns(loop, 1)
     assert loop.latest.overlay is None

@@ -390,3 +390,11 @@ def test_the_process_finds_what_is_beside_and_survives_its_end() -> None:
         assert "exit code -9" in twin.ended and twin.news() == []
         assert measures.words()["model"] == twin.ended
     assert twin.ended
+
+
+@pytest.mark.verification
+def test_the_example_of_errors_measures_all_three(capfd: pytest.CaptureFixture[str]) -> None:
+    from tests.test_examples import script
+
+    found = script("live_errors").errors()
+    assert len(found.splitlines()) == 3 and found.count("%") >= 2

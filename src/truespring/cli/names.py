@@ -32,7 +32,7 @@ LOAD_TYPES_3D = ("twist",)
 UNKNOWNS = ("class", "region", "direction-row", "spring", "hourglass", "material")
 
 #: Names of `truespring.exports.TARGETS`.
-TARGETS = ("calculix", "abaqus", "mujoco", "sofa", "c", "warp", "gltf", "obj", "usd", "npz", "json")
+TARGETS = ("calculix", "abaqus", "mujoco", "sofa", "c", "warp", "febio", "gltf", "obj", "usd", "npz", "json")
 
 #: Names of `truespring.reference.READERS`.
 READERS = (

@@ -7,6 +7,7 @@ from truespring.exports.arrays import as_json, npz
 from truespring.exports.c import c
 from truespring.exports.calculix import calculix, calculix_values
 from truespring.exports.features import ALL, Feature
+from truespring.exports.febio import febio
 from truespring.exports.gltf import gltf
 from truespring.exports.keyword_files import DECKS, NAMES
 from truespring.exports.mujoco import mujoco
@@ -91,6 +92,17 @@ TARGETS: Table[Target] = Table(
             expressed="Springs, functions of the volume and coupled springs are kernels, in float32 or float64; loads "
             "are constant forces.",
             left_out="Contact is not set up. newton_mount.py was not run.",
+        ),
+        "febio": Target(
+            febio,
+            "FEBio 4.0: springs.feb of discrete springs, or of neo-Hookean elements for Gaussian springs",
+            "FEBio",
+            ("springs.feb",),
+            frozenset({Feature.PRESSURE, Feature.FOLLOWING}),
+            expressed="Plain springs are discrete elements, Gaussian springs neo-Hookean finite elements: equal on "
+            "tetrahedra of first order, on others a twin at small strain only.",
+            left_out="Contact is left out; weight is in the nodal forces.",
+            unrun="FEBio was not run; the structure is that of its published test suite",
         ),
         "gltf": Target(
             gltf,

@@ -49,15 +49,21 @@ class Compiled:
         self._zero = (0.0,) * nodes.shape[1]
         self._inverse = _by_direction(np.where(body.held, 0.0, 1 / body.mass[:, None]))
         self._last: _State | None = None
+        self._known: tuple[Floats, float] | None = None  # positions and their energy
         self._rest = self._energy(nodes)
 
     def forget(self) -> None:
-        """Forget the force at the end of the last frame."""
-        self._last = None
+        """Forget the force and the energy at the end of the last frame."""
+        self._last, self._known = None, None
 
     def elastic(self, positions: Floats) -> float:
-        """Return the elastic energy [J]; with the pressure continued linearly below a tenth of the volume."""
-        return self._energy(positions) - self._rest
+        """Return the elastic energy [J]; with the pressure continued linearly below a tenth of the volume.
+
+        That of the last positions is kept: a frame begins where the one before it ended.
+        """
+        if self._known is None or self._known[0] is not positions:
+            self._known = positions, self._energy(positions) - self._rest
+        return self._known[1]
 
     def _energy(self, positions: Floats) -> float:
         from truespring.kernels import leapfrog

@@ -3,13 +3,14 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
 
 import numpy as np
 
 from truespring.errors import TruespringError, one_line
 from truespring.live.commands import COMMANDS, Command, Log
+from truespring.live.companion import Companion, Gauge
 from truespring.live.drawn import Drawn, drawn
+from truespring.live.marks import marks_of
 from truespring.live.orders import Order, Orders
 from truespring.live.pace import Clock, Meter, Pace, WallClock
 from truespring.live.readout import Facts, Readout
@@ -29,44 +30,6 @@ _SHOWN = ("rest", "moving")
 _LARGE = 3000
 # Number of messages of the loop that are kept.
 _MESSAGES = 50
-
-
-class Companion(Protocol):
-    """A reference that follows a session in another process.
-
-    Attributes:
-        notes: what happened since they were cleared, in sentences.
-    """
-
-    notes: list[str]
-
-    def tell(self, command: Command) -> None:
-        """Take a command of the session."""
-        ...
-
-    def frames(self, n: int, still: bool) -> None:
-        """Take the number of frames of the session, and whether it is held still."""
-        ...
-
-    def news(self) -> Sequence[Any]:
-        """Return the states that are known since the last call; never block."""
-        ...
-
-    def close(self) -> None:
-        """End the process."""
-        ...
-
-
-class Gauge(Protocol):
-    """Measures the errors of a session."""
-
-    def take(self, ghost: Any, ring: Ring) -> None:
-        """Compare a state of the companion with the session at the same time."""
-        ...
-
-    def words(self) -> dict[str, str]:
-        """Return the errors that are known, as text by "model", "time" and "solver"."""
-        ...
 
 
 class Loop:
@@ -235,6 +198,7 @@ class Loop:
             if self._gauge is not None:
                 self._gauge.take(ghost, self.ring)
             own = self.ring.at(ghost.time)
+            own = ghost.own if own is None else own  # at rest the equilibrium of the session's model is known, too
             if ghost.kind not in _SHOWN or own is None or own.shape != ghost.positions.shape:
                 continue
             apart = np.linalg.norm(ghost.positions - own, axis=1)
@@ -338,7 +302,7 @@ class Loop:
         live = self.live
         if live.problem.mesh is not self._drawn.mesh:
             self._drawn, self._overlay = drawn(live.problem.mesh, self._drawn.number + 1), None
-        marks = tuple(self._marks())
+        marks = marks_of(live, self.pins)
         readout = self._readout.values(self.clock.now(), live, lambda: self._facts(marks), fresh)
         self._numbers += 1
         echo, self._echo = self._echo, float("nan")
@@ -349,19 +313,3 @@ class Loop:
         errors = {} if self._gauge is None else self._gauge.words()
         pace = self.running, self.pace.speed, self.meter.rates()
         return Facts(*pace, self.still, marks, self._overlay, errors, tuple(self.messages), self._save is not None)
-
-    def _marks(self) -> list[Mark]:
-        """Return what acts on the body."""
-        positions = self.live.moment.positions
-        found = [
-            Mark(
-                "pin" if name in self.pins else "grasp",
-                name,
-                one.radius,
-                one.place,
-                one.at + one.mean_motion(positions),
-            )
-            for name, one in self.live.grasps.items()
-        ]
-        balls = self.live.spheres.items()
-        return found + [Mark("sphere", name, one.radius, one.place, one.place) for name, one in balls]
