@@ -15,9 +15,10 @@ import pytest
 import truespring as ts
 from truespring.errors import LiveError
 from truespring.live import Live
-from truespring.live.haptic import FRAME, GRASP, HOLD, SPHERE, TOUCH, Haptic, Reply, Request, packed_request, read_reply
+from truespring.live.haptic import GRASP, SPHERE, Haptic
 from truespring.live.haptic_loop import HapticLoop
 from truespring.live.orders import Order
+from truespring.live.packets import FRAME, HOLD, TOUCH, Reply, Request, packed_request, read_reply
 from truespring.problem import Problem
 
 CLIENT = Path(__file__).parents[1] / "examples" / "haptic_client.py"

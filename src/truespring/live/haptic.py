@@ -1,30 +1,23 @@
 """A haptic device at a live session: places in, forces out, over a local UDP port at 1 kHz.
 
-The frame is `FRAME`, 64 bytes, little-endian; docs/live.md has a table of it. The body advances by a frame of the
-session for each packet: what comes back is the force of this very place, and the log of the session repeats it bit for
-bit.
+The body advances by a frame of the session for each packet: the reply has the force at the place of that packet, and
+the log of the session repeats it bit for bit.
 """
 
-import hmac
 import math
 import secrets
 import socket
-import struct
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 from truespring.errors import LiveError
+from truespring.live.packets import FRAME, HOLD, TOUCH, Reply, Request, ahead, before, packed_reply, read_request
 from truespring.live.session import Live
 
-#: A frame: magic, version, flags, 0, sequence, number, token, clock [s], vector [m or N], clock [s].
-FRAME = struct.Struct("<4sBBHIIQd3dd")
-MAGIC, VERSION = b"TSHP", 1
-#: Flags of a request, and of the reply where it is so: hold the patch at the place; touch with a sphere there.
-HOLD, TOUCH = 1, 2
 #: Time between frames of a session with a device [s].
 PERIOD = 1e-3
 #: Without a packet for this time [s] what the device holds stays where it is, and the body moves on by the clock.
@@ -35,84 +28,8 @@ GONE = 1.0
 _AT_ONCE = 64
 # Frames that one packet advances at most: packets that were lost, or that came while the body was computed.
 _MOST = 4
-# Sequence numbers have 32 bits: the next of the largest is 0.
-_SEQUENCES = 2**32
 #: Names of what a device holds and touches with.
 GRASP, SPHERE = "haptic", "haptic sphere"
-
-
-class Request(NamedTuple):
-    """A packet of a device.
-
-    Attributes:
-        flags: HOLD, TOUCH, both or 0.
-        sequence: number of the packet, larger by 1 than the last one.
-        clock: time of the device [s]; it comes back with the reply.
-        place: of the device [m], three values; a plane body does not use the third.
-    """
-
-    flags: int
-    sequence: int
-    clock: float
-    place: tuple[float, float, float]
-
-
-class Reply(NamedTuple):
-    """What a device receives.
-
-    Attributes:
-        flags: HOLD while the body is held, TOUCH while a sphere is there.
-        sequence: that of the request.
-        frames: number of frames that the request advanced the body by.
-        total: number of frames of the session.
-        time: simulated time [s].
-        force: of the body on the device [N], three values.
-        clock: that of the request [s].
-    """
-
-    flags: int
-    sequence: int
-    frames: int
-    total: int
-    time: float
-    force: tuple[float, float, float]
-    clock: float
-
-
-def packed_request(token: int, request: Request) -> bytes:
-    """Return the frame of a request."""
-    flags, sequence, clock, place = request
-    return FRAME.pack(MAGIC, VERSION, flags, 0, sequence % _SEQUENCES, 0, token, clock, *place, 0.0)
-
-
-def read_request(packet: bytes, token: int) -> Request | str:
-    """Return the request of a packet, or why it is not accepted: "size", "magic", "version", "token", "numbers"."""
-    if len(packet) != FRAME.size:
-        return "size"
-    magic, version, flags, _, sequence, _, theirs, clock, *rest = FRAME.unpack(packet)
-    if magic != MAGIC:
-        return "magic"
-    if version != VERSION:
-        return "version"
-    if not hmac.compare_digest(theirs.to_bytes(8, "little"), token.to_bytes(8, "little")):
-        return "token"
-    if not all(map(math.isfinite, (clock, *rest))) or flags & ~(HOLD | TOUCH):
-        return "numbers"
-    return Request(flags, sequence, clock, (rest[0], rest[1], rest[2]))
-
-
-def packed_reply(reply: Reply) -> bytes:
-    """Return the frame of a reply; its place of the token has the number of frames of the session."""
-    flags, sequence, frames, total, seconds, force, clock = reply
-    return FRAME.pack(MAGIC, VERSION, flags, 0, sequence, frames, total, seconds, *force, clock)
-
-
-def read_reply(packet: bytes) -> Reply:
-    """Return the reply of a packet; raise LiveError if it is none."""
-    if len(packet) != FRAME.size or packet[:5] != MAGIC + bytes([VERSION]):
-        raise LiveError(f"a packet of {len(packet)} bytes is no reply of a haptic session: version {VERSION} has 64")
-    _, _, flags, _, sequence, frames, total, seconds, *rest = FRAME.unpack(packet)
-    return Reply(flags, sequence, frames, total, seconds, (rest[0], rest[1], rest[2]), rest[3])
 
 
 @dataclass
@@ -231,7 +148,7 @@ class Haptic:
             request = self._accepted(packet, address)
             if request is not None and found is not None:
                 self.counts["late"] += 1
-                request = request if self._is_newer(request.sequence, found[0].sequence) else found[0]
+                request = request if ahead(request.sequence, found[0].sequence) else found[0]
             found = found if request is None else (request, address)
         return found
 
@@ -247,23 +164,18 @@ class Haptic:
             self.counts[request] += 1
             return None
         if self._device is _NOBODY:
-            self._device = _Device(address, (request.sequence - 1) % _SEQUENCES, self._clock())
+            self._device = _Device(address, before(request.sequence), self._clock())
         if address != self._device.address:
             self.counts["other device"] += 1
             return None
         return request
 
-    @staticmethod
-    def _is_newer(one: int, other: int) -> bool:
-        """Return whether a sequence number is after another, also past the largest."""
-        return 0 < (one - other) % _SEQUENCES < _SEQUENCES // 2
-
     def _newer(self, request: Request) -> int:
         """Return by how many packets a request is newer than the last one, 0 for an old one."""
-        if not self._is_newer(request.sequence, self._device.sequence):
+        frames = ahead(request.sequence, self._device.sequence)
+        if not frames:
             self.counts["old"] += 1
-            return 0
-        return (request.sequence - self._device.sequence) % _SEQUENCES
+        return frames
 
     # --- the body -----------------------------------------------------------------------------------------------
 
