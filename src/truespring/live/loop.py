@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from truespring.errors import TruespringError, one_line
-from truespring.live.commands import COMMANDS, Command, Log
+from truespring.live.commands import COMMANDS, Log
 from truespring.live.companion import Companion, Gauge
+from truespring.live.compared import Compared
 from truespring.live.drawn import Drawn, drawn
 from truespring.live.marks import marks_of
 from truespring.live.orders import Order, Orders
@@ -16,7 +17,7 @@ from truespring.live.pace import Clock, Meter, Pace, WallClock
 from truespring.live.readout import Facts, Readout
 from truespring.live.ring import Kept, Ring
 from truespring.live.session import Live
-from truespring.live.snapshot import Mark, Overlay, Snapshot
+from truespring.live.snapshot import Mark, Snapshot
 
 #: Slowest and fastest simulated time per real time.
 SPEEDS = (0.01, 10.0)
@@ -24,8 +25,6 @@ SPEEDS = (0.01, 10.0)
 _STILL, _LOOK = 0.01, 6
 # Time between looks at the orders while the session is paused [s].
 _IDLE = 0.05
-# Kinds of ghosts that are shown.
-_SHOWN = ("rest", "moving")
 # A body of more nodes is cut aside.
 _LARGE = 3000
 # Number of messages of the loop that are kept.
@@ -74,10 +73,9 @@ class Loop:
         self.ring = Ring(live.settings.frame)
         self.running, self.still, self.pins = True, False, set[str]()
         self.messages: deque[str] = deque(about, maxlen=_MESSAGES)
-        self._twin, self._gauge, self._save = twin, gauge, save
+        self._compared = Compared(twin, gauge, live.log)
+        self._save = save
         self._single, self._echo, self._numbers = 0, float("nan"), 0
-        self._told, self._log = 0, live.log
-        self._overlay: Overlay | None = None
         self._drawn: Drawn = drawn(live.problem.mesh)
         self._readout = Readout(model)
         self._watchers: list[Callable[[], None]] = []
@@ -105,8 +103,7 @@ class Loop:
         self._ended.set()
         if self._thread is not None:
             self._thread.join(seconds)
-        if self._twin is not None:
-            self._twin.close()
+        self._compared.close()
 
     def save(self) -> str:
         """Write the session to files, after `stop` or before `start`, and return what was written, as a sentence.
@@ -143,9 +140,9 @@ class Loop:
 
     def _end_turn(self, moves: bool, asked: bool) -> None:
         """Compare with the twin, and make known what changed."""
-        before = self._overlay
-        self._guarded(self._compare)
-        if moves or asked or self._overlay is not before:
+        before = self._compared.overlay
+        self._guarded(lambda: self._compared.news(self.ring, self.messages))
+        if moves or asked or self._compared.overlay is not before:
             self._publish(fresh=asked)
 
     def _guarded(self, done: Callable[[], None]) -> None:
@@ -173,37 +170,7 @@ class Loop:
         if log.frames % _LOOK < frames:
             energies = self.live.energies()
             self.still = energies.kinetic < _STILL * energies.elastic
-        self._tell()
-
-    def _tell(self) -> None:
-        """Give the twin the commands and the frames since the last time."""
-        log = self.live.log
-        if log is not self._log:  # it began again
-            self._log, self._told, self._overlay = log, 0, None
-            if self._twin is not None:
-                self._twin.tell(Command(0, "restart"))
-        if self._twin is None:
-            return
-        for command in log.commands[self._told :]:
-            self._twin.tell(command)
-        self._told = len(log.commands)
-        self._twin.frames(log.frames, self.still)
-
-    def _compare(self) -> None:
-        """Compare the news of the twin with the session at equal times."""
-        if self._twin is not None and self._twin.notes:
-            self.messages.extend(self._twin.notes)
-            self._twin.notes.clear()
-        for ghost in () if self._twin is None else self._twin.news():
-            if self._gauge is not None:
-                self._gauge.take(ghost, self.ring)
-            own = self.ring.at(ghost.time)
-            own = ghost.own if own is None else own  # at rest the equilibrium of the session's model is known, too
-            if ghost.kind not in _SHOWN or own is None or own.shape != ghost.positions.shape:
-                continue
-            apart = np.linalg.norm(ghost.positions - own, axis=1)
-            self._numbers += 1
-            self._overlay = Overlay(self._numbers, ghost.kind, ghost.time, ghost.positions, apart)
+        self._compared.tell(log, self.still)
 
     # --- orders -------------------------------------------------------------------------------------------------
 
@@ -233,7 +200,7 @@ class Loop:
                 self.messages.append(f"{order.kind} was changed: a recording ends before it")
         if order.kind == "restart":
             self.ring, self.pins = Ring(self.live.settings.frame), set()
-        self._tell()
+        self._compared.tell(self.live.log, self.still)
 
     def _node(self, order: Order) -> int:
         """Return the number of the node of an order among those of the mesh, or of the surface's node nearest to it."""
@@ -301,15 +268,15 @@ class Loop:
     def _snapshot(self, fresh: bool) -> Snapshot:
         live = self.live
         if live.problem.mesh is not self._drawn.mesh:
-            self._drawn, self._overlay = drawn(live.problem.mesh, self._drawn.number + 1), None
+            self._drawn, self._compared.overlay = drawn(live.problem.mesh, self._drawn.number + 1), None
         marks = marks_of(live, self.pins)
         readout = self._readout.values(self.clock.now(), live, lambda: self._facts(marks), fresh)
         self._numbers += 1
         echo, self._echo = self._echo, float("nan")
         known = (live.log.frames, live.time, self.running, self._drawn, live.positions, marks)
-        return Snapshot(self._numbers, *known, self._overlay, readout, echo)
+        return Snapshot(self._numbers, *known, self._compared.overlay, readout, echo)
 
     def _facts(self, marks: Sequence[Mark]) -> Facts:
-        errors = {} if self._gauge is None else self._gauge.words()
+        overlay, errors = self._compared.overlay, self._compared.errors
         pace = self.running, self.pace.speed, self.meter.rates()
-        return Facts(*pace, self.still, marks, self._overlay, errors, tuple(self.messages), self._save is not None)
+        return Facts(*pace, self.still, marks, overlay, errors, tuple(self.messages), self._save is not None)
