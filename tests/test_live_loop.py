@@ -1,5 +1,6 @@
 """The loop of a live session: orders, pace, frames that are kept, and what a twin is given, by a stand-in clock."""
 
+import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -186,6 +187,17 @@ def test_an_error_of_the_session_pauses_it(monkeypatch: pytest.MonkeyPatch) -> N
     assert loop.latest.running and loop.latest.frames > 0
 
 
+def test_a_grasp_added_after_a_restart_has_no_force_yet() -> None:
+    """Also while the session is paused: the page shows it at once."""
+    loop = loop_of()
+    loop.ask(Order("pull", "pull 1", node=0))
+    turns(loop, 2)
+    for order in (Order("pause"), Order("restart"), Order("pull", "pull 2", node=1)):
+        loop.ask(order)
+    turns(loop, 1)
+    assert [(one["name"], one["force"]) for one in loop.latest.readout["marks"]] == [("pull 2", None)]
+
+
 def test_settings_are_those_that_were_set() -> None:
     loop = loop_of(model="first")
     known = loop.latest.readout["settings"]
@@ -259,8 +271,9 @@ def test_the_thread_of_a_loop_runs_and_stops() -> None:
             break
     loop.stop()
     assert len(seen) > 3 and seen == sorted(seen)
-    frames = loop.latest.frames
-    assert frames and loop.latest.frames == frames
+    last = loop.latest.number
+    time.sleep(0.05)
+    assert loop.latest.number == last == seen[-1]
 
 
 def test_a_body_at_rest_keeps_its_step() -> None:

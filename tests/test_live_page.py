@@ -105,7 +105,6 @@ def test_a_point_is_pulled_by_the_mouse(address: str, browser: Any) -> None:
     seen.page.wait_for_timeout(1000)
     assert seen.place(node)[1] > begin[1] + 0.03
     assert seen.ask("truespringLive.counts.lags.length") > 3
-    assert "measuring" in seen.page.inner_text("#errors") or "%" in seen.page.inner_text("#errors")
     seen.until("truespringLive.readout.errors.model !== null && truespringLive.readout.errors.time !== null", 1200)
     assert seen.page.inner_text("#errors").count("%") >= 2
     mouse.up()
