@@ -135,7 +135,7 @@ def test_an_inverted_body_recovers() -> None:
 def by_steps(problem: ts.Problem, **settings: object) -> Live:
     """A session whose steps are taken one by one."""
     live = Live(problem, ts.Springs("gaussian"), **settings)
-    live._stepper = StepByStep(Leapfrog(live.body), "leapfrog")
+    live._core.mover.stepper = StepByStep(Leapfrog(live.body), "leapfrog")
     return live
 
 
@@ -197,7 +197,7 @@ def test_a_session_repeats_bit_for_bit() -> None:
 
 def test_a_step_that_is_too_long_is_halved_and_the_energy_stays_bounded() -> None:
     live = Live(CUBE, ts.Springs("gaussian"))
-    live._longest = 1.3 * live._stable  # unstable at rest, too
+    live._core.mover.longest = 1.3 * live._core.built.stable  # unstable at rest, too
     longest = live.step_length
     weight = 9.81 * live.body.mass
 
@@ -210,7 +210,7 @@ def test_a_step_that_is_too_long_is_halved_and_the_energy_stays_bounded() -> Non
         live.step()
         totals.append(total())
         stored.append(live.energies().elastic)
-    assert live.step_length < live._stable < longest
+    assert live.step_length < live._core.built.stable < longest
     assert [note for note in live.notes if "the step is halved" in note]
     assert not [note for note in live.notes if "unstable" in note]
     assert np.ptp(totals[20:]) < 0.01 * max(stored)
@@ -222,7 +222,7 @@ def test_frames_of_another_state_begin_with_its_own_forces() -> None:
     first.step(5)
     second.step(2)
     second.go_on(first.state)
-    first._stepper.forget()
+    first._core.mover.stepper.forget()
     first.step()
     second.step()
     assert np.array_equal(first.positions, second.positions)

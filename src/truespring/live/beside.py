@@ -15,7 +15,8 @@ from truespring.live.follower import Follower
 from truespring.live.ghost import Ghost
 from truespring.live.hold import Hold
 from truespring.live.rest import InterruptedSearchError
-from truespring.live.session import Live, Settings
+from truespring.live.session import Live
+from truespring.live.settings import Settings
 from truespring.live.solved import solved
 from truespring.live.state import State
 from truespring.models import Model

@@ -4,7 +4,7 @@ from typing import Any
 
 from truespring.live.haptic import Haptic
 from truespring.live.loop import Loop
-from truespring.live.session import FRAME
+from truespring.live.settings import FRAME
 
 
 class HapticLoop(Loop):

@@ -11,7 +11,8 @@ from truespring.live.haptic_loop import HapticLoop
 from truespring.live.loop import Loop
 from truespring.live.measured import Measures
 from truespring.live.record import write_session
-from truespring.live.session import FRAME, Live
+from truespring.live.session import Live
+from truespring.live.settings import FRAME
 from truespring.live.twin import Twin
 from truespring.models import Fem
 from truespring.study import Study, read_text

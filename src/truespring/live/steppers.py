@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+import numpy as np
+
 from truespring.arrays import Floats, Ints
 from truespring.conditions import Loading
 from truespring.live.actions import Ball, Grip, Weight, stacked
@@ -57,6 +59,11 @@ class Frame:
     damped: float
     forces: Floats
     solved: bool = True
+
+    @property
+    def is_found(self) -> bool:
+        """Whether all steps were found, and all positions are finite."""
+        return self.solved and bool(np.isfinite(self.moment.positions).all())
 
 
 class Stepper(Protocol):

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from truespring.live.lives import Life, gravity
-from truespring.live.session import Live, steps_in
+from truespring.live.session import Live
+from truespring.live.settings import steps_in
 from truespring.material import Material
 from truespring.study import Study, moved_document
 from truespring.tools import Grasp, Tool
