@@ -1,7 +1,7 @@
 """What runs beside a session: the reference at rest and in motion, and the same model with shorter steps.
 
-It is told the commands of the session, and how far that is; `turn` does the next piece of work. `twin.Twin` runs it in
-another process.
+It receives the commands of the session and its number of frames; `turn` does the next piece of work. `twin.Twin`
+runs it in another process.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -38,7 +38,7 @@ class Job:
 
     Attributes:
         problem: the problem of the session, completed.
-        reference: the model that is right.
+        reference: the model to compare with.
         model: the model of the session at its begin.
         models: the models to which the session may change, by name.
         settings: how the session takes its steps.
@@ -94,7 +94,7 @@ class Beside:
         self._shown = 0.0
         self._hear: Callable[[], None] = lambda: None
 
-    # --- what it is told ----------------------------------------------------------------------------------------
+    # --- what it receives ---------------------------------------------------------------------------------------
 
     def tell(self, command: Command) -> None:
         """Note a command of the session."""

@@ -28,7 +28,7 @@ _ROUNDING = 1e-11
 
 
 class Arrays(NamedTuple):
-    """A body for the loops of `kernels.leapfrog`, where shapes and units are told."""
+    """A body for the loops of `kernels.leapfrog`, which has shapes and units."""
 
     columns: Any
     straight: Bools

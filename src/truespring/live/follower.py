@@ -57,7 +57,7 @@ class Follower:
         self.frame, self.since, self.waits = 0, 0.0, waits
 
     def go_on(self, held: State, moment: Moment | None = None) -> None:
-        """Go on from the state of the other session, told after all commands before it; or from `moment`, held so."""
+        """Go on from the state of the other session, or from `moment`, held so; after all commands before it."""
         self._first, self._start = self._changes, (held, moment)
         self._left.clear()
         self._latest_step()

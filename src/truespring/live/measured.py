@@ -23,7 +23,7 @@ class Frames(Protocol):
         ...
 
 
-# Errors below this are not told apart.
+# Errors below this are shown as smaller than it.
 _SMALLEST = 1e-5
 # An error of the last moments is that of now [s].
 _NOW = 0.05

@@ -21,7 +21,6 @@ class Order:
         value: what the kind needs.
         node: number of a node.
         echo: time that a page gave to its message; it comes back with the first frame after it.
-        more: further numbers of the kind.
     """
 
     kind: str
@@ -31,7 +30,6 @@ class Order:
     value: float | None = None
     node: int | None = None
     echo: float | None = None
-    more: tuple[float, ...] = ()
 
 
 class Orders:

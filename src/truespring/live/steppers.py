@@ -1,6 +1,5 @@
 """Ways to take the steps of a frame, and the one that takes steps of any scheme."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -142,8 +141,3 @@ class StepByStep:
         own += [one.interaction(acting.surface, len(nodes), times, span) for one in acting.balls]
         loading = acting.weight.added_to(body.loading, times, span)
         return replace(loading, interactions=(*loading.interactions, *own))
-
-
-def names(one: Sequence[Grip | Ball]) -> tuple[str, ...]:
-    """Return the names of grasps or spheres."""
-    return tuple(each.name for each in one)

@@ -37,11 +37,10 @@ _NICE = 5
 
 
 class Twin:
-    """A process that is told the commands of a session, and how far it is; `news` returns what it found.
+    """A process that receives the commands of a session and its number of frames; `news` returns what it found.
 
-    All methods return at once. If the process ends, `ended` says why, and nothing else happens.
-
-    The process has one thread of kernels, and is less urgent than the session.
+    All methods but `close` return at once. If the process ends, `ended` has the reason, and the session goes on. The
+    process has one thread of kernels and a lower priority.
 
     Attributes:
         notes: what happened, in sentences.
@@ -49,7 +48,7 @@ class Twin:
     """
 
     def __init__(self, live: Live, reference: Model | Potential) -> None:
-        """Start the process beside a session at its begin; `reference` is the model that counts as right.
+        """Start the process beside a session at its begin; `reference` is the model to compare with.
 
         Raises LiveError if problem or models cannot be sent to another process.
         """
@@ -103,7 +102,7 @@ class Twin:
             self._put("present", live.state, live.step_length)
 
     def follow(self) -> None:
-        """Tell all that is new in the session, after each frame: instead of `tell` and `frames`."""
+        """Send what is new in the session, after each frame: instead of `tell` and `frames`."""
         log = self._live.log
         if log is not self._log:
             self._log, self._told = log, 0
@@ -226,7 +225,7 @@ class _Served:
 
 
 def packed(job: Job) -> bytes:
-    """Return what is compared as bytes; raise LiveError if that is not possible."""
+    """Return a job as bytes; raise LiveError if that is not possible."""
     file = io.BytesIO()
     pickler = pickle.Pickler(file)
     pickler.dispatch_table = copyreg.dispatch_table | {MappingProxyType: _by_its_values}
