@@ -1,4 +1,4 @@
-"""The server of a session on this machine: one page, one socket, one owner, any number of pages that watch."""
+"""The server of a session on this machine: one page, one socket, one owner, up to 15 pages that watch."""
 
 import asyncio
 import secrets
