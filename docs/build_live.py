@@ -76,7 +76,10 @@ def main() -> None:
         session.terminate()
         session.wait()
     kept = [*pictures[: PULLED + 1], *pictures[PULLED + 1 : PULLED + HELD : 3], *pictures[PULLED + HELD :]]
-    palette = kept[len(kept) // 2].quantize(96)
+    both = Image.new("RGB", (2 * FILM[0], FILM[1]))  # without colours of the distance, and with them
+    both.paste(kept[0], (0, 0))
+    both.paste(kept[len(kept) // 2], (FILM[0], 0))
+    palette = both.quantize(128)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in kept]
     file = ROOT / "docs" / "images" / "live.gif"
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=120, loop=0, optimize=True)
