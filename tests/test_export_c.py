@@ -233,7 +233,7 @@ def test_single_precision() -> None:
 # --- grasps and spheres ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("plane", [False, True])
+@pytest.mark.parametrize("plane", [False, pytest.param(True, marks=pytest.mark.verification)])
 def test_grasps_and_spheres_are_those_of_a_live_session(plane: bool) -> None:
     mesh, section = (_STRIP, _SLICE) if plane else (_BOX, None)
     dim = mesh.dim
