@@ -351,6 +351,7 @@ def test_ansys_vm9_settles_in_calculix(tmp_path: Path) -> None:
 # --- what goes wrong ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.verification
 @needs_ccx
 def test_levels_reached_are_kept_where_it_does_not_converge(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Crushed to a hundredth of its length: St. Venant-Kirchhoff's law has nothing that resists it."""

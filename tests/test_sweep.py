@@ -562,6 +562,7 @@ def test_a_file_that_changes_meanwhile_fails_its_points(tmp_path: Path) -> None:
         solve_point((plan.text, point))
 
 
+@pytest.mark.verification
 def test_any_cluster_will_do(cluster: str, study: Path) -> None:
     vary = {"material.poisson": "0:0.4:5"}
     with Pool(scheduler=cluster) as pool:

@@ -231,6 +231,7 @@ def test_an_order_that_meshes_only_seem_to_have_is_not_believed() -> None:
     assert shown is None and errors[-1] < told < 1.5 * errors[-1]
 
 
+@pytest.mark.verification
 def test_what_is_adaptive_has_the_lines_of_the_whole_grid(bent: Validity, study: Path) -> None:
     whole = map_validity(
         study,
@@ -356,6 +357,7 @@ def test_a_reference_that_ends_limits_the_map(study: Path) -> None:
     assert "St. Venant-Kirchhoff FEM itself ends at" in verdict(found, one)
 
 
+@pytest.mark.verification
 def test_other_axes(study: Path) -> None:
     """Elements of the right length suit Lloyd's squares alone; Poisson's ratio the rules that follow it."""
     found = map_validity(study, rules=["lloyd", "isotropic"], x="aspect", y=None, ranges={"aspect": (1, 2, 3)})
