@@ -419,6 +419,11 @@ class Refined(Potential, Protocol):
         ...
 
 
+def loading_of(potential: Potential, loading: Loading) -> Loading:
+    """Return the loading of all nodes of a potential; `loading` is that of the nodes of the mesh."""
+    return potential.loading if isinstance(potential, Refined) else loading
+
+
 def from_parents(parents: Ints, n_nodes: int) -> "sparse.csr_array[Any]":
     """Return the weights of all nodes of a refined potential from the `n_nodes` of the mesh, shape (n_all, n_nodes)."""
     n_further = len(parents)

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from truespring.arrays import Floats
 from truespring.coarsening import CoarseBody
-from truespring.conditions import Loading, Refined, from_parents, on_the_mesh
+from truespring.conditions import Loading, Refined, from_parents, loading_of, on_the_mesh
 from truespring.deprecation import renamed_argument
 from truespring.dynamics import Dynamics
 from truespring.errors import ModelError, OneProcessError, ProblemError, TruespringError, one_line
@@ -132,7 +132,7 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         raise ModelError(
             f"the potential has nodes of shape {potential.nodes.shape}, the problem {problem.mesh.nodes.shape}"
         )
-    loading = potential.loading if isinstance(potential, Refined) else problem.loading
+    loading = loading_of(potential, problem.loading)
     upright = geometry_of(problem, model.finite)
     geometry = replace(
         upright,
@@ -228,7 +228,7 @@ def moving_body(problem: Problem, model: Model | Potential) -> tuple[MovingBody,
         raise ProblemError("a motion needs dynamics: Problem(..., dynamics=Dynamics(duration=...))")
     check_fibres(problem, model)
     potential = model.potential(problem)
-    loading = potential.loading if isinstance(potential, Refined) else problem.loading
+    loading = loading_of(potential, problem.loading)
     loading = loading if model.finite else loading.at_rest(potential.nodes)
     mass, damper = _inertia(problem, dynamics, model, potential)
     creep = creep_speed(dynamics, potential.nodes)

@@ -20,6 +20,10 @@ class Lame(NamedTuple):
     mu: float
 
 
+#: Density of water [kg/m^3], for bodies that move and have none.
+WATER = 1000.0
+
+
 @dataclass(frozen=True, slots=True)
 class Material:
     """An isotropic elastic material.

@@ -24,7 +24,7 @@ from truespring.loading import (
     nodal_force,
     nodal_mass,
 )
-from truespring.material import Material, Section, Solid
+from truespring.material import WATER, Material, Section, Solid
 from truespring.memory import slices
 from truespring.mesh import MIXED, Mesh, Selection, element_corner_measures, select_elements
 from truespring.mesh.selections import AXES
@@ -198,9 +198,20 @@ class Problem:
         """The body without fibres, and without supports and loads, which may act along them; `self` if it has none."""
         if self.fibres is None or self.material is None:
             return self
-        regions = [replace(region, material=replace(region.material, fibres=None)) for region in self.regions]
-        material = replace(self.material, fibres=None)
-        return replace(self, material=material, regions=regions, supports=(), loads=(), stated=False)
+        plain = replace(self, supports=(), loads=(), stated=False)
+        return plain.with_materials(lambda material: replace(material, fibres=None))
+
+    def with_materials(self, change: Callable[[Material], Material]) -> "Problem":
+        """Return the problem with each material changed: that of the body, and those of its regions."""
+        if self.material is None:
+            return self
+        regions = [replace(region, material=change(region.material)) for region in self.regions]
+        return replace(self, material=change(self.material), regions=regions)
+
+    @property
+    def dense(self) -> "Problem":
+        """The problem with the density of water for materials without one."""
+        return self.with_materials(lambda material: replace(material, density=material.density or WATER))
 
     @cached_property
     def blocks(self) -> "tuple[tuple[Ints, Problem], ...]":

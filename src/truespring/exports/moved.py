@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.conditions import Loading, Refined
+from truespring.conditions import Loading, Refined, loading_of
 from truespring.dynamics import Damping
 from truespring.exports.exported import Exported
-from truespring.material import Material
+from truespring.material import WATER
 from truespring.motion.explicit import stable_step
 from truespring.motion.moving import Body
 from truespring.potential import Massive
-from truespring.problem import Problem
 from truespring.tools.surface import surface
 
-# Density of a body without one: that of water [kg/m^3]; mass of a node of a network without masses [kg].
-_WATER, _NODE_MASS = 1000.0, 1.0
+# Mass of a node of a network without masses [kg].
+_NODE_MASS = 1.0
 # Radius of a grasp by default: the larger of these shares of a typical edge and of the size of the body.
 _PATCH, _SHARE = 1.6, 0.05
 # Steps in which the load grows when the body settles: at least so many, and so many for a support to move by an edge.
@@ -42,7 +41,8 @@ class Moved:
     def loading(self) -> Loading:
         """The loading of all nodes of the potential."""
         potential = self.exported.path.potential
-        return potential.loading if isinstance(potential, Refined) else self.exported.problem.loading
+        assert potential is not None  # springs have one
+        return loading_of(potential, self.exported.problem.loading)
 
     @property
     def nodes(self) -> Floats:
@@ -55,7 +55,7 @@ class Moved:
     def mass(self) -> Floats:
         """Lumped mass of each node [kg], shape (n_nodes,)."""
         potential: Any = self.exported.path.potential
-        dense = _dense(self.exported.problem)
+        dense = self.exported.problem.dense
         if isinstance(potential, Refined):
             moved: Any = potential  # a frozen dataclass of the problem
             return np.asarray(replace(moved, problem=dense).lumped_mass())
@@ -105,17 +105,5 @@ class Moved:
         if not problem.materials:
             yield f"A network without masses has {_NODE_MASS:g} kg per node."
         elif any(material.density is None for material in problem.materials):
-            yield f"No density is given: that of water, {_WATER:g} kg/m^3, is assumed."
+            yield f"No density is given: that of water, {WATER:g} kg/m^3, is assumed."
         yield f"The largest stable step of the undeformed body is {self.stable:.6g} s; body.step is half of it."
-
-
-def _dense(problem: Problem) -> Problem:
-    """Return a problem whose materials have a density."""
-
-    def dense(material: Material) -> Material:
-        return material if material.density is not None else replace(material, density=_WATER)
-
-    if problem.material is None:
-        return problem
-    regions = [replace(one, material=dense(one.material)) for one in problem.regions]
-    return replace(problem, material=dense(problem.material), regions=regions)

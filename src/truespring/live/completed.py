@@ -1,17 +1,14 @@
 """What a study leaves open that a session needs: density, and how the body begins."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from truespring.dynamics import Damping, Dynamics
 from truespring.loading import Fixed
-from truespring.material import Material
+from truespring.material import WATER
 from truespring.problem import Problem
 
-#: Density of a body without one: that of water [kg/m^3].
-WATER = 1000.0
 #: Damping by mass of a body without dynamics [1/s]: its slow motion ceases within a second or two.
 DAMPING = 4.0
 
@@ -21,7 +18,7 @@ def completed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     notes = []
     if problem.material is not None and any(one.density is None for one in problem.materials):
         notes.append(f"no density is given: that of water, {WATER:g} kg/m^3, is taken")
-        problem = with_materials(problem, lambda one: replace(one, density=one.density or WATER))
+        problem = problem.dense
     if problem.dynamics is None:
         notes.append(
             f"no dynamics are given: the body begins at its equilibrium, with damping by mass of {DAMPING:g} 1/s"
@@ -37,12 +34,3 @@ def _moved_at_once(support: Fixed) -> Fixed:
     if support.over is not None or not (support.rotation or np.any(support.displacement or 0.0)):
         return support
     return replace(support, over=((0.0, 1.0),))
-
-
-def with_materials(problem: Problem, change: Callable[[Material], Material]) -> Problem:
-    """Return a problem with each material changed, that of the body first, then those of its regions."""
-    if problem.material is None:
-        return problem
-    material = change(problem.material)
-    regions = [replace(one, material=change(one.material)) for one in problem.regions]
-    return replace(problem, material=material, regions=regions)

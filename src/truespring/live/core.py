@@ -8,7 +8,7 @@ import numpy as np
 from truespring.dynamics import Dynamics
 from truespring.live.choosing import Choice, Schemes
 from truespring.live.commands import Log
-from truespring.live.completed import completed, with_materials
+from truespring.live.completed import completed
 from truespring.live.cut import Aside, Built, Whole, built
 from truespring.live.gravity import FullGravity, weighted
 from truespring.live.held import Held
@@ -139,7 +139,7 @@ class Core:
 
         if not self.changes and problem.dynamics is self.dynamics:
             return problem
-        return replace(with_materials(problem, changed), dynamics=self.dynamics)
+        return replace(problem.with_materials(changed), dynamics=self.dynamics)
 
     # --- how it moves -------------------------------------------------------------------------------------------
 

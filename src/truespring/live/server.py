@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ADDRESS = "127.0.0.1"
 # Names of this machine in the headers Host and Origin.
 _HOSTS = (ADDRESS, "localhost")
-# A page is closed after so many wrong messages; more pages than these are refused.
+# A page is closed after so many wrong messages; no more pages than these may watch.
 _WRONG, _PAGES = 20, 16
 # WebSocket close codes: a policy was violated; try again later.
 _REFUSED, _LATER = 1008, 1013
