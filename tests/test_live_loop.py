@@ -282,7 +282,7 @@ def test_a_body_at_rest_keeps_its_step() -> None:
     live = Live(problem, ts.Springs("gaussian"))
     steps = live.steps_a_frame
     live.step(10)
-    assert live.steps_a_frame == steps and not live.notes
+    assert live.steps_a_frame == steps and not [note for note in live.notes if "halved" in note]
 
 
 def test_a_node_within_a_plane_body_stands_for_the_nearest_of_its_boundary() -> None:
