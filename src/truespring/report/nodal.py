@@ -34,9 +34,10 @@ FIELDS: Mapping[str, Field] = {
 def node_fields(path: Solution, state: State) -> dict[str, Floats]:
     """Return what is known of FIELDS at the nodes of a solid body, shape (n_nodes,) each.
 
-    * stress: von Mises, of the mean of the true stress of the elements at a node; of an element with springs alone their
-      virial stress, sum(t l n n) / v with tension t, length l and direction n of its springs and its volume v
-      (Thompson, Plimpton, Mattson, General formulation of pressure and stress tensor, J. Chem. Phys. 131 (2009) 154107).
+    * stress: von Mises, of the mean of the true stress of the elements at a node. The stress of an element that has
+      springs only is their virial stress, sum(t l n n) / v with tension t, length l and direction n of each spring and
+      the volume v (Thompson, Plimpton, Mattson, General formulation of pressure and stress tensor for arbitrary
+      many-body interaction potentials, J. Chem. Phys. 131 (2009) 154107).
     * stretch: the largest singular value of the deformation gradient of the elements.
     * energy: stored energy per undeformed volume [J/m^3]; not known where cells do not hold all of it.
 
@@ -161,7 +162,7 @@ def _keys(mesh: Mesh, ends: Ints) -> Ints:
 def _virial(ends: Ints, tension: Floats, positions: Floats) -> Floats:
     """Return tension times length times the dyad of the direction of each spring [J], shape (n_springs, 3, 3)."""
     along = positions[ends[:, 1]] - positions[ends[:, 0]]
-    return np.einsum("s,si,sj->sij", tension / np.linalg.norm(along, axis=1), along, along)
+    return np.asarray(np.einsum("s,si,sj->sij", tension / np.linalg.norm(along, axis=1), along, along))
 
 
 def _von_mises(stress: Floats) -> Floats:
