@@ -212,5 +212,5 @@ def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: t
     with pytest.raises(OutputError, match=r"the suffix of an animation is \.gif or \.mp4, not '\.avi'"):
         springs.animate(tmp_path / "springs.avi")
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))
-    with pytest.raises(OutputError, match="needs two load levels or more, springs.stl has fewer"):
+    with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
         surface.animate(tmp_path / "surface.gif")

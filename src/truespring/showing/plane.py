@@ -64,7 +64,7 @@ def draw_lines(
 
 def draw_dots(axes: "Axes", points: Floats, zorder: float, name: str, **style: Any) -> Any:
     """Draw points as dots with a rim."""
-    rim = {"linewidths": 0.4, "edgecolors": "#00000088"}
+    rim: dict[str, Any] = {"linewidths": 0.4, "edgecolors": "#00000088"}
     return axes.scatter(points[:, 0], points[:, 1], s=16, zorder=zorder, gid=name, **rim, **style)
 
 

@@ -35,7 +35,7 @@ class Scene:
     @property
     def is_plane(self) -> bool:
         """Whether the bodies are plane."""
-        return self.mine.points.shape[1] == 2
+        return bool(self.mine.points.shape[1] == 2)
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
