@@ -84,6 +84,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     return {
         "id": f"study-{place}",
         "title": result.title,
+        "stem": result.stem,
         "verdict": verdict_sentences(result),
         "more": [text for sentence in _SENTENCES if (text := sentence(result))],
         "converged": result.converged,
