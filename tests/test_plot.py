@@ -238,7 +238,7 @@ def test_a_mesh_shows_its_sides_and_groups(axes: Any) -> None:
 
 @pytest.mark.parametrize("size", [(0.04, 0.01), (0.04, 0.01, 0.01)])
 def test_a_problem_shows_loads_and_springs(size: tuple[float, ...]) -> None:
-    problem = solved(size=size).problem
+    problem = solved(size=size, model=ts.Springs("gaussian")).problem
     load, blue = np.array([0xB8, 0x4A, 0x00]), np.array([0x00, 0x72, 0xB2])
 
     def count(axes: Any, color: Any) -> int:

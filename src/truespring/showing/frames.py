@@ -114,7 +114,7 @@ def draw_lines(
 
 def thinner(n_lines: int) -> float:
     """Return the factor of the width of many lines."""
-    return min(1.0, max(0.3, (_MANY / max(n_lines, 1)) ** 0.5))
+    return float(np.clip((_MANY / max(n_lines, 1)) ** 0.5, 0.3, 1.0))
 
 
 def draw_dots(axes: "Axes", points: Floats, zorder: float, name: str, **style: Any) -> Any:
