@@ -18,7 +18,7 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "accessor": {"material", "mesh", "models", "problem", "units"},
+    "accessor": {"material", "mesh", "models", "problem"},
     "cli": {
         "calibration",
         "comparing",
@@ -133,7 +133,7 @@ ALLOWED = {
         "study",
     },
     "sweeping": {"study", "report", "outputs"},
-    "showing": {"comparison", "mesh", "potential", "report", "solution", "units"},
+    "showing": {"comparison", "mesh", "models", "potential", "problem", "report", "solution", "units"},
     "study": {
         "outputs",
         "refining",
