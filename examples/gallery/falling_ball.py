@@ -23,8 +23,8 @@ scale = radius * (ring * ring / np.maximum(np.hypot(x, y), 1e-12) + (1 - ring) *
 disc = ts.Mesh(np.stack([scale * x, scale * y + drop + radius], axis=1), square.elements)
 
 # %%
-# The scheme "leapfrog" keeps the energy. The floor is as soft as a layer of rubber: the sum of energies is then constant
-# in steps of 0.1 ms.
+# The scheme "leapfrog" keeps the energy. The floor is as soft as a layer of rubber, so that steps of 0.1 ms resolve the
+# impact.
 problem = ts.Problem(
     disc,
     ts.Material(young=40e3, poisson=0.45, density=1000.0),

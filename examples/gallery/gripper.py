@@ -33,12 +33,12 @@ jaws = [
 ]
 table = ts.HalfSpace("table", (0.0, 1.0), (0.0, 0.0), friction=friction)
 problem = ts.Problem(
-    ts.rectangle((size, size), (10, 10)),
+    ts.rectangle((size, size), (8, 8)),
     ts.Material(young=10e3, poisson=0.45, density=1000.0),
     ts.PlaneStress(thickness),
     loads=ts.Gravity((0.0, -gravity)),
     tools=[*jaws, table],
-    dynamics=ts.Dynamics(0.8, step=4e-3, scheme="bdf2", record=0.02, damping=ts.Damping(stiffness=5e-3)),
+    dynamics=ts.Dynamics(0.8, step=5e-3, scheme="bdf2", record=0.02, damping=ts.Damping(stiffness=5e-3)),
 )
 motion = ts.solve(problem, ts.Springs(rule="gaussian"), ts.Newton(tolerance=1e-8))
 

@@ -10,19 +10,19 @@ import numpy as np
 
 import truespring as ts
 
-length, gravity, friction, slope = 0.10, 9.81, 0.4, np.radians(30)
+length, gravity, slope = 0.10, 9.81, np.radians(30)
 
 
 # %%
 # The axes are those of the incline: gravity is turned, instead of the plane.
 def slide(coefficient: float) -> ts.Solution:
     problem = ts.Problem(
-        ts.rectangle((length, length / 2), (8, 4)),
+        ts.rectangle((length, length / 2), (6, 3)),
         ts.Material(young=1e5, poisson=0.3, density=1000.0),
         ts.PlaneStress(length),
         loads=ts.Gravity((gravity * np.sin(slope), -gravity * np.cos(slope))),
         tools=[ts.HalfSpace("plane", (0.0, 1.0), (0.0, 0.0), friction=coefficient)],
-        dynamics=ts.Dynamics(0.3, step=2e-3, scheme="bdf2", record=0.02, damping=ts.Damping(stiffness=2e-3)),
+        dynamics=ts.Dynamics(0.3, step=4e-3, scheme="bdf2", record=0.02, damping=ts.Damping(stiffness=2e-3)),
     )
     return ts.solve(problem, ts.Springs(rule="gaussian"), ts.Newton(tolerance=1e-8))
 
